@@ -1,0 +1,227 @@
+"""A job: what is simulated and how, read from a YAML file into frozen sections.
+
+`load` reads a job file and names every mistake in it with file, line and column; `Job.resolved` is the job as YAML with
+every default filled in; `describe` is a table of it to read. SI units everywhere. No MPI and no maps here.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, PrivateAttr, ValidationError
+
+from parcontact.jobfile import advice, table
+from parcontact.jobfile.fault import Fault, faults_of
+from parcontact.jobfile.history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_range
+from parcontact.jobfile.loading import read_job
+from parcontact.jobfile.material import Elastic, Material, PronyBranch, Zener, ZenerBranch
+from parcontact.jobfile.part import Context, Part, Rule
+from parcontact.jobfile.sections import Checkpoint, Grid, Numerics, Output
+from parcontact.jobfile.source import Key, Mistake, Source, dump
+from parcontact.jobfile.surface import Cylinder, Flat, HeightFile, Rough, Shape, Sphere, Wave
+
+__all__ = [
+    "Checkpoint",
+    "Control",
+    "Cylinder",
+    "Elastic",
+    "Flat",
+    "GeometricStep",
+    "Grid",
+    "HeightFile",
+    "Initial",
+    "Job",
+    "JobError",
+    "Numerics",
+    "Output",
+    "PronyBranch",
+    "Ramp",
+    "Rough",
+    "Sphere",
+    "Stage",
+    "Steady",
+    "Wave",
+    "Zener",
+    "ZenerBranch",
+    "describe",
+    "load",
+    "log_range",
+]
+
+
+class JobError(Exception):
+    """A job that cannot be run; `mistakes` are sentences, each beginning with file:line:column."""
+
+    def __init__(self, mistakes: Sequence[str]):
+        super().__init__("\n".join(mistakes))
+        self.mistakes = list(mistakes)
+
+
+def _kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
+    if grid.boundary == "free" and numerics.kernel == "spectral":
+        yield Fault("must be love when grid.boundary is free: the spectral kernel is periodic", ("numerics", "kernel"))
+
+
+def _waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
+    """No wave may be shorter than two cells (Nyquist), and the shortest one must fit into the box."""
+    cell = max([step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1], default=0.0)
+    for index, shape in enumerate(surface):
+        if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - advice.ROUND_OFF):
+            sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), got {shape.short_wavelength!r}"
+            yield Fault(sentence, ("surface", index, "short_wavelength"))
+        if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):
+            sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
+            yield Fault(sentence, ("surface", index, "short_wavelength"))
+        for axis, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
+            if abs(waves) > n / 2:
+                sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
+                yield Fault(sentence, ("surface", index, "waves", axis))
+
+
+def _some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
+    if not surface:
+        yield Fault("needs at least one shape; shape: flat is one", ("surface",))
+
+
+def _some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
+    if not history and steady is None:
+        yield Fault("needs at least one stage, unless there is a steady section", ("history",))
+    known = steady is None or steady.pressures is not None or None in history
+    if not known and not any(stage.pressure for stage in history):
+        sentence = "is missing; it must be positive pressures [Pa] when no stage of the history has one"
+        yield Fault(sentence, ("steady", "pressures"))
+
+
+def _some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
+    if not history or None in history or initial.pressure or any(stage.approach for stage in history):
+        return
+    if not any(stage.load.start or stage.load.end for stage in history):
+        yield Fault("must not be zero in every stage: nothing would ever touch", ("history", 0, history[0].control))
+
+
+def _steady_at_rest(initial: Initial, material: Elastic | Zener) -> Iterator[Fault]:
+    if initial.state == "steady" and not any(initial.velocity) and material.long_modulus == 0:
+        sentence = "must not be zero: the material has no long-term modulus, and a fluid at rest no steady contact"
+        yield Fault(sentence, ("initial", "velocity"))
+
+
+class Job(Part):
+    """A whole job. Sections have the names of the job file; equal jobs may come from different files."""
+
+    title: str = Field(default="", description="text (put numbers in quotes)")
+    grid: Grid = Field(description="a mapping with points and size")
+    surface: tuple[Shape, ...] = Field(description="one shape, or a list of shapes")
+    material: Material = Field(description="a mapping with model: elastic | zener")
+    initial: Initial = Initial()
+    history: tuple[Stage, ...] = Field(default=(), description="a list of stages")
+    numerics: Numerics = Numerics()
+    accuracy: Annotated[float, Field(ge=0, lt=1, strict=True)] = Field(
+        default=1e-3, description="an error of friction [-], zero or more and below 1"
+    )
+    output: Output = Output()
+    checkpoint: Checkpoint = Checkpoint()
+    steady: Steady | None = None
+
+    _path: Path = PrivateAttr(default=Path("job.yaml"))
+
+    rules = (
+        Rule(("grid", "numerics"), _kernel_fits),
+        Rule(("surface",), _some_shape),
+        Rule(("grid", "surface"), _waves_fit),
+        Rule(("history", "steady"), _some_history),
+        Rule(("history", "initial"), _some_load),
+        Rule(("initial", "material"), _steady_at_rest),
+    )
+
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+        """Numbers unnamed stages, chooses the kernel by the boundary, and names the output after the job file."""
+        if isinstance(data.get("surface"), dict):
+            data["surface"] = [data["surface"]]
+        if isinstance(data.get("history"), list):
+            data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
+        free = isinstance(data.get("grid"), dict) and data["grid"].get("boundary") == "free"
+        _default(data, "numerics", "kernel", "love" if free else "spectral")
+        _default(data, "output", "directory", str(Path("out", context.path.stem if context else "job")))
+        return data
+
+    def model_post_init(self, context: Any) -> None:
+        """Keeps the path of the job file."""
+        if isinstance(context, Context):
+            self._path = context.path
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Job) and dict(self) == dict(other)
+
+    def __hash__(self) -> int:
+        return hash(self.resolved())
+
+    @property
+    def path(self) -> Path:
+        """The job file (absolute)."""
+        return self._path
+
+    @property
+    def directory(self) -> Path:
+        """Where the job file is; files named in the job are looked for from here."""
+        return self._path.parent
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but will probably disappoint."""
+        return tuple(advice.warnings(self))
+
+    def resolved(self) -> str:
+        """YAML text with every default filled in; it loads back to an equal job."""
+        return dump(table.plain(self))
+
+
+def _named(stage: Any, index: int) -> Any:
+    return {**stage, "name": f"stage {index + 1}"} if isinstance(stage, dict) and stage.get("name") is None else stage
+
+
+def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
+    given = data.get(section, {})
+    if isinstance(given, dict) and given.get(key) is None:
+        data[section] = {**given, key: value}
+
+
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Job:
+    """Reads a job file; `overrides` are texts like `grid.points=512`. Raises JobError with every mistake."""
+    source = read_job(Path(path), tuple(overrides))
+    if () not in source.broken:
+        try:
+            job = Job.model_validate(source.data, context=Context(Path(path).absolute()))
+            if not source.mistakes:
+                return job
+        except ValidationError as error:
+            source.mistakes += _mistakes(source, error)
+    ordered = sorted(source.mistakes, key=lambda mistake: (mistake.place.origin != str(path), mistake.place))
+    raise JobError(list(dict.fromkeys(map(str, ordered))))
+
+
+def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
+    """The faults that the sections found, at their places; not those about data that could not be read."""
+    for fault in faults_of(error):
+        path = source.written(fault.path)
+        if any(path[: len(broken)] == broken[: len(path)] for broken in source.broken):
+            continue
+        place = source.key_place(path) if fault.at_key else source.place(path)
+        yield Mistake(place, f"{_name(path)} {fault.predicate}")
+
+
+def _name(path: Key) -> str:
+    return ".".join(map(str, path)) or "the job"
+
+
+def describe(job: Job) -> str:
+    """A table of the job with every default and its unit; times and cells that follow from it come last."""
+    rows = list(table.rows(job))
+    rows.append(("cell", table.text((job.grid.dx, job.grid.dy)), "m"))
+    seconds = math.fsum(stage.seconds for stage in job.history)
+    rows.append(("time", table.text(seconds), "s"))
+    return table.layout(rows)

@@ -1,0 +1,91 @@
+"""What is allowed in a job but will probably disappoint: warnings with their numbers and what to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from parcontact.jobfile.history import GeometricStep, Stage
+from parcontact.jobfile.sections import Grid
+from parcontact.jobfile.surface import Rough
+
+if TYPE_CHECKING:
+    from parcontact.job import Job
+
+LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter of luck (paper, end of section 3)
+CELLS_PER_WAVE = 8  # fewer under-resolve the contact of the shortest waves (paper, end of section 3)
+STEPS_PER_WAVE = 4  # fewer skip over the shortest waves while sliding
+ROUND_OFF = 1e-9
+
+
+def warnings(job: Job) -> Iterator[str]:
+    """Sentences, in the order of the sections."""
+    yield from _surface(job)
+    for index, stage in enumerate(job.history):
+        yield from _stage(job, index, stage)
+
+
+def _directions(grid: Grid) -> Iterator[tuple[str, float, float]]:
+    """Name, length and cell [m] of the directions that have more than one point."""
+    if grid.nx > 1:
+        yield "x", grid.lx, grid.dx
+    if grid.ny > 1:
+        yield "y", grid.ly, grid.dy
+
+
+def _surface(job: Job) -> Iterator[str]:
+    directions = list(_directions(job.grid))
+    for index, shape in enumerate(job.surface):
+        if not isinstance(shape, Rough) or not directions:
+            continue
+        name, length, _ = min(directions, key=lambda direction: direction[1])
+        if length < LONG_WAVES * shape.long_wavelength * (1 - ROUND_OFF):
+            yield (
+                f"surface.{index}: only {length / shape.long_wavelength:.3g} long waves fit into the box along {name}; "
+                f"for a representative surface use at least {LONG_WAVES}: a size of "
+                f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
+            )
+        name, length, cell = max(directions, key=lambda direction: direction[2])
+        if shape.short_wavelength < CELLS_PER_WAVE * cell * (1 - ROUND_OFF):
+            yield (
+                f"surface.{index}: only {shape.short_wavelength / cell:.3g} cells per shortest wave along {name}; "
+                f"for a resolved contact use at least {CELLS_PER_WAVE}: "
+                f"{math.ceil((1 - ROUND_OFF) * CELLS_PER_WAVE * length / shape.short_wavelength)} points or a "
+                f"short_wavelength of {CELLS_PER_WAVE * cell:.4g} m"
+            )
+
+
+def longest_step(stage: Stage, grid: Grid) -> float:
+    """The longest time step of a stage [s], before steps are fitted to its end."""
+    step = stage.time_step
+    if stage.cells_per_step is not None:
+        return min(stage.seconds, stage.cells_per_step * grid.dx / stage.speed)
+    if isinstance(step, GeometricStep):  # n steps last first (growth^n - 1) / (growth - 1)
+        return min(stage.seconds, (stage.seconds * (step.growth - 1) + step.first) / step.growth)
+    return min(stage.seconds, step or 0.0)
+
+
+def _stage(job: Job, index: int, stage: Stage) -> Iterator[str]:
+    step = longest_step(stage, job.grid)
+    if stage.speed and not stage.seconds:
+        yield f"history.{index}: nothing slides in a stage without duration or distance; its velocity has no effect"
+    yield from _relaxation(job, index, step)
+    short = min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None)
+    slid = step * stage.speed
+    if short is not None and slid > short / STEPS_PER_WAVE * (1 + ROUND_OFF):
+        yield (
+            f"history.{index}: the surface slides {slid:.3g} m in one step, {slid / short:.2g} of its shortest wave; "
+            f"use time steps up to {short / STEPS_PER_WAVE / stage.speed:.3g} s "
+            f"(cells_per_step up to {short / STEPS_PER_WAVE / job.grid.dx:.3g})"
+        )
+
+
+def _relaxation(job: Job, index: int, step: float) -> Iterator[str]:
+    times = [branch.relaxation_time for branch in getattr(job.material, "branches", ())]
+    shortest = min((time for time in times if 0 < time < float("inf")), default=None)
+    if job.numerics.integrator == "backward-euler" and shortest is not None and step > shortest * (1 + ROUND_OFF):
+        yield (
+            f"history.{index}: time steps up to {step:.3g} s are longer than the shortest relaxation time "
+            f"{shortest:.3g} s, which backward-euler does not resolve; shorten the steps or use integrator: exponential"
+        )

@@ -1,0 +1,58 @@
+"""Mistakes as sentences: the part of a sentence that follows the name of a key, and its way through pydantic."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, NoReturn
+
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from parcontact.jobfile.source import Key
+
+AT_VALUE, AT_KEY = "at value", "at key"  # the types of our errors within pydantic
+
+
+class Fault(NamedTuple):
+    """A mistake within a part: the rest of the sentence that begins with the name of a key, and the way to that key."""
+
+    predicate: str
+    path: Key = ()
+    at_key: bool = False  # point at the key itself instead of its value
+
+
+def refuse(*faults: Fault) -> NoReturn:
+    """Raises the faults in the form in which pydantic collects them."""
+    raise ValidationError.from_exception_data("job", [_line(fault) for fault in faults])
+
+
+def _line(fault: Fault) -> InitErrorDetails:
+    kind = PydanticCustomError(AT_KEY if fault.at_key else AT_VALUE, "{text}", {"text": fault.predicate})
+    return InitErrorDetails(type=kind, loc=fault.path, input=None)
+
+
+def faults_of(error: ValidationError) -> Iterator[Fault]:
+    """The faults inside an error that `refuse` raised."""
+    for line in error.errors():
+        yield Fault(line["msg"], line["loc"], line["type"] == AT_KEY)
+
+
+def quote(value: Any) -> str:
+    """A value as it is shown after "got"."""
+    if value is None or isinstance(value, dict):
+        return "nothing" if value is None else "a mapping"
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def choices(words: Iterable[str]) -> str:
+    """The words to choose from."""
+    return " | ".join(words)
+
+
+def did_you_mean(word: Any, words: Iterable[str]) -> str:
+    """The ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
+    known = {candidate.lower(): candidate for candidate in words}
+    close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.65)
+    return f"; did you mean {known[close[0]]}?" if close else ""

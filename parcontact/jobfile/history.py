@@ -1,0 +1,213 @@
+"""The `initial`, `history` and `steady` sections: what is done to the body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create_model
+
+from parcontact.jobfile.fault import Fault, refuse
+from parcontact.jobfile.part import Part, Rule
+from parcontact.jobfile.values import Flag, NonNegative, Positive, Real, Vector, listed
+
+Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
+Control = Literal["pressure", "force", "approach"]
+CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
+PRESSURE = "a pressure [Pa] of zero or more"
+FORCE = "a force [N] of zero or more"
+APPROACH = "a finite approach [m]"
+
+
+SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """A load that goes linearly from `start` to `end` within a stage."""
+
+    start: float
+    end: float
+
+    @property
+    def constant(self) -> bool:
+        """Whether the load does not change."""
+        return self.start == self.end
+
+    def at(self, fraction: float) -> float:
+        """The load at a fraction (0 to 1) of the stage; exact at both ends."""
+        return (1 - fraction) * self.start + fraction * self.end
+
+
+def _ramp(number: Any, description: str) -> PlainValidator:
+    """A validator for `Ramp`: one number, or {from, to}."""
+    start = (number, Field(alias="from", description=description))
+    end = (number, Field(alias="to", description=description))
+    keys = create_model("Ends", __base__=Part, start=start, end=end)
+
+    def read(value: Any) -> Ramp:
+        if isinstance(value, Ramp):
+            return value
+        ends = keys.model_validate(value if isinstance(value, dict) else {"from": value, "to": value})
+        return Ramp(*(number for _, number in ends))
+
+    return PlainValidator(read)
+
+
+class GeometricStep(Part):
+    """Time steps that grow by a factor: `first`, `first growth`, `first growth^2`, ... [s]."""
+
+    first: Positive = Field(description="a positive time step [s]")
+    growth: float = Field(ge=1, allow_inf_nan=False, strict=True, description="a factor [-] of one or more")
+
+
+def _time_step(value: Any) -> float | GeometricStep:
+    if isinstance(value, dict | GeometricStep):
+        return GeometricStep.model_validate(value)
+    return SECONDS.validate_python(value)
+
+
+def _stepping(
+    duration: float | None,
+    distance: float | None,
+    velocity: tuple[float, float],
+    time_step: float | GeometricStep | None,
+    cells_per_step: float | None,
+) -> Iterator[Fault]:
+    """A stage that lasts needs its steps; one that does not must have none."""
+    lasts = duration is not None or distance is not None
+    given = {"time_step": time_step, "cells_per_step": cells_per_step}
+    steps = [name for name, value in given.items() if value is not None]
+    if lasts and not steps:
+        yield Fault("needs exactly one of time_step | cells_per_step, got none")
+    if steps and not lasts:
+        yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (steps[0],))
+    for name, value in (("distance", distance), ("cells_per_step", cells_per_step)):
+        if value is not None and not any(velocity):
+            yield Fault("needs a velocity [m/s] that is not zero", (name,))
+
+
+def _lasting_ramp(duration: float | None, distance: float | None, *loads: Ramp | None) -> Iterator[Fault]:
+    for name, ramp in zip(CONTROLS, loads, strict=True):
+        if ramp is not None and not ramp.constant and duration is None and distance is None:
+            yield Fault("changes from one value to another, which needs a duration [s] or a distance [m]", (name,))
+
+
+class Stage(Part):
+    """One stage of the history: a load, a velocity, and how long they last; an instantaneous stage is one solve."""
+
+    name: str = Field(default="stage", description="text (put numbers in quotes)")
+    pressure: Annotated[Ramp | None, _ramp(NonNegative, PRESSURE)] = Field(default=None, description=PRESSURE)
+    force: Annotated[Ramp | None, _ramp(NonNegative, FORCE)] = Field(default=None, description=FORCE)
+    approach: Annotated[Ramp | None, _ramp(Real, APPROACH)] = Field(default=None, description=APPROACH)
+    velocity: Velocity = (0.0, 0.0)
+    duration: Positive | None = Field(default=None, description="a positive time [s]")
+    distance: Positive | None = Field(default=None, description="a positive length [m]")
+    time_step: Annotated[float | GeometricStep | None, PlainValidator(_time_step)] = Field(
+        default=None, description="a positive time step [s], or {first, growth}"
+    )
+    cells_per_step: Positive | None = Field(
+        default=None, description="a positive number of cells (a fraction is allowed)"
+    )
+
+    one_of = (CONTROLS,)
+    at_most_one = (("duration", "distance"), ("time_step", "cells_per_step"))
+    rules = (
+        Rule(("duration", "distance", "velocity", "time_step", "cells_per_step"), _stepping),
+        Rule(("duration", "distance", *CONTROLS), _lasting_ramp),
+    )
+
+    @property
+    def control(self) -> Control:
+        """Which load is prescribed."""
+        return next(name for name in CONTROLS if getattr(self, name) is not None)
+
+    @property
+    def load(self) -> Ramp:
+        """The prescribed load, in the unit of its control: Pa, N or m."""
+        ramp: Ramp = getattr(self, self.control)
+        return ramp
+
+    @property
+    def speed(self) -> float:
+        """Magnitude of the velocity [m/s]."""
+        return math.hypot(*self.velocity)
+
+    @property
+    def seconds(self) -> float:
+        """How long the stage lasts [s]; 0 for an instantaneous one."""
+        if self.distance is not None:
+            return self.distance / self.speed
+        return self.duration or 0.0
+
+
+def _steady_start(state: str, velocity: tuple[float, float], pressure: float | None) -> Iterator[Fault]:
+    if state == "steady" and pressure is None:
+        yield Fault("needs a pressure [Pa] for the steady state to start from")
+    if state == "virgin" and (any(velocity) or pressure is not None):
+        yield Fault("must be steady when velocity or pressure is given: a virgin body has felt nothing", ("state",))
+
+
+class Initial(Part):
+    """What the body has felt before: nothing, or steady sliding (at rest: full relaxation) under a pressure."""
+
+    state: Literal["virgin", "steady"] = "virgin"
+    velocity: Velocity = (0.0, 0.0)
+    pressure: Positive | None = Field(default=None, description="a positive pressure [Pa]")
+
+    rules = (Rule(("state", "velocity", "pressure"), _steady_start),)
+
+
+def log_range(text: str) -> tuple[float, ...]:
+    """`a:b:n` as n positive numbers from a to b, equally spaced in their logarithm; ValueError for other text."""
+    first, last, count = text.split(":")
+    a, b, n = float(first), float(last), int(count)
+    if not (0 < a < math.inf and 0 < b < math.inf and n >= 1) or (n == 1 and a != b):
+        raise ValueError(text)
+    return (*(a * (b / a) ** (i / (n - 1)) for i in range(n - 1)), b)
+
+
+def _numbers(value: Any) -> Any:
+    if not isinstance(value, str):
+        return listed(value)
+    try:
+        return log_range(value)
+    except ValueError:
+        refuse(Fault(f"must be numbers or a range first:last:count like 1e-3:1e2:31, both positive, got {value!r}"))
+
+
+def _some(name: str) -> Rule:
+    def check(values: tuple[float, ...] | None) -> Iterator[Fault]:
+        if values == ():
+            yield Fault("must have at least one number, got none", (name,))
+
+    return Rule((name,), check)
+
+
+def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
+    if not any(direction):
+        yield Fault("must not be zero in both components, got [0, 0]", ("direction",))
+
+
+class Steady(Part):
+    """Steady sliding solved directly, for each speed under each pressure."""
+
+    velocities: Annotated[tuple[Positive, ...], BeforeValidator(_numbers)] = Field(
+        description="positive speeds [m/s]: a list, or first:last:count"
+    )
+    pressures: Annotated[tuple[Positive, ...] | None, BeforeValidator(_numbers)] = Field(
+        default=None, description="positive pressures [Pa]: a list, or first:last:count"
+    )
+    direction: tuple[Real, Real] = Field(default=(1.0, 0.0), description="a direction [x, y] [-]")
+    waves: Flag = Field(default=False, description="true or false")
+
+    rules = (_some("velocities"), _some("pressures"), Rule(("direction",), _directed))
+
+    @property
+    def unit_direction(self) -> tuple[float, float]:
+        """The direction with length 1."""
+        x, y = self.direction
+        length = math.hypot(x, y)
+        return x / length, y / length

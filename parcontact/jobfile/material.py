@@ -1,0 +1,130 @@
+"""The `material` section: an elastic or a generalized Zener body (paper, Eq. 8 and its state variables)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, PlainValidator, ValidationInfo
+
+from parcontact.jobfile.fault import Fault, quote, refuse
+from parcontact.jobfile.part import Part, Rule, chosen
+from parcontact.jobfile.values import NonNegative, Positive
+
+Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
+Poisson = Annotated[float, Field(gt=-1, le=0.5, strict=True, description="a Poisson ratio [-] above -1 and up to 0.5")]
+
+
+class ZenerBranch(Part):
+    """A spring G0 in series with a Kelvin element, spring G1 beside dashpot eta1; G1 = 0 makes it a Maxwell branch."""
+
+    label: ClassVar[str] = "a branch of the form G0, G1, eta1"
+    G0: Positive = Field(description="a positive shear modulus [Pa]")
+    G1: Modulus
+    eta1: float = Field(ge=0, strict=True, description="a viscosity [Pa s] of zero or more, or .inf")
+
+    @property
+    def relaxation_time(self) -> float:
+        """Time constant of stress relaxation at constant strain, eta1 / (G0 + G1) [s]."""
+        return self.eta1 / (self.G0 + self.G1)
+
+    @property
+    def instant_modulus(self) -> float:
+        """Modulus at a sudden strain [Pa]."""
+        return self.G0 if self.eta1 > 0 else self.G0 * self.G1 / (self.G0 + self.G1)
+
+    @property
+    def long_modulus(self) -> float:
+        """Modulus after all relaxation [Pa]."""
+        return self.G0 if math.isinf(self.eta1) else self.G0 * self.G1 / (self.G0 + self.G1)
+
+
+class PronyBranch(Part):
+    """A term `modulus exp(-t / relaxation_time)` of the relaxation function."""
+
+    label: ClassVar[str] = "a branch of the form modulus, relaxation_time"
+    modulus: Modulus
+    relaxation_time: Positive = Field(description="a positive time [s]")
+
+    @property
+    def instant_modulus(self) -> float:
+        """Modulus at a sudden strain [Pa]."""
+        return self.modulus
+
+    @property
+    def long_modulus(self) -> float:
+        """Modulus after all relaxation: none [Pa]."""
+        return 0.0
+
+
+def _branch(data: Any, info: ValidationInfo) -> ZenerBranch | PronyBranch:
+    """The form of a branch follows from its keys."""
+    if isinstance(data, ZenerBranch | PronyBranch):
+        return data
+    forms = f"{', '.join(ZenerBranch.words())} or {', '.join(PronyBranch.words())}"
+    if not isinstance(data, dict):
+        refuse(Fault(f"must be a mapping of {forms}, got {quote(data)}"))
+    zener = [key for key in ZenerBranch.words() if key in data]
+    prony = [key for key in PronyBranch.words() if key in data]
+    if zener and prony:
+        refuse(Fault(f"mixes the two forms of a branch: give {forms}, got {', '.join(zener + prony)}"))
+    if not zener and not prony:
+        refuse(Fault(f"must have the keys {forms}, got {', '.join(data) or 'none'}"))
+    return (ZenerBranch if zener else PronyBranch).model_validate(data, context=info.context)
+
+
+Branch = Annotated[ZenerBranch | PronyBranch, PlainValidator(_branch)]
+
+
+class Elastic(Part):
+    """A linear elastic body."""
+
+    label: ClassVar[str] = "model elastic"
+    model: Literal["elastic"] = "elastic"
+    poisson: Poisson = 0.5
+    shear_modulus: Positive = Field(description="a positive shear modulus [Pa]")
+
+    @property
+    def instant_modulus(self) -> float:
+        """Modulus at a sudden strain [Pa]."""
+        return self.shear_modulus
+
+    @property
+    def long_modulus(self) -> float:
+        """Modulus after all relaxation [Pa]."""
+        return self.shear_modulus
+
+
+def _stiff(modulus_inf: float, branches: tuple[ZenerBranch | PronyBranch | None, ...]) -> Iterator[Fault]:
+    if None not in branches and modulus_inf + sum(branch.instant_modulus for branch in branches if branch) == 0:
+        yield Fault("has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
+
+
+class Zener(Part):
+    """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
+
+    The long-term modulus may be zero: the body is then a fluid in the long run.
+    """
+
+    label: ClassVar[str] = "model zener"
+    model: Literal["zener"] = "zener"
+    poisson: Poisson = 0.5
+    modulus_inf: Modulus = 0.0
+    branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
+
+    rules = (Rule(("modulus_inf", "branches"), _stiff),)
+
+    @property
+    def instant_modulus(self) -> float:
+        """Modulus at a sudden strain [Pa]."""
+        return self.modulus_inf + sum(branch.instant_modulus for branch in self.branches)
+
+    @property
+    def long_modulus(self) -> float:
+        """Modulus after all relaxation [Pa]."""
+        return self.modulus_inf + sum(branch.long_modulus for branch in self.branches)
+
+
+KINDS = {"elastic": Elastic, "zener": Zener}
+Material = Annotated[Elastic | Zener, PlainValidator(chosen("model", KINDS))]

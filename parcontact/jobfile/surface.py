@@ -1,0 +1,123 @@
+"""The `surface` section: shapes whose heights add up to the rigid surface, z pointing into the body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
+
+from parcontact.jobfile.fault import Fault, refuse
+from parcontact.jobfile.part import Context, Part, Rule, chosen
+from parcontact.jobfile.values import Natural, Positive, Real, Whole
+
+Profile = Literal["paraboloid", "exact"]
+Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
+Radius = Annotated[Positive, Field(description="a positive length [m]")]
+Wavelength = Annotated[Positive, Field(description="a positive wavelength [m]")]
+
+FILE_KINDS = (".npy", ".h5", ".txt")
+
+
+def _ordered(name: str, than: str) -> Rule:
+    """Refuses a wavelength `name` that is longer than `than`."""
+
+    def check(shorter: float, longer: float) -> Iterator[Fault]:
+        if shorter > longer:
+            yield Fault(f"must not be longer than {than} = {longer:g} m, got {shorter!r}", (name,))
+
+    return Rule((name, than), check)
+
+
+class Rough(Part):
+    """Self-affine roughness with a roll-off, Eqs. (12)-(13) of the paper; scaled by one of rms slope, rms height or C.
+
+    Its power spectrum is constant between the long and the roll-off wavelength, falls as q^(-2(1 + hurst)) down to the
+    short one and is zero elsewhere. `amplitudes: fixed` puts all randomness into the phases.
+    """
+
+    label: ClassVar[str] = "shape rough"
+    shape: Literal["rough"] = "rough"
+    hurst: float = Field(gt=0, le=1, strict=True, description="a Hurst exponent above 0 and up to 1")
+    long_wavelength: Wavelength
+    rolloff_wavelength: Wavelength  # default: long_wavelength, no plateau
+    short_wavelength: Wavelength
+    rms_slope: Annotated[Positive | None, Field(description="a positive rms slope [-]")] = None
+    rms_height: Annotated[Positive | None, Field(description="a positive rms height [m]")] = None
+    psd_constant: Annotated[Positive | None, Field(description="a positive spectral constant [m^4]")] = None
+    seed: Annotated[Natural, Field(description="a whole number of zero or more")] = 0
+    amplitudes: Literal["random", "fixed"] = "random"
+
+    one_of = (("rms_slope", "rms_height", "psd_constant"),)
+    rules = (_ordered("rolloff_wavelength", "long_wavelength"), _ordered("short_wavelength", "rolloff_wavelength"))
+
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+        """No plateau unless told otherwise: the roll-off wavelength is the long one."""
+        if "long_wavelength" in data:
+            data.setdefault("rolloff_wavelength", data["long_wavelength"])
+        return data
+
+
+class Sphere(Part):
+    """A sphere; `paraboloid` is its parabola at the tip, the surface of Hertz's theory."""
+
+    label: ClassVar[str] = "shape sphere"
+    shape: Literal["sphere"] = "sphere"
+    radius: Radius
+    profile: Profile = "paraboloid"
+    center: Center = None  # default: the middle of the box
+
+
+class Cylinder(Part):
+    """A cylinder lying along `axis`."""
+
+    label: ClassVar[str] = "shape cylinder"
+    shape: Literal["cylinder"] = "cylinder"
+    radius: Radius
+    axis: Literal["x", "y"] = "y"
+    profile: Profile = "paraboloid"
+    center: Center = None  # default: the middle of the box
+
+
+class Wave(Part):
+    """`A cos(2 pi (wx x/Lx + wy y/Ly) + phase)`; a product of cosines is the sum of two waves of half its amplitude."""
+
+    label: ClassVar[str] = "shape wave"
+    shape: Literal["wave"] = "wave"
+    amplitude: Real = Field(description="a finite height [m]")
+    waves: tuple[Whole, Whole] = Field(description="two whole numbers of waves in the box, along x and along y")
+    phase: Real = Field(default=0.0, description="a finite angle [rad]")
+
+
+def _surface_file(path: Path, info: ValidationInfo) -> Path:
+    """The absolute path of a file of heights; relative ones start at the job file."""
+    path = path.expanduser()
+    found = (info.context.path.parent if info.context else Path.cwd()) / path
+    if path.suffix not in FILE_KINDS:
+        refuse(Fault(f"must end in {' or '.join(FILE_KINDS)}, got {str(path)!r}"))
+    if not found.is_file():
+        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
+    return found
+
+
+class HeightFile(Part):
+    """Heights read from a file of the grid's shape, times `scale`; `dataset` names them in an HDF5 file."""
+
+    label: ClassVar[str] = "shape file"
+    shape: Literal["file"] = "file"
+    path: Annotated[Path, AfterValidator(_surface_file), Field(description="the path of a .npy, .h5 or .txt file")]
+    scale: Real = Field(default=1.0, description="a finite factor that makes heights [m] of the numbers")
+    dataset: str = Field(default="heights", description="the name of a dataset (text)")
+
+
+class Flat(Part):
+    """Zero height everywhere."""
+
+    label: ClassVar[str] = "shape flat"
+    shape: Literal["flat"] = "flat"
+
+
+KINDS = {"rough": Rough, "sphere": Sphere, "cylinder": Cylinder, "wave": Wave, "file": HeightFile, "flat": Flat}
+Shape = Annotated[Rough | Sphere | Cylinder | Wave | HeightFile | Flat, PlainValidator(chosen("shape", KINDS))]

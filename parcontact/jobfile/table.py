@@ -1,0 +1,84 @@
+"""A resolved job as text: YAML that loads again, and a table with units to read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from parcontact.jobfile.history import Ramp
+from parcontact.jobfile.part import Part
+
+
+def plain(value: Any) -> Any:
+    """A value of a job as the plain data it was written as; keys without a value are left out."""
+    if isinstance(value, Part):
+        return {key: plain(inner) for key, inner in items(value)}
+    if isinstance(value, Ramp):
+        return value.start if value.constant else {"from": value.start, "to": value.end}
+    if isinstance(value, tuple):
+        return [plain(inner) for inner in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def items(part: Part) -> Iterator[tuple[str, Any]]:
+    """The keys of a part that have a value, as they are written in a job."""
+    for name, field in type(part).model_fields.items():
+        value = getattr(part, name)
+        if value is not None:
+            yield field.alias or name, value
+
+
+def unit(part: Part, key: str) -> str:
+    """The unit of a key, from the brackets in its description; '' for numbers without one and for words."""
+    found = re.search(r"\[([^\],]+)\]", type(part).field(key).description or "")
+    return found.group(1) if found and found.group(1) != "-" else ""
+
+
+def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
+    """Key, value and unit of everything in a part; each item of a list of parts is one row."""
+    for key, value in items(part):
+        name = f"{path}{key}"
+        if isinstance(value, Part):
+            yield from rows(value, f"{name}.")
+        elif isinstance(value, tuple) and value and isinstance(value[0], Part):
+            for index, item in enumerate(value):
+                yield f"{name}.{index}", line(item), ""
+        else:
+            yield name, text(value), unit(part, key)
+
+
+def line(part: Part) -> str:
+    """A part in one line."""
+    pairs = [(key, value, "" if isinstance(value, Part) else unit(part, key)) for key, value in items(part)]
+    return ", ".join(f"{key} {text(value)} {unit}".rstrip() for key, value, unit in pairs)
+
+
+def text(value: Any) -> str:
+    """A value in the few digits that a reader wants."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, Ramp):
+        return text(value.start) if value.constant else f"{text(value.start)} to {text(value.end)}"
+    if isinstance(value, Part):
+        return f"({line(value)})"
+    if isinstance(value, tuple):
+        return f"[{', '.join(text(inner) for inner in value)}]"
+    return str(value)
+
+
+def layout(lines: list[tuple[str, str, str]]) -> str:
+    """Rows of key, value and unit as an aligned table, with an empty line between sections."""
+    key_width = max(len(key) for key, _, _ in lines)
+    value_width = max([len(value) for _, value, unit in lines if unit], default=0)
+    out: list[str] = []
+    section = lines[0][0].split(".")[0]
+    for key, value, unit_text in lines:
+        if section != key.split(".")[0]:
+            section = key.split(".")[0]
+            out.append("")
+        out.append(f"{key:<{key_width}}  {value:<{value_width}}  {unit_text}".rstrip())
+    return "\n".join(out)

@@ -1,0 +1,147 @@
+"""The time loop: one contact solve per step, then everything that is due."""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from .clock import Step, steps
+from .errors import RunError
+from .parallel.slab import Array
+from .physics import loops
+from .physics.energy import ElasticEnergy, ZenerEnergy
+from .physics.material import Zener
+from .record.row import Row
+from .scene import Scene
+from .solve.contact import Approach, Contact, MeanPressure
+
+CONTROLS = {"pressure": MeanPressure, "force": MeanPressure, "approach": Approach}
+
+
+class March:
+    """A scene at an instant, and how it advances."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.row = Row(**self._energies())
+        self.position = (0.0, 0.0)
+        self.alpha = self.alpha_old = 0.0
+        slab, dtype = scene.slab, scene.solver.p.dtype
+        self.p_old = slab.zeros(dtype) if scene.lasts else None
+        self._u = scene.solver.u
+
+    @property
+    def p(self) -> Array:
+        """The pressure over `alpha`, in the run's units."""
+        return self.scene.solver.p
+
+    def advance(self, step: Step) -> Row:
+        """Solve one step and commit it; collective. Raises RunError when the solve fails and the job does not allow it."""
+        began, tally = time.perf_counter(), self.scene.slab.tally
+        calls = tally["operator"]
+        heights = self.scene.path.at(step.position)
+        alpha, effective = self.scene.material.begin(step.dt, heights)
+        self._start(step, alpha)
+        contact = self.scene.solver.solve(effective, self._control(step, alpha, effective))
+        if contact.failure and not self.scene.job.numerics.accept_unconverged:
+            raise RunError(self._failure(step, contact))
+        measures = self.scene.ledger.measures(contact.p, alpha, contact.u, effective, contact.d, step.position)
+        self.scene.material.commit(contact.u, heights)
+        self.alpha_old, self.alpha = self.alpha, alpha
+        self._account(step, contact)
+        slid = math.dist(step.position, self.position)
+        self.position = step.position
+        self._u, self._d = contact.u, contact.d
+        self.row = Row(
+            step.number,
+            step.time,
+            self.row.distance + slid,
+            measures,
+            contact.iterations,
+            contact.certificate,
+            tally["operator"] - calls,
+            **self._energies(),
+            seconds=time.perf_counter() - began,
+        )
+        return self.row
+
+    # -- the parts of a step ------------------------------------------------------------------------------------------
+
+    def _start(self, step: Step, alpha: float) -> None:
+        """Put the start of the next solve into the solver: the last pressure, moved with the surface and extrapolated."""
+        if self.p_old is None:
+            return
+        cells = (step.position[0] - self.position[0]) / self.scene.job.grid.dx
+        whole = math.floor(cells + 1e-6)
+        fraction = cells - whole if cells - whole > 1e-6 else 0.0
+        now, before = (1.0 + step.growth) * self.alpha / alpha, step.growth * self.alpha_old / alpha
+        loops.travel(self.p, self.p_old, now, before, whole, fraction)
+
+    def _control(self, step: Step, alpha: float, effective: Array) -> MeanPressure | Approach:
+        scene, grid = self.scene, self.scene.job.grid
+        if step.control == "approach":
+            d = step.load / scene.units.height
+            self._refuse_beyond_full_contact(step, d, effective)
+            return Approach(d)
+        mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
+        return MeanPressure(mean / (alpha * scene.units.pressure))
+
+    def _refuse_beyond_full_contact(self, step: Step, d: float, effective: Array) -> None:
+        """A periodic half space cannot follow an approach that puts its mean surface below its undeformed level."""
+        scene = self.scene
+        if scene.job.grid.boundary == "periodic":
+            mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
+            if d + mean > 0.0:
+                most = -mean * scene.units.height
+                raise RunError(
+                    f"step {step.number}: an approach of {step.load:g} m is beyond full contact, which a periodic body "
+                    f"reaches at {most:g} m; prescribe a pressure instead"
+                )
+
+    def _failure(self, step: Step, contact: Contact) -> str:
+        name = self.scene.job.history[step.stage].name
+        return f"step {step.number} at t = {step.time:g} s (stage {name!r}): the contact solve {contact.failure}"
+
+    def _account(self, step: Step, contact: Contact) -> None:
+        energy = self.scene.energy
+        if isinstance(energy, ZenerEnergy):
+            energy.advance(step.dt, contact.p, self.alpha, self.p_old, self.alpha_old)
+        elif isinstance(energy, ElasticEnergy):
+            energy.advance(contact.p, self.alpha, contact.u)
+
+    def _energies(self) -> dict[str, float | tuple[float, ...]]:
+        energy, units, grid = self.scene.energy, self.scene.units, self.scene.job.grid
+        if energy is None:
+            return {}
+        unit = units.pressure * units.height * grid.dx * grid.dy
+        balance = energy.balance
+        lost = tuple(float(value) * unit for value in balance.dissipated)
+        return {
+            "work": balance.work * unit,
+            "stored": balance.stored * unit,
+            "dissipated": math.fsum(lost),
+            "branch_dissipation": lost,
+        }
+
+    def field(self, name: str) -> Array:
+        """This rank's rows of `pressure` [Pa], `displacement` [m] or `gap` [m], as a new array."""
+        scene, units = self.scene, self.scene.units
+        if name == "pressure":
+            return self.p * (self.alpha * units.pressure)
+        u = scene.material.u if isinstance(scene.material, Zener) else self._u
+        if name == "displacement":
+            return u * units.height
+        base, offset = scene.path.at(self.position).parts
+        return (u - np.roll(base, offset, axis=1) - self._d) * units.height
+
+
+def run(march: March, tasks: Sequence[Callable[[March], None]], timeline: Iterable[Step] | None = None) -> None:
+    """Advance through a history, after the initial state and after every step doing the tasks in order."""
+    job = march.scene.job
+    for task in tasks:
+        task(march)
+    for step in steps(job.history, job.grid) if timeline is None else timeline:
+        march.advance(step)
+        for task in tasks:
+            task(march)

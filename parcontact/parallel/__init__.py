@@ -1,0 +1,1 @@
+"""Who owns which rows, and how data moves between ranks. MPI lives here (files excepted)."""

@@ -1,0 +1,1 @@
+"""What is simulated. Nothing here sees a communicator."""

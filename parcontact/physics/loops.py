@@ -1,0 +1,149 @@
+"""Fused loops over this rank's rows for the body and the surface. Heights come as a map and a cyclic offset along x."""
+
+import numpy as np
+
+from ..compiled import loop
+
+
+@loop
+def roll(source, offset, target):
+    """`target(i) = source(i - offset)` along x, cyclic."""
+    nx = source.shape[1]
+    start = offset % nx
+    for j in range(source.shape[0]):
+        target[j, start:] = source[j, : nx - start]
+        target[j, :start] = source[j, nx - start :]
+
+
+@loop
+def begin(branches, decay, gain, work, weight, weight_u, u, heights, offset):
+    """Advance the branches, `h_k <- decay_k h_k + gain_k work`, and form the next effective heights in `work`:
+    `heights(i - offset) + sum weight_k h_k - weight_u u`.
+    """
+    count, ny, nx = branches.shape
+    start = offset % nx
+    effective = np.empty(nx, work.dtype)
+    for j in range(ny):
+        effective[start:] = heights[j, : nx - start]
+        effective[:start] = heights[j, nx - start :]
+        for i in range(nx):
+            effective[i] -= weight_u * u[j, i]
+        for k in range(count):
+            a, b, c = decay[k], gain[k], weight[k]
+            for i in range(nx):
+                value = a * branches[k, j, i] + b * work[j, i]
+                branches[k, j, i] = value
+                effective[i] += c * value
+        work[j, :] = effective
+
+
+@loop
+def commit(displacement, work, u, heights, offset):
+    """`u_new = displacement - work + heights(i - offset)`: put `u_new - u` into `work` and `u_new` into `u`."""
+    nx = u.shape[1]
+    start = offset % nx
+    for j in range(u.shape[0]):
+        for i in range(nx):
+            source = i - start if i >= start else i - start + nx
+            new = displacement[j, i] - work[j, i] + heights[j, source]
+            work[j, i] = new - u[j, i]
+            u[j, i] = new
+
+
+@loop
+def measure(p, u, h):
+    """Over this rank's points: sum of p, points in contact, sum of `u - h`, largest p."""
+    load, count, gaps, largest = 0.0, 0.0, 0.0, 0.0
+    for j in range(p.shape[0]):
+        row_load, row_count, row_gaps, row_largest = 0.0, 0.0, 0.0, 0.0
+        for i in range(p.shape[1]):
+            row_load += p[j, i]
+            row_count += 1.0 if p[j, i] > 0.0 else 0.0
+            row_gaps += u[j, i] - h[j, i]
+            row_largest = max(row_largest, p[j, i])
+        load += row_load
+        count += row_count
+        gaps += row_gaps
+        largest = max(largest, row_largest)
+    return load, count, gaps, largest
+
+
+@loop
+def dot(a, b):
+    """Sum of a b."""
+    total = 0.0
+    for j in range(a.shape[0]):
+        row = 0.0
+        for i in range(a.shape[1]):
+            row += a[j, i] * b[j, i]
+        total += row
+    return total
+
+
+@loop
+def work(p, alpha, p_old, alpha_old, du):
+    """Sum of `(alpha p + alpha_old p_old)/2 du`: the work of a pressure that changes linearly with u."""
+    total = 0.0
+    for j in range(p.shape[0]):
+        row = 0.0
+        for i in range(p.shape[1]):
+            row += 0.5 * (alpha * p[j, i] + alpha_old * p_old[j, i]) * du[j, i]
+        total += row
+    return total
+
+
+@loop
+def travel(p, p_old, factor, factor_old, shift, fraction):
+    """Extrapolate a pressure that moves with the surface: `p <- max(S (factor p - factor_old S p_old), 0)`, `p_old <- p`.
+
+    S moves by `shift + fraction` cells along x (cyclic), 0 <= fraction < 1, between cells linearly.
+    """
+    ny, nx = p.shape
+    moved, now = np.empty(nx, p.dtype), np.empty(nx, p.dtype)
+    for j in range(ny):
+        _shift(p_old[j], shift, fraction, moved)
+        for i in range(nx):
+            p_old[j, i] = p[j, i]
+            now[i] = factor * p[j, i] - factor_old * moved[i]
+        _shift(now, shift, fraction, moved)
+        for i in range(nx):
+            p[j, i] = max(moved[i], 0.0)
+
+
+@loop
+def _shift(row, shift, fraction, out):
+    start = shift % row.size
+    out[start:] = row[: row.size - start]
+    out[:start] = row[row.size - start :]
+    if fraction > 0.0:
+        last = out[-1]
+        for i in range(row.size - 1, 0, -1):
+            out[i] += fraction * (out[i - 1] - out[i])
+        out[0] += fraction * (last - out[0])
+
+
+@loop
+def tangential(p, h, along_x, along_y, weight):
+    """Tangential forces of a pressure on a surface from their spectra: `sum weight Re(conj(p) i along h)` along x and y.
+
+    `along_x`, `along_y` are the slope symbols (the wavenumber for the exact slope), `weight` the multiplicity of a
+    column of the half spectrum.
+    """
+    force_x, force_y = 0.0, 0.0
+    for j in range(p.shape[0]):
+        row_x, row_y = 0.0, 0.0
+        for i in range(p.shape[1]):
+            product = weight[i] * (p[j, i].imag * h[j, i].real - p[j, i].real * h[j, i].imag)
+            row_x += along_x[i] * product
+            row_y += along_y[j] * product
+        force_x += row_x
+        force_y += row_y
+    return force_x, force_y
+
+
+@loop
+def displace(h, along_x, along_y, out):
+    """Spectrum of moved heights: `out = along_x along_y h`, the phases of the shift."""
+    for j in range(h.shape[0]):
+        for i in range(h.shape[1]):
+            out[j, i] = along_x[i] * along_y[j] * h[j, i]

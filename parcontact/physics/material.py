@@ -1,0 +1,128 @@
+"""What the body remembers: nothing (Elastic), or one map per relaxing branch (Zener).
+
+With `G(t) = G_inf + sum_k G_k exp(-t/tau_k)` and the elastic operator A of shear modulus 1, the total pressure obeys
+
+    A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     h_k the part of branch k [Pa m].
+
+A step advances `h_k <- decay_k h_k + gain_k (u_new - u)` with, for z = dt/tau_k,
+
+    exponential      decay = exp(-z),     gain = G_k (1 - exp(-z))/z    exact for u linear in time,
+    backward-euler   decay = 1/(1 + z),   gain = G_k/(1 + z)            the paper's Eqs. (7)-(9), in another form,
+
+so that `A p = alpha u_new + r`, `alpha = G_inf + sum gain_k`, `r = sum decay_k h_k - (sum gain_k) u`. The contact problem
+of a step is then that of an elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, Eq. 9).
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from ..parallel.slab import Array, Slab, allocate
+from ..theory.viscoelastic import Prony
+from . import loops
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights of the rigid surface: the map `base` moved by `offset` cells along x (cyclic)."""
+
+    base: Array
+    offset: int = 0
+
+    @property
+    def parts(self) -> tuple[Array, int]:
+        return self.base, self.offset
+
+
+class Material(Protocol):
+    """The body between two instants; every call is local to this rank."""
+
+    def begin(self, dt: float, heights: Heights) -> tuple[float, Array]: ...
+
+    def commit(self, displacement: Array, heights: Heights) -> None: ...
+
+
+class Elastic:
+    """A body of one modulus: remembers nothing and allocates at most the moved heights."""
+
+    def __init__(self, slab: Slab, modulus: float) -> None:
+        self.slab, self.modulus = slab, modulus
+        self._moved: Array | None = None
+
+    def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
+        """Modulus and effective heights of a step: the heights themselves."""
+        if heights.offset == 0:
+            return self.modulus, heights.base
+        if self._moved is None:
+            self._moved = self.slab.empty(heights.base.dtype)
+        loops.roll(heights.base, heights.offset, self._moved)
+        return self.modulus, self._moved
+
+    def commit(self, displacement: Array, heights: Heights) -> None:
+        """Nothing to remember."""
+
+
+class Zener:
+    """Relaxing branches: this rank's rows of one map per branch and of the last displacement.
+
+    The maps are advanced when the next step begins, in the same pass that forms its effective heights: until then the
+    increment of the displacement waits in the buffer of the effective heights.
+    """
+
+    def __init__(self, slab: Slab, prony: Prony, integrator: str, dtype: DTypeLike = np.float64) -> None:
+        self.prony, self.integrator = prony, integrator
+        self.branches = allocate((len(prony.moduli), *slab.shape), dtype, slab.tally)
+        self.branches.fill(0.0)
+        self.u = slab.zeros(dtype)
+        self._work = slab.zeros(dtype)
+        self._step = self._pending = self._still
+
+    @property
+    def _still(self) -> tuple[Array, Array]:
+        return np.ones_like(self.prony.moduli), np.zeros_like(self.prony.moduli)
+
+    def coefficients(self, dt: float) -> tuple[Array, Array]:
+        """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
+        z = dt / self.prony.relaxation_times
+        if self.integrator == "backward-euler":
+            return 1.0 / (1.0 + z), self.prony.moduli / (1.0 + z)
+        phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)
+        return np.exp(-z), self.prony.moduli * phi
+
+    def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
+        """Modulus alpha and effective heights `h + r/alpha` of a step; may be called again for another dt."""
+        self._step = decay, gain = self.coefficients(dt)
+        alpha = self.prony.modulus_inf + float(gain.sum())
+        loops.begin(
+            self.branches, *self._pending, self._work, decay / alpha, float(gain.sum()) / alpha, self.u, *heights.parts
+        )
+        self._pending = self._still
+        return alpha, self._work
+
+    def commit(self, displacement: Array, heights: Heights) -> None:
+        """End the step: `displacement` is `A p/alpha`, which under the effective heights stands for u."""
+        loops.commit(displacement, self._work, self.u, *heights.parts)
+        self._pending = self._step
+
+    @property
+    def increment(self) -> Array:
+        """`u_new - u` of the step just committed; valid until the next begins."""
+        return self._work
+
+    def settle(self) -> None:
+        """Advance the branch maps now, for somebody who reads them; the run goes on to the same digits."""
+        loops.begin(self.branches, *self._pending, self._work, self._still[0], 0.0, self.u, self.u, 0)
+        self._pending = self._still
+
+    def state(self) -> dict[str, Array]:
+        """What a restart needs."""
+        self.settle()
+        return {"displacement": self.u, **{f"branch {k}": branch for k, branch in enumerate(self.branches)}}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        self.u[...] = state["displacement"]
+        for k, branch in enumerate(self.branches):
+            branch[...] = state[f"branch {k}"]
+        self._pending = self._still

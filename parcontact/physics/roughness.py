@@ -1,0 +1,110 @@
+"""Random self-affine surfaces from their power spectral density (paper, Eqs. 12 and 13).
+
+    Phi(k) = C                             long-wavelength end <= k < roll-off
+             C (k/k_r)^(-2 (1 + hurst))    roll-off <= k < short-wavelength end
+
+with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. Each wave has its own random numbers, drawn from a stream that belongs to its
+x-wavenumber: the same seed gives the same waves on every grid and every number of ranks, and no rank holds the whole.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.slab import Array
+from .halfspace import wavenumbers
+
+EDGE = 1.0 - 1e-9  # wavenumbers equal to a limit up to round-off are taken as equal to it
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Parameters of one random surface; lengths in m. Exactly one of the last three is given."""
+
+    hurst: float
+    long_wavelength: float
+    rolloff_wavelength: float
+    short_wavelength: float
+    seed: int = 0
+    random_amplitudes: bool = True
+    rms_slope: float | None = None
+    rms_height: float | None = None
+    psd_constant: float | None = None
+
+    def density(self, k: Array) -> Array:
+        """Phi(k)/C at wavenumbers k [rad/m]."""
+        k_long, k_rolloff, k_short = (
+            2 * np.pi / length for length in (self.long_wavelength, self.rolloff_wavelength, self.short_wavelength)
+        )
+        inside = (k >= EDGE * k_long) & (k < EDGE * k_short)
+        return np.where(inside, np.maximum(k / k_rolloff, 1.0) ** (-2.0 * (1.0 + self.hurst)), 0.0)
+
+    def spectrum(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
+        """This rank's part of the transform of the heights [m] on a box of `size` [m]; collective."""
+        qx, qy = wavenumbers(fft, size)
+        k = np.hypot(qx, qy)
+        waves = np.sqrt(self.density(k)) * self._random(fft, size)
+        points = fft.mx * fft.my
+        if self.psd_constant is not None:
+            return np.asarray(waves * points * np.sqrt(self.psd_constant / (size[0] * size[1])))
+        power = self.rms_slope is not None
+        target = self.rms_slope if self.rms_slope is not None else self.rms_height
+        mean_square = fft.slab.sum(float(np.sum(fft.multiplicity * np.abs(waves) ** 2 * (k**2 if power else 1.0))))[0]
+        return np.asarray(waves * (points * target / np.sqrt(mean_square) if mean_square > 0.0 else 0.0))
+
+    def _random(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
+        """Complex random amplitudes of mean square 1 (modulus 1 if they are fixed) for the waves within the limits."""
+        waves = np.zeros(fft.shape, dtype=np.complex128)
+        last_x, last_y = (int(length / self.short_wavelength) for length in size)
+        index_y = _alternating(min(last_y, (fft.my - 1) // 2))
+        for column, index_x in enumerate(range(fft.columns.start, min(fft.columns.stop, last_x + 1))):
+            stream = np.random.Generator(np.random.Philox(key=[self.seed, index_x]))
+            phase, square = stream.random((index_y.size, 2)).T
+            modulus = np.sqrt(-np.log1p(-square)) if self.random_amplitudes else 1.0
+            amplitude = modulus * np.exp(2j * np.pi * phase)
+            if index_x == 0:  # the heights are real: waves along y come in conjugate pairs
+                positive = index_y > 0
+                waves[index_y[positive], column] = amplitude[positive]
+                waves[-index_y[positive], column] = amplitude[positive].conj()
+            else:
+                waves[index_y, column] = amplitude
+        return waves
+
+
+def _alternating(last: int) -> Array:
+    """0, 1, -1, 2, -2, ..., last, -last: more waves never change the numbers of the first ones."""
+    count = np.arange(1, last + 1)
+    return np.concatenate([[0], np.stack([count, -count], axis=1).ravel()])
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Spectral moments of an isotropic surface and what follows from them (SI)."""
+
+    m0: float
+    m2: float
+    m4: float
+
+    @property
+    def rms_height(self) -> float:
+        return float(np.sqrt(self.m0))
+
+    @property
+    def rms_slope(self) -> float:
+        """Of the gradient's length, both directions together."""
+        return float(np.sqrt(2.0 * self.m2))
+
+    @property
+    def nayak(self) -> float:
+        """Nayak's parameter m0 m4/m2^2, the breadth of the spectrum."""
+        return self.m0 * self.m4 / self.m2**2 if self.m2 > 0.0 else float("nan")
+
+
+def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
+    """m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = (3/8) <(laplace h)^2> of a map given by its transform; collective."""
+    q2 = np.hypot(*wavenumbers(fft, size)) ** 2
+    power = fft.multiplicity * np.abs(spectrum) ** 2 / (fft.mx * fft.my) ** 2
+    power[q2 == 0.0] = 0.0
+    m0, m2, m4 = fft.slab.sum(*(float(np.sum(power * weight)) for weight in (1.0, q2 / 2, 3 * q2**2 / 8)))
+    return Moments(m0, m2, m4)

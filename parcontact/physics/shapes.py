@@ -1,0 +1,50 @@
+"""Smooth shapes known in closed form: they are evaluated where the surface is, at any fraction of a cell."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..parallel.slab import Array
+
+
+class Shape(Protocol):
+    """Heights and slopes at distances (x, y) from the shape's centre; any unit, the same for all lengths."""
+
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array: ...
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]: ...
+
+
+def _paraboloid(r2: Array, radius: float) -> tuple[Array, Array]:
+    return -r2 / (2.0 * radius), np.full_like(r2, -1.0 / radius)
+
+
+def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
+    """Beyond the radius the body of the shape has ended: the height stays at its equator."""
+    rest = np.sqrt(np.maximum(radius**2 - r2, 0.0))
+    inverse = np.divide(-1.0, rest, out=np.zeros_like(rest), where=rest > 0.0)
+    return -r2 / (radius + rest), inverse
+
+
+@dataclass(frozen=True)
+class Round:
+    """A sphere, or a cylinder along x or y, with its highest point (0) in the centre; parabolic or exact profile."""
+
+    radius: float
+    centre: tuple[float, float]
+    along: tuple[float, float] = (1.0, 1.0)  # which coordinates the profile depends on
+    exact: bool = False
+
+    def _profile(self, x: Array, y: Array) -> tuple[Array, Array]:
+        r2 = self.along[0] * x**2 + self.along[1] * y**2
+        return (_circle if self.exact else _paraboloid)(r2, self.radius)
+
+    def height(self, x: Array, y: Array) -> Array:
+        return self._profile(x, y)[0]
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        factor = self._profile(x, y)[1]
+        return self.along[0] * x * factor, self.along[1] * y * factor

@@ -1,0 +1,43 @@
+"""Where the rigid surface is: `h(x, t) = h0(x - s(t))`, with s its displacement [m]."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from .material import Heights
+from .surface import Surface
+
+
+class Path(Protocol):
+    """Heights of the surface at a displacement; collective."""
+
+    def at(self, displacement: tuple[float, float]) -> Heights: ...
+
+
+class WholeCells:
+    """Standing, or sliding by whole cells along x on a periodic box: one map, and an index offset."""
+
+    def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
+        self._cell = surface.cell[0]
+        self._count = surface.slab.nx
+        self._base = surface.heights((0.0, 0.0), surface.slab.empty(dtype))
+
+    def at(self, displacement: tuple[float, float]) -> Heights:
+        return Heights(self._base, round(displacement[0] / self._cell) % self._count)
+
+
+class AnyFraction:
+    """Any fraction of a cell in any direction: the heights are made anew when the surface has moved."""
+
+    def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
+        self._surface = surface
+        self._map = surface.slab.empty(dtype)
+        self._where: tuple[float, float] | None = None
+
+    def at(self, displacement: tuple[float, float]) -> Heights:
+        if displacement != self._where:
+            self._surface.slab.tally["shift"] += 1
+            self._surface.heights(displacement, self._map)
+            self._where = displacement
+        return Heights(self._map)

@@ -1,0 +1,136 @@
+"""Heights of the rigid surface, wherever it has moved to, and the tangential force of a pressure on it.
+
+What is periodic and given by its waves (roughness, single waves, files) is kept as one transform and moved by a phase
+`exp(-i q s)`: exact for any fraction of a cell in any direction as long as there is nothing at the Nyquist wavenumber,
+which is taken as a standing wave. Shapes in closed form are evaluated anew. Every move starts from the original.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.slab import Array, Slab
+from . import loops
+from .halfspace import wavenumbers
+from .shapes import Shape
+
+
+@dataclass
+class Surface:
+    """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
+
+    `waves` is this rank's part of the transform of the periodic heights or None; `periodic` wraps the shapes around the
+    box; `scale` turns m into the unit of heights; with `differences` slopes are central differences over a cell.
+    """
+
+    slab: Slab
+    fft: FFT
+    size: tuple[float, float]
+    waves: Spectrum | None = None
+    shapes: Sequence[Shape] = field(default_factory=tuple)
+    periodic: bool = True
+    differences: bool = False
+    scale: float = 1.0
+
+    @property
+    def cell(self) -> tuple[float, float]:
+        return self.size[0] / self.slab.nx, self.size[1] / self.slab.ny
+
+    def rescale(self, unit: float) -> None:
+        """Give heights in this unit [m] from now on."""
+        self.scale = 1.0 / unit
+        if self.waves is not None:
+            self.waves *= self.scale
+
+    def heights(self, shift: tuple[float, float], out: Array) -> Array:
+        """Heights of the surface moved by `shift` [m], this rank's rows; collective."""
+        if self.waves is None:
+            out.fill(0.0)
+        else:
+            loops.displace(self.waves, *self._phases(shift), self.fft.spectrum)
+            self.fft.backward(self.fft.spectrum, out)
+        for shape in self.shapes:
+            out += self.scale * shape.height(*self._distances(shape, shift))
+        return out
+
+    def forces(self, pressure: Array, shift: tuple[float, float]) -> list[float]:
+        """Sums over all points of pressure times slope along x and y (paper, Eq. 10, over the area of a cell); collective.
+
+        In the units of the pressure and, for the slope, of heights over m.
+        """
+        along_x, along_y = 0.0, 0.0
+        if self.waves is not None:
+            transform = self.fft.forward(pressure)
+            loops.displace(transform, *(phase.conj() for phase in self._phases(shift)), transform)
+            slopes, weight = self._slope_symbols(), self.fft.multiplicity.ravel()
+            sums = loops.tangential(transform, self.waves, *slopes, weight)
+            along_x, along_y = (value / (self.fft.mx * self.fft.my) for value in sums)
+        rows, columns = np.nonzero(pressure > 0.0) if self.shapes else ((), ())
+        for shape in self.shapes:
+            slope_x, slope_y = self._slopes(shape, shift, rows, columns)
+            touching = pressure[rows, columns].astype(np.float64)
+            along_x += self.scale * float(touching @ slope_x)
+            along_y += self.scale * float(touching @ slope_y)
+        return self.slab.sum(along_x, along_y)
+
+    # -- waves ----------------------------------------------------------------------------------------------------------
+
+    def _phases(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
+        """Factors along x and y that move a transform by `shift`; at the Nyquist wavenumber their real part."""
+        factors = []
+        for q, mode, count, s in zip(
+            wavenumbers(self.fft, self.size), self.fft.modes, (self.fft.mx, self.fft.my), shift, strict=True
+        ):
+            phase = np.exp(-1j * q.ravel() * s)
+            nyquist = 2 * np.abs(mode.ravel()) == count
+            phase[nyquist] = phase[nyquist].real
+            factors.append(phase)
+        return factors[0], factors[1]
+
+    def _slope_symbols(self) -> tuple[Array, Array]:
+        """What stands for the wavenumber in a slope; 0 at the Nyquist wavenumber, whose slope vanishes on the grid."""
+        symbols = []
+        for q, mode, count, step in zip(
+            wavenumbers(self.fft, self.size), self.fft.modes, (self.fft.mx, self.fft.my), self.cell, strict=True
+        ):
+            symbol = np.sin(q.ravel() * step) / step if self.differences else q.ravel().copy()
+            symbol[2 * np.abs(mode.ravel()) == count] = 0.0
+            symbols.append(symbol)
+        return symbols[0], symbols[1]
+
+    # -- shapes ---------------------------------------------------------------------------------------------------------
+
+    def _distances(self, shape: Shape, shift: tuple[float, float]) -> tuple[Array, Array]:
+        """Distances from the moved centre of a shape, (1, nx) and (ny_loc, 1); the nearest image if periodic."""
+        rows = self.slab.rows
+        x = np.arange(self.slab.nx) * self.cell[0] - shape.centre[0] - shift[0]
+        y = np.arange(rows.start, rows.stop) * self.cell[1] - shape.centre[1] - shift[1]
+        if self.periodic:
+            x, y = (d - length * np.round(d / length) for d, length in zip((x, y), self.size, strict=True))
+        return x[None, :], y[:, None]
+
+    def _slopes(
+        self, shape: Shape, shift: tuple[float, float], rows: Array, columns: Array
+    ) -> tuple[Array, Array]:
+        x, y = self._distances(shape, shift)
+        x, y = x[0, columns], y[rows, 0]
+        if not self.differences:
+            return shape.slope(x, y)
+        dx, dy = self.cell
+        return (
+            (shape.height(x + dx, y) - shape.height(x - dx, y)) / (2 * dx),
+            (shape.height(x, y + dy) - shape.height(x, y - dy)) / (2 * dy),
+        )
+
+
+def single_wave(fft: FFT, amplitude: float, waves: tuple[int, int], phase: float) -> Spectrum:
+    """This rank's part of the transform of `amplitude cos(2 pi (wx x/lx + wy y/ly) + phase)`."""
+    spectrum = np.zeros(fft.shape, dtype=np.complex128)
+    half = 0.5 * amplitude * fft.mx * fft.my * np.exp(1j * phase)
+    for sign, value in ((1, half), (-1, half.conjugate())):
+        column, row = sign * waves[0] % fft.mx - fft.columns.start, sign * waves[1] % fft.my
+        if 0 <= column < fft.shape[1]:
+            spectrum[row, column] += value
+    return spectrum

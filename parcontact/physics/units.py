@@ -1,0 +1,44 @@
+"""Units in which everything inside a run is dimensionless, so that nanometres and kilometres behave alike.
+
+All are powers of two: changing to them and back loses no digit, and a checkpoint in SI restarts bit for bit.
+"""
+
+import math
+from dataclasses import dataclass
+
+
+def _power_of_two(value: float) -> float:
+    return 2.0 ** round(math.log2(value)) if value > 0.0 else 1.0
+
+
+@dataclass(frozen=True)
+class Units:
+    """Unit of heights and displacements [m], of lengths in the plane [m], and of moduli [Pa]."""
+
+    height: float
+    length: float
+    modulus: float
+
+    @classmethod
+    def near(cls, height: float, length: float, modulus: float) -> "Units":
+        """The powers of two nearest to typical values; a flat surface (height 0) is measured in `length`."""
+        return cls(_power_of_two(height or length), _power_of_two(length), _power_of_two(modulus))
+
+    @property
+    def pressure(self) -> float:
+        """Of pressures [Pa]: what moves the half space by `height` over `length`."""
+        return self.modulus * self.height / self.length
+
+    @property
+    def area(self) -> float:
+        return self.length**2
+
+    @property
+    def tangential_force(self) -> float:
+        """Of a pressure times a slope over an area [N]."""
+        return self.pressure * self.height / self.length * self.area
+
+    @property
+    def energy(self) -> float:
+        """Of a pressure times a displacement over an area [J]."""
+        return self.pressure * self.height * self.area

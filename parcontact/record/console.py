@@ -1,0 +1,86 @@
+"""What a run says: one line per step on root, a progress bar on a terminal, the same lines in run.log."""
+
+import logging
+import sys
+import time
+from pathlib import Path
+
+from tqdm import tqdm
+
+from .row import Row
+
+HEAD = "    step        time [s]    load [Pa]      area  friction   iter  residual"
+EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
+
+
+def line(row: Row) -> str:
+    m = row.measures
+    return (
+        f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} "
+        f"{row.iterations:6d} {row.certificate.worst:9.2e}"
+    )
+
+
+class Console:
+    """Root's voice; the other ranks have `Silence` instead, so that no caller asks who it is."""
+
+    def __init__(self, log: Path | None, quiet: bool, total: int) -> None:
+        self._log = logging.Logger("parcontact")
+        if log is not None:
+            handler = logging.FileHandler(log)
+            handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+            self._log.addHandler(handler)
+        self._quiet, self._total = quiet, total
+        self._bar: tqdm[None] | None = None
+        self._headed = False
+        self._began = time.perf_counter()
+
+    def say(self, text: str) -> None:
+        """A message for the user and the log."""
+        self._log.info(text)
+        if not self._quiet:
+            self._write(text)
+
+    def warn(self, text: str) -> None:
+        """A message that is shown even to those who asked for quiet."""
+        self._log.warning("warning: %s", text)
+        self._write(f"warning: {text}", sys.stderr)
+
+    def step(self, row: Row) -> None:
+        """One line per step."""
+        text = line(row)
+        self._log.info(text)
+        if self._quiet:
+            return
+        if not self._headed:
+            self._headed = True
+            print(HEAD)
+            if sys.stderr.isatty() and self._total > 1:
+                self._bar = tqdm(total=self._total, initial=row.step, unit="step", leave=False, mininterval=EVERY_SECONDS)
+        self._write(text)
+        if self._bar is not None:
+            self._bar.update(row.step - self._bar.n)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+        for handler in self._log.handlers:
+            handler.close()
+
+    def _write(self, text: str, file: object = None) -> None:
+        if self._bar is not None:
+            self._bar.write(text)
+        else:
+            print(text, file=file or sys.stdout, flush=True)  # type: ignore[call-overload]
+
+
+class Silence:
+    """The console of every other rank."""
+
+    def say(self, text: str) -> None: ...
+
+    def warn(self, text: str) -> None: ...
+
+    def step(self, row: Row) -> None: ...
+
+    def close(self) -> None: ...

@@ -1,0 +1,25 @@
+"""What is recorded of one instant."""
+
+import math
+from dataclasses import dataclass, field
+
+from ..physics.ledger import Measures
+from ..solve.contact import Certificate
+
+
+@dataclass(frozen=True)
+class Row:
+    """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start."""
+
+    step: int = 0
+    time: float = 0.0
+    distance: float = 0.0
+    measures: Measures = field(default_factory=Measures)
+    iterations: int = 0
+    certificate: Certificate = field(default_factory=lambda: Certificate(0.0, 0.0, 0.0))
+    operator_calls: int = 0
+    work: float = math.nan
+    stored: float = math.nan
+    dissipated: float = math.nan
+    branch_dissipation: tuple[float, ...] = ()
+    seconds: float = 0.0

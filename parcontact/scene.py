@@ -1,0 +1,188 @@
+"""From a job to what runs: the only place that decides which effects exist.
+
+Each effect is one object handed to the march; an effect that a job does not call for is never made.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import job as jobs
+from .clock import Step, steps
+from .job import Job
+from .parallel.fft import FFT
+from .parallel.slab import Array, Slab
+from .physics import halfspace, heightfile
+from .physics.energy import ElasticEnergy, ZenerEnergy
+from .physics.ledger import Ledger
+from .physics.material import Elastic, Heights, Zener
+from .physics.roughness import Moments, Roughness, moments
+from .physics.shapes import Round, Shape
+from .physics.sliding import AnyFraction, Path, WholeCells
+from .physics.surface import Surface, single_wave
+from .physics.units import Units
+from .solve.contact import ContactSolver
+from .theory.viscoelastic import Prony, normal_form, zener_to_prony
+
+WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
+
+
+@dataclass
+class Scene:
+    """Everything a march needs."""
+
+    job: Job
+    slab: Slab
+    units: Units
+    surface: Surface
+    path: Path
+    material: Elastic | Zener
+    solver: ContactSolver
+    ledger: Ledger
+    energy: ElasticEnergy | ZenerEnergy | None
+    roughness: Moments | None
+    slides: bool
+    lasts: bool
+
+
+def build(job: Job, slab: Slab) -> Scene:
+    """Make a job's scene on the ranks of `slab`; collective. Raises InputError for surface files that do not fit."""
+    grid, numerics = job.grid, job.numerics
+    dtype = np.float32 if numerics.precision == "single" else np.float64
+    fft = FFT(slab, dtype=dtype)
+    surface = _surface(job, fft)
+    roughness = moments(surface.waves, fft, grid.size) if surface.waves is not None else None
+    prony = relaxation_of(job)
+    height = _height(surface)
+    units = Units.near(height, grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
+    surface.rescale(units.height)
+    timeline = tuple(steps(job.history, grid))
+    path: Path = WholeCells(surface, dtype) if _by_whole_cells(job, timeline) else AnyFraction(surface, dtype)
+    material = _material(slab, prony, units, numerics.integrator, dtype)
+    size = (grid.lx / units.length, grid.ly / units.length)
+    operator = _operator(job, slab, fft, size)
+    preconditioner = _preconditioner(job, slab, fft, size)
+    tolerance, limit = numerics.tolerance, numerics.max_iterations
+    solver = ContactSolver(
+        slab, operator, preconditioner, (height or grid.dx) / units.height, tolerance, limit, dtype
+    )
+    energy = _energy(job, solver, material) if job.output.energy else None
+    slides = any(step.position != (0.0, 0.0) for step in timeline)
+    lasts = any(not step.jump for step in timeline)
+    ledger = Ledger(slab, surface, units)
+    return Scene(job, slab, units, surface, path, material, solver, ledger, energy, roughness, slides, lasts)
+
+
+def relaxation_of(job: Job) -> Prony:
+    """The relaxation function of a job's material [Pa, s]; one modulus and no terms if it is elastic."""
+    material = job.material
+    if isinstance(material, jobs.Elastic):
+        return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
+    zener = [(b.G0, b.G1, b.eta1) for b in material.branches if isinstance(b, jobs.ZenerBranch)]
+    plain = [(b.modulus, b.relaxation_time) for b in material.branches if isinstance(b, jobs.PronyBranch)]
+    springs = zener_to_prony(*zip(*zener, strict=True), material.modulus_inf) if zener else None
+    modulus_inf, moduli, times = springs or (material.modulus_inf, (), ())
+    return normal_form(
+        modulus_inf, [*moduli, *(modulus for modulus, _ in plain)], [*times, *(time for _, time in plain)]
+    )
+
+
+# -- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _surface(job: Job, fft: FFT) -> Surface:
+    grid, slab = job.grid, fft.slab
+    waves: Array | None = None
+    shapes: list[Shape] = []
+    for part in job.surface:
+        if isinstance(part, jobs.Sphere | jobs.Cylinder):
+            centre = part.center or (grid.lx / 2, grid.ly / 2)
+            along = (1.0, 1.0)
+            if isinstance(part, jobs.Cylinder):
+                along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
+            shapes.append(Round(part.radius, centre, along, part.profile == "exact"))
+        elif not isinstance(part, jobs.Flat):
+            added = _waves(part, fft, grid.size)
+            waves = added if waves is None else waves + added
+    if waves is not None:
+        waves = waves.astype(fft.complex, copy=False)
+    return Surface(
+        slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", job.numerics.slope == "finite-difference"
+    )
+
+
+def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple[float, float]) -> Array:
+    if isinstance(part, jobs.Wave):
+        return single_wave(fft, part.amplitude, part.waves, part.phase)
+    if isinstance(part, jobs.HeightFile):
+        rows = heightfile.read(part.path, part.dataset, fft.slab)
+        field = fft.slab.empty(fft.dtype)
+        np.multiply(rows, part.scale, out=field, casting="same_kind")
+        return fft.forward(field).copy()
+    return Roughness(
+        part.hurst,
+        part.long_wavelength,
+        part.rolloff_wavelength,
+        part.short_wavelength,
+        part.seed,
+        part.amplitudes == "random",
+        part.rms_slope,
+        part.rms_height,
+        part.psd_constant,
+    ).spectrum(fft, size)
+
+
+def _height(surface: Surface) -> float:
+    """From the lowest to the highest point [m]: Sz of the standards on roughness."""
+    heights = surface.heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
+    return sum(surface.slab.reduce((), [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]))
+
+
+def _material(slab: Slab, prony: Prony, units: Units, integrator: str, dtype: type[np.floating]) -> Elastic | Zener:
+    scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
+    if scaled.moduli.size == 0:
+        return Elastic(slab, scaled.modulus_inf)
+    return Zener(slab, scaled, integrator, dtype)
+
+
+def _operator(job: Job, slab: Slab, fft: FFT, size: tuple[float, float]) -> halfspace.Convolution:
+    if job.grid.boundary == "free":
+        return halfspace.free(slab, size, job.material.poisson, fft.dtype)
+    return halfspace.periodic(fft, size, job.material.poisson, job.numerics.kernel)
+
+
+def _preconditioner(
+    job: Job, slab: Slab, fft: FFT, size: tuple[float, float]
+) -> halfspace.Convolution | halfspace.Narrowed:
+    if job.numerics.precision == "mixed":
+        return halfspace.Narrowed(halfspace.inverse(FFT(slab, dtype=np.float32), size, job.material.poisson))
+    return halfspace.inverse(fft, size, job.material.poisson)
+
+
+def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> ElasticEnergy | ZenerEnergy:
+    slab = solver.slab
+    if isinstance(material, Elastic):
+        return ElasticEnergy(slab)
+    if job.grid.boundary == "periodic" and job.numerics.kernel == "spectral" and job.numerics.precision == "double":
+        inverse = solver.preconditioner
+        return ZenerEnergy(slab, material, lambda p, dt, du: inverse.apply(du, solver.w))
+    memory = Zener(slab, material.prony, material.integrator)
+
+    def creep(p: Array, dt: float, du: Array) -> Array:
+        """What `A^-1 u` has grown by: it answers to the pressure at each point as u does to `A p`."""
+        memory.begin(dt, Heights(memory.u))
+        memory.commit(p, Heights(memory.u))
+        return memory.increment
+
+    return ZenerEnergy(slab, material, creep)
+
+
+def _by_whole_cells(job: Job, timeline: tuple[Step, ...]) -> bool:
+    """Whether the surface stands, or slides by whole cells along x on a periodic box."""
+    positions = {step.position for step in timeline}
+    if positions <= {(0.0, 0.0)}:
+        return True
+    if job.grid.boundary == "free":
+        return False
+    cells = np.array([x for x, _ in positions]) / job.grid.dx
+    return all(y == 0.0 for _, y in positions) and bool(np.all(np.abs(cells - np.round(cells)) < WHOLE))

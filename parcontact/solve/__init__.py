@@ -1,0 +1,1 @@
+"""Numbers only: no physics names, no files."""

@@ -1,0 +1,206 @@
+"""A rigid rough surface in full contact with a viscoelastic half-space that it slides on: exact, because it is linear.
+
+The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
+Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a function
+of time after a change of velocity, and a function of the time step for a code that takes such. With k = |(kx, ky)|:
+
+    pressure    p = p0 + sum Re[2 k A conj(M) exp(i (kx (x - sx) + ky (y - sy)))]
+    traction    <p grad h> = -sum k |A|^2 (kx, ky) Im M        force on the surface per nominal area
+    friction    mu = -traction . v/(|v| p0)
+
+valid while the pressure is positive everywhere. The pressure of a wave runs ahead of it by the angle of M.
+
+Source: Eqs. (5) and (10) of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
+half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
+Wave arguments (`amplitude` in m, maybe complex, `kx`, `ky` in rad/m) have one entry per wave and broadcast; SI units.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Array, ComplexArray, ComplexValues, Values
+from .viscoelastic import Integrator, complex_modulus, discrete_modulus, normal_form
+
+
+class Waves(NamedTuple):
+    """Complex amplitudes (m) and wave vectors (rad/m) of real waves; of two opposite wave vectors one is listed."""
+
+    amplitude: ComplexArray
+    kx: Array
+    ky: Array
+
+
+def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
+    """The waves of a map of heights (m), shape (ny, nx), on a periodic rectangle of sides length_x and length_y (m).
+
+    Its mean does not matter and is left out. Raises ValueError if there is a wave of two points per period, whose slope
+    is not defined by its heights.
+    """
+    heights = np.asarray(heights, float)
+    ny, nx = heights.shape
+    amplitudes = 2 * np.fft.fft2(heights - heights.mean()) / heights.size
+    rows, columns = (np.fft.fftfreq(count, 1 / count) for count in (ny, nx))
+    row, column = np.meshgrid(rows, columns, indexing="ij")
+    present = np.abs(amplitudes) > 1e-14 * np.abs(heights).max()  # the rest is rounding
+    if np.any(present & ((2 * row == -ny) | (2 * column == -nx))):
+        raise ValueError("The map of heights has a wave of two points per period.")
+    chosen = present & ((column > 0) | (column == 0) & (row > 0))
+    return Waves(amplitudes[chosen], 2 * np.pi / length_x * column[chosen], 2 * np.pi / length_y * row[chosen])
+
+
+def frequency(kx: Values, ky: Values, vx: Values, vy: Values) -> Array:
+    """omega = kx vx + ky vy in rad/s, the rate at which a point of the body goes through the phases of a wave."""
+    return np.asarray(kx * vx + ky * vy)
+
+
+# from transfer moduli to pressure and friction
+
+
+def pressure_amplitude(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> ComplexArray:
+    """2 k A conj(M) in Pa: size and phase of each wave of pressure relative to the moving surface; `modulus` is M."""
+    return 2 * np.hypot(kx, ky) * amplitude * np.conj(modulus)
+
+
+def pressure_variance(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> Array:
+    """The mean square fluctuation of the pressure in Pa^2, summed over waves on the last axis."""
+    return np.asarray(np.sum(np.abs(pressure_amplitude(amplitude, kx, ky, modulus)) ** 2, axis=-1) / 2)
+
+
+def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> Array:
+    """<p grad h> = -sum k |A|^2 (kx, ky) Im M in Pa, shape (..., 2); the last axis of `modulus` (M) holds the waves."""
+    strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(modulus)
+    return -np.stack([np.sum(strength * kx, axis=-1), np.sum(strength * ky, axis=-1)], axis=-1)
+
+
+# steady sliding
+
+
+def lead(
+    kx: Values,
+    ky: Values,
+    vx: Values,
+    vy: Values,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> Array:
+    """The angle of G*(omega) in rad by which each wave of pressure runs ahead of its wave of height (in time)."""
+    return np.angle(complex_modulus(frequency(kx, ky, vx, vy), modulus_inf, moduli, relaxation_times))
+
+
+def steady_pressure_amplitude(
+    amplitude: ComplexValues,
+    kx: Values,
+    ky: Values,
+    vx: Values,
+    vy: Values,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> ComplexArray:
+    """2 k A conj(G*(omega)) in Pa for each wave, relative to the surface that slides at (vx, vy) m/s."""
+    modulus = complex_modulus(frequency(kx, ky, vx, vy), modulus_inf, moduli, relaxation_times)
+    return pressure_amplitude(amplitude, kx, ky, modulus)
+
+
+def friction_coefficient(
+    mean_pressure: Values,
+    amplitude: ComplexValues,
+    kx: Values,
+    ky: Values,
+    vx: float,
+    vy: float,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> Array:
+    """mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves together in steady sliding at (vx, vy) m/s, not 0."""
+    modulus = complex_modulus(frequency(kx, ky, vx, vy), modulus_inf, moduli, relaxation_times)
+    return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
+
+
+def discrete_friction_coefficient(
+    mean_pressure: Values,
+    amplitude: ComplexValues,
+    kx: Values,
+    ky: Values,
+    vx: float,
+    vy: float,
+    dt: float,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+    integrator: Integrator = "exponential",
+) -> Array:
+    """The mu that a code with exact derivatives and Fourier kernel finds in steady sliding with time steps dt (s).
+
+    The surface goes by n cells of size c per step when dt = n c/|v|.
+    """
+    omega = frequency(kx, ky, vx, vy)
+    modulus = discrete_modulus(omega, dt, modulus_inf, moduli, relaxation_times, integrator)
+    return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
+
+
+# changes of velocity
+
+
+def velocity_step_modulus(
+    t: ArrayLike,
+    omega_before: ComplexValues,
+    omega_after: ArrayLike,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> ComplexArray:
+    """M(t) in Pa at times t >= 0 (s) after steady sliding at omega_before became sliding at omega_after.
+
+    M = G_inf + sum_j G_j [b_j + (a_j - b_j) exp(-t/tau_j - i omega_after t)], with i omega tau_j/(1 + i omega tau_j)
+    before (a) and after (b). The frequencies (rad/s, one per wave) are those of `frequency`. The shape is that of t
+    followed by that of the frequencies.
+    """
+    before = _memory(omega_before, normal_form(modulus_inf, moduli, relaxation_times).relaxation_times)
+    return _modulus_after(t, before, omega_after, modulus_inf, moduli, relaxation_times)
+
+
+def load_rest_slide_modulus(
+    t: ArrayLike,
+    rest: float,
+    omega: ArrayLike,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> ComplexArray:
+    """M(t) in Pa at times t >= 0 (s) of sliding at omega (rad/s) after `rest` (s) in full contact of a virgin body.
+
+    As `velocity_step_modulus` with a_j = exp(-rest/tau_j). The shape is that of t followed by that of omega.
+    """
+    before = np.exp(-rest / normal_form(modulus_inf, moduli, relaxation_times).relaxation_times)
+    return _modulus_after(t, before, omega, modulus_inf, moduli, relaxation_times)
+
+
+def _modulus_after(
+    t: ArrayLike,
+    before: ComplexValues,
+    omega: ArrayLike,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> ComplexArray:
+    """M(t), given by the shares of the moduli that are `before` in memory at t = 0 (last axis: terms of the series)."""
+    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    t, omega = np.asarray(t, float), np.asarray(omega, float)
+    t = t.reshape(t.shape + (1,) * (omega.ndim + 1))
+    after = _memory(omega, times)
+    fading = np.exp(-t / times - 1j * omega[..., None] * t)
+    return np.asarray(spring + (after + (before - after) * fading) @ terms)
+
+
+def _memory(omega: ArrayLike, times: Array) -> ComplexArray:
+    phase = 1j * np.asarray(omega, float)[..., None] * times
+    return phase / (1 + phase)
+
+
+def _friction(traction: Array, vx: float, vy: float, mean_pressure: Values) -> Array:
+    return np.asarray(-(traction @ np.array([vx, vy])) / (np.hypot(vx, vy) * mean_pressure))

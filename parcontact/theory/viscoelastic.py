@@ -1,0 +1,197 @@
+"""Linear viscoelasticity: relaxation, creep, complex and time-discrete moduli of a Prony series.
+
+    G(t) = G_inf + sum_j G_j exp(-t/tau_j)
+
+Source: J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapters 1 and 3; the Zener branch is Eq. (4) of the
+paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". A term may have relaxation
+time 0 (no stress after the first instant) or infinity (a spring).
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from .arrays import Array, ComplexArray
+
+Integrator = Literal["backward-euler", "exponential"]
+
+
+class Prony(NamedTuple):
+    """A relaxation function: long-term shear modulus (Pa), then moduli (Pa) and relaxation times (s) of its terms."""
+
+    modulus_inf: float
+    moduli: Array
+    relaxation_times: Array
+
+
+class CreepSpectrum(NamedTuple):
+    """J(t) = glass + sum_i compliances[i] (1 - exp(-t/retardation_times[i])) + fluidity t, in 1/Pa, s and 1/(Pa s)."""
+
+    glass: float
+    compliances: Array
+    retardation_times: Array
+    fluidity: float
+
+    def compliance(self, t: ArrayLike) -> Array:
+        """J(t) in 1/Pa for times t >= 0 (s, any shape)."""
+        t = np.asarray(t, float)
+        delayed = -np.expm1(-t[..., None] / self.retardation_times) @ self.compliances
+        return np.asarray(self.glass + delayed + self.fluidity * t)
+
+    def time(self, compliance: float) -> float:
+        """The time t at which J(t) = `compliance`, in s: 0 if it is so from the start, inf if it never is."""
+        growth = compliance - self.glass
+        if growth <= 0:
+            return 0.0
+        total = self.compliances.sum()
+        if self.fluidity == 0 and growth >= total * (1 - 1e-14):
+            return np.inf
+        # J rises no faster than at the start, and no slower than by flow alone or by the longest retardation time
+        earliest = growth / (self.fluidity + np.sum(self.compliances / self.retardation_times))
+        by_flow = growth / self.fluidity if self.fluidity > 0 else np.inf
+        by_delay = -self.retardation_times.max() * np.log1p(-growth / total) if growth < total else np.inf
+        low, high = np.log(earliest) - 1, np.log(min(by_flow, by_delay)) + 1
+        return float(np.exp(brentq(lambda x: self.compliance(np.exp(x)) - compliance, low, high, xtol=1e-15)))
+
+
+def normal_form(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Prony:
+    """The same series with ascending, distinct, positive and finite relaxation times and positive moduli.
+
+    Raises ValueError for numbers that are no relaxation function.
+    """
+    terms, times = np.atleast_1d(np.asarray(moduli, float)), np.atleast_1d(np.asarray(relaxation_times, float))
+    if terms.shape != times.shape or terms.ndim != 1:
+        raise ValueError(f"There are {terms.size} moduli but {times.size} relaxation times.")
+    if not (modulus_inf >= 0 and np.all(terms >= 0) and np.all(times >= 0)):
+        raise ValueError("Moduli and relaxation times must not be negative.")
+    spring = modulus_inf + terms[np.isinf(times)].sum()
+    lasting = (terms > 0) & (times > 0) & np.isfinite(times)
+    distinct, index = np.unique(times[lasting], return_inverse=True)
+    if not 0 < spring + terms[lasting].sum() < np.inf:
+        raise ValueError("The modulus after the first instant must be positive and finite.")
+    return Prony(float(spring), np.asarray(np.bincount(index, terms[lasting], distinct.size), float), distinct)
+
+
+def zener_to_prony(
+    series_modulus: ArrayLike, kelvin_modulus: ArrayLike, kelvin_viscosity: ArrayLike, modulus_inf: float = 0.0
+) -> Prony:
+    """The Prony series of Zener branches in parallel with a spring `modulus_inf`.
+
+    A branch is a spring G0 (`series_modulus`, Pa) in series with a spring G1 (`kelvin_modulus`, Pa) and a dashpot eta1
+    (`kelvin_viscosity`, Pa s) that are parallel. It adds G0 G1/(G0 + G1) to the long-term modulus and one term with
+    modulus G0^2/(G0 + G1) and relaxation time eta1/(G0 + G1). G1 = 0 is a Maxwell branch; eta1 = 0 leaves the two
+    springs (relaxation time 0), eta1 = inf leaves G0 (relaxation time inf).
+    """
+    g0, g1, eta1 = (
+        np.atleast_1d(np.asarray(value, float)) for value in (series_modulus, kelvin_modulus, kelvin_viscosity)
+    )
+    if not (np.all((g0 > 0) & np.isfinite(g0 + g1)) and np.all(g1 >= 0) and np.all(eta1 >= 0)):
+        raise ValueError("A Zener branch needs finite moduli, a positive series modulus and nothing negative.")
+    both = g0 + g1
+    return Prony(float(modulus_inf + np.sum(g0 * g1 / both)), g0 * g0 / both, eta1 / both)
+
+
+def relaxation(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
+    """G(t) in Pa for times t >= 0 (s, any shape); t = 0 is the instant after the step."""
+    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    return np.asarray(spring + np.exp(-np.asarray(t, float)[..., None] / times) @ terms)
+
+
+def relaxation_integral(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
+    """The integral of G from 0 to t, in Pa s: the stress after time t (s, any shape) of straining at unit rate."""
+    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    t = np.asarray(t, float)
+    return np.asarray(spring * t - np.expm1(-t[..., None] / times) @ (terms * times))
+
+
+def complex_modulus(
+    omega: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
+) -> ComplexArray:
+    """G* = G' + i G'' in Pa at angular frequencies omega (rad/s, any shape and sign), for strains exp(+i omega t).
+
+    G*(omega) = G_inf + sum_j G_j i omega tau_j / (1 + i omega tau_j)
+    """
+    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    phase = 1j * np.asarray(omega, float)[..., None] * times
+    return np.asarray(spring + (phase / (1 + phase)) @ terms)
+
+
+def discrete_modulus(
+    omega: ArrayLike,
+    dt: ArrayLike,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+    integrator: Integrator = "exponential",
+) -> ComplexArray:
+    """The complex modulus (Pa) that time steps dt > 0 (s) give to a displacement sampled from exp(i omega t).
+
+    With z = exp(i omega dt) the terms of G_inf + sum_j H_j are
+        backward Euler: H_j = G_j (1 - 1/z) / (1 + dt/tau_j - 1/z)
+        exponential:    H_j = G_j phi_j (1 - 1/z) / (1 - exp(-dt/tau_j)/z),   phi_j = (1 - exp(-dt/tau_j)) tau_j/dt
+    (z-transforms of the two one-step recursions, the latter being exact for piecewise linear displacement.)
+    N steps per period is dt = 2 pi/(N omega). omega and dt broadcast.
+    """
+    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    omega, dt = (np.asarray(value, float)[..., None] for value in (omega, dt))
+    ratio, turn = dt / times, 1j * omega * dt
+    if integrator == "backward-euler":
+        gains = -np.expm1(-turn) / (ratio - np.expm1(-turn))
+    elif integrator == "exponential":
+        gains = -np.expm1(-ratio) / ratio * np.expm1(-turn) / np.expm1(-ratio - turn)
+    else:
+        raise ValueError(f'The integrator must be "backward-euler" or "exponential", not "{integrator}".')
+    return np.asarray(spring + gains @ terms)
+
+
+def creep_spectrum(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> CreepSpectrum:
+    """The creep compliance that belongs to a relaxation function, by partial fractions of 1/Gbar.
+
+    Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, one lambda_i above every relaxation
+    time (the last one is infinite, a flow, where G_inf = 0), and J_i = -1/(s Gbar'(s)) there. Each zero is found as the
+    logarithm of its distance to the nearer pole, so that no digits are lost however close they are or however many
+    decades the times span.
+    """
+    series = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = series
+    zeros = [_zero_above(index, series) for index in range(times.size - (spring == 0))]
+    slopes = np.array([np.sum(terms * times / distances**2) for _, distances in zeros])
+    retardation_times = np.array([zero for zero, _ in zeros])
+    fluidity = 1 / float(terms @ times) if spring == 0 else 0.0
+    return CreepSpectrum(1 / float(spring + terms.sum()), 1 / (retardation_times * slopes), retardation_times, fluidity)
+
+
+def creep(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
+    """The creep compliance J(t) in 1/Pa for times t >= 0 (s, any shape): the strain after a unit step of stress."""
+    return creep_spectrum(modulus_inf, moduli, relaxation_times).compliance(t)
+
+
+def _zero_above(index: int, series: Prony) -> tuple[float, Array]:
+    """The zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda) above tau[index], and every tau_k - lambda."""
+    pole, sign, room = _nearer_pole(index, series)
+    times = series.relaxation_times
+    own, rest = _split(pole, sign * room, series)
+    # f rises between poles, so that nearer than this the pole's own term outweighs the rest
+    least = room * min(1.0, abs(own / rest))
+    bracket = np.log(least / 2), np.log(1.5 * room)
+    offset = sign * np.exp(brentq(lambda x: sum(_split(pole, sign * np.exp(x), series)), *bracket, xtol=1e-15))
+    return float(times[pole] + offset), times - times[pole] - offset
+
+
+def _nearer_pole(index: int, series: Prony) -> tuple[int, int, float]:
+    """The pole nearer to the zero above tau[index], the side of it (+1 above) and the largest possible distance."""
+    spring, terms, times = series
+    if index == times.size - 1:
+        return index, 1, times[index] * terms.sum() / spring
+    room = 0.5 * (times[index + 1] - times[index])
+    return (index, 1, room) if sum(_split(index, room, series)) >= 0 else (index + 1, -1, room)
+
+
+def _split(pole: int, offset: float, series: Prony) -> tuple[float, float]:
+    """f at lambda = tau[pole] + offset, as the term of that pole and the rest."""
+    spring, terms, times = series
+    others = np.arange(times.size) != pole
+    distances = times[others] - times[pole] - offset
+    return -terms[pole] * times[pole] / offset, spring + float(np.sum(terms[others] * times[others] / distances))

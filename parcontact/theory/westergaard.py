@@ -1,0 +1,128 @@
+"""A rigid wavy surface (one sinusoid) pressed on an elastic or viscoelastic half-space (Westergaard).
+
+The surface h(x) = Delta cos(2 pi x/lambda) has its crests at x = 0, +-lambda, ...; p is the mean pressure. With
+p* = pi E* Delta/lambda, at which contact becomes complete, s = min(p/p*, 1), psi = pi x/lambda and E* = 2 G/(1 - nu):
+
+    contact fraction  f = (2/pi) asin sqrt(s)
+    pressure          p(x) = 2 p* |cos psi| sqrt(s - sin^2 psi)_+               p + p* cos(2 psi) in full contact
+    gap               g(x) = 2 Delta (y sqrt(y^2 - s) - s arcosh(y/sqrt(s))),   y = |sin psi| > sqrt(s)
+    mean gap          Delta (1 - s + s ln s)
+
+Source: H. M. Westergaard, J. Appl. Mech. 6 (1939) 49; K. L. Johnson, Contact Mechanics (1985), section 13.2. The gap
+is the integral of its slope outside the contact; the mean gap d follows from the elastic energy U per area, dU = -p dd.
+Arguments are in SI units and broadcast.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Array, Values
+from .viscoelastic import creep_spectrum
+
+
+def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
+    """p* = pi E* Delta/lambda in Pa, the mean pressure at which contact becomes complete."""
+    modulus = 2 * shear_modulus / (1 - poisson)
+    return np.asarray(np.pi * modulus * amplitude / wavelength)
+
+
+def contact_fraction(
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """The part of the surface that is in contact, f = 2a/lambda = (2/pi) asin sqrt(p/p*)."""
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    return _fraction(load)
+
+
+def pressure(
+    x: Values,
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """p(x) in Pa at distances x (m) from a crest; any x, also beyond one wave."""
+    full = full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    psi = np.pi * x / wavelength
+    inside = np.maximum(mean_pressure / full - np.sin(psi) ** 2, 0)
+    partial = 2 * full * np.abs(np.cos(psi)) * np.sqrt(inside)
+    return np.asarray(np.where(mean_pressure < full, partial, mean_pressure + full * np.cos(2 * psi)))
+
+
+def peak_pressure(
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """p(0) in Pa: 2 sqrt(p p*) in partial contact, p + p* in full contact."""
+    return pressure(0.0, mean_pressure, amplitude, wavelength, shear_modulus, poisson)
+
+
+def gap(
+    x: Values,
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """g(x) in m, the distance between the surfaces; zero in the contact."""
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    edge = np.sqrt(np.clip(load, np.finfo(float).tiny, 1))
+    y = np.maximum(np.abs(np.sin(np.pi * x / wavelength)), edge)
+    return np.asarray(2 * amplitude * (y * np.sqrt(y**2 - edge**2) - edge**2 * np.arccosh(y / edge)))
+
+
+def mean_gap(
+    mean_pressure: Values,
+    amplitude: Values,
+    wavelength: Values,
+    shear_modulus: Values,
+    poisson: Values = 0.5,
+) -> Array:
+    """The mean of the gap over one wave in m, Delta (1 - s + s ln s)."""
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    s = np.clip(load, np.finfo(float).tiny, 1)
+    return amplitude * (1 - s + s * np.log(s))
+
+
+def load_step_contact_fraction(
+    t: ArrayLike,
+    mean_pressure: float,
+    amplitude: float,
+    wavelength: float,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> Array:
+    """The contact fraction at times t >= 0 (s) after `mean_pressure` was put on a virgin viscoelastic body.
+
+    Contact only grows, so that the elastic solution holds with 1/E* = J(t)/4, where J is the creep compliance
+    (E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438).
+    """
+    compliance = creep_spectrum(modulus_inf, moduli, relaxation_times).compliance(t)
+    return _fraction(mean_pressure * compliance * wavelength / (4 * np.pi * amplitude))
+
+
+def load_step_full_contact_time(
+    mean_pressure: float,
+    amplitude: float,
+    wavelength: float,
+    modulus_inf: float,
+    moduli: ArrayLike,
+    relaxation_times: ArrayLike,
+) -> float:
+    """When `load_step_contact_fraction` reaches 1, in s: J(t) = 4 pi Delta/(p lambda); 0 or inf if always or never."""
+    spectrum = creep_spectrum(modulus_inf, moduli, relaxation_times)
+    return spectrum.time(4 * np.pi * amplitude / (mean_pressure * wavelength))
+
+
+def _fraction(load: Values) -> Array:
+    return np.asarray(2 / np.pi * np.arcsin(np.sqrt(np.clip(load, 0, 1))))

@@ -1,0 +1,129 @@
+"""What all tests share: communicators, the program as a user starts it, and failing together under mpirun."""
+
+import io
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import hypothesis
+import pytest
+from _pytest.config import create_terminal_writer
+from mpi4py import MPI
+
+WORLD = MPI.COMM_WORLD
+REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
+UNSEEN = io.StringIO()  # what pytest says on the other ranks
+PATIENCE = 20.0  # seconds in which the other ranks must end a test that failed here
+
+# All ranks must see the same examples, and a first example waits for the compiler.
+hypothesis.settings.register_profile("ranks", derandomize=WORLD.size > 1, deadline=None)
+hypothesis.settings.load_profile("ranks")
+
+
+@pytest.fixture(scope="session")
+def comm() -> MPI.Comm:
+    return WORLD
+
+
+@pytest.fixture(scope="session")
+def communicators() -> list[MPI.Comm]:
+    """The communicators of the first 1, 2, ... ranks, as far as this rank belongs to them."""
+    groups = [WORLD.Split(0 if WORLD.rank < size else MPI.UNDEFINED) for size in range(1, WORLD.size + 1)]
+    return [group for group in groups if group != MPI.COMM_NULL]
+
+
+@pytest.fixture
+def shared_path(tmp_path: Path) -> Path:
+    """A temporary directory that is the same on all ranks."""
+    return WORLD.bcast(tmp_path)
+
+
+class RunParcontact(Protocol):
+    def __call__(
+        self, args: Sequence[str | Path], ranks: int = 1, cwd: Path | None = None, timeout: float = 240.0
+    ) -> subprocess.CompletedProcess[str]: ...
+
+
+@pytest.fixture
+def run_parcontact(tmp_path: Path) -> RunParcontact:
+    """`run_parcontact(["job.yaml", "--quiet"], ranks=2)`: as a user would, in `tmp_path`; 0 ranks is without mpirun."""
+
+    def run(
+        args: Sequence[str | Path], ranks: int = 1, cwd: Path | None = None, timeout: float = 240.0
+    ) -> subprocess.CompletedProcess[str]:
+        mpirun = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks else []
+        command = [*mpirun, sys.executable, "-m", "parcontact", *map(str, args)]
+        # MPI has left marks in the environment of this process that would confuse the next mpirun.
+        clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+        pipe = subprocess.PIPE
+        process = subprocess.Popen(
+            command, cwd=cwd or tmp_path, env=clean, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+        )
+        try:
+            out, err = process.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)  # mpirun and all its ranks
+            out, err = process.communicate()
+            pytest.fail(f"{' '.join(command)} took more than {timeout:g} s\n{out}\n{err}")
+        return subprocess.CompletedProcess(command, process.returncode, out, err)
+
+    return run
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Under mpirun no test may start another mpirun."""
+    if WORLD.size > 1:
+        starters = [item for item in items if "run_parcontact" in getattr(item, "fixturenames", ())]
+        config.hook.pytest_deselected(items=starters)
+        items[:] = [item for item in items if item not in starters]
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Only rank 0 prints."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    if WORLD.rank > 0 and reporter is not None:
+        reporter._tw = create_terminal_writer(config, UNSEEN)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if WORLD.size > 1:
+        agree(report)
+    return report
+
+
+def agree(report: pytest.TestReport) -> None:
+    """Make a test that fails on one rank fail on all, so that they enter the next one together."""
+    own = f"on rank {WORLD.rank}: {report.outcome}\n{report.longreprtext}"
+    arrival = REFEREE.Ibarrier()
+    deadline = time.monotonic() + PATIENCE if report.failed else math.inf
+    while not arrival.Test():
+        if time.monotonic() > deadline:
+            print(f"\n{report.nodeid} {own}\nother ranks did not finish it", file=sys.stderr, flush=True)
+            WORLD.Abort(1)
+        time.sleep(1e-3)
+    outcomes = REFEREE.allgather((report.outcome, own))
+    if len({outcome for outcome, _ in outcomes}) > 1:
+        report.outcome = "failed"
+        report.longrepr = "\n".join(text for outcome, text in outcomes if outcome != "passed")
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> Generator[None]:
+    """A rank that leaves without having agreed (it could not read a test, say) ends all."""
+    yield
+    agreed = (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.NO_TESTS_COLLECTED)
+    if WORLD.size > 1 and exitstatus not in agreed:
+        session.config.get_terminal_writer().flush()
+        if WORLD.rank > 0:
+            time.sleep(2.0)  # rank 0 may say the same
+            print(f"rank {WORLD.rank}:\n{UNSEEN.getvalue()}", file=sys.stderr, flush=True)
+        WORLD.Abort(exitstatus)

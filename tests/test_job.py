@@ -1,0 +1,326 @@
+"""Jobs that are right: the contract's own example, short forms, defaults, round trips, warnings."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from parcontact.job import (
+    Elastic,
+    GeometricStep,
+    JobError,
+    PronyBranch,
+    Ramp,
+    Stage,
+    ZenerBranch,
+    describe,
+    load,
+    log_range,
+)
+
+CONTRACT = """
+title: Rubber pressed on a road, then sliding      # free text
+grid:
+  points: [1024, 1024]          # nx, ny; one number means both
+  size: [1.0e-3, 1.0e-3]        # Lx, Ly [m]
+  boundary: periodic            # periodic (default) | free (zero padded, isolated contact)
+surface:                        # one mapping, or a list whose heights add up
+  - {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, rolloff_wavelength: 2.5e-4, short_wavelength: 7.8125e-6,
+     rms_slope: 0.02, seed: 1}  # exactly one of rms_slope | rms_height | psd_constant [m^4]
+  - {shape: sphere, radius: 1.0e-2, profile: paraboloid}   # or exact; center: [x, y] defaults to the middle
+  - {shape: cylinder, radius: 1.0e-2, axis: y}
+  - {shape: wave, amplitude: 5.0e-7, waves: [4, 0], phase: 0.0}   # A cos(2 pi (wx x/Lx + wy y/Ly) + phase)
+  - {shape: file, path: road.npy, scale: 1.0e-6}           # also .h5 (dataset: name) and .txt
+  - {shape: flat}
+material:
+  model: zener                  # elastic | zener
+  poisson: 0.5
+  modulus_inf: 1.0e6            # zener: the extra parallel spring G_inf of Eq. (8) [Pa]; 0 allowed
+  branches:                     # zener: either form, may be mixed
+    - {G0: 2.75e6, G1: 3.0556e5, eta1: 3055.6}             # the paper's spring in series with Kelvin
+    - {modulus: 2.475e6, relaxation_time: 1.0e-3}          # Prony: modulus * exp(-t / relaxation_time)
+initial: {state: virgin}        # virgin (default) | {state: steady, velocity: 0.01, pressure: 1.0e5}
+history:                        # stages, run in order
+  - {name: press, pressure: 1.0e5, duration: 1.0e-3, time_step: {first: 1.0e-7, growth: 1.2}}
+  - {name: slide, pressure: 1.0e5, velocity: 3.0, distance: 5.0e-4, cells_per_step: 1}
+numerics:
+  integrator: exponential       # exponential (default, 2nd order) | backward-euler (the paper's)
+  tolerance: 1.0e-4             # of the certified stop
+  max_iterations: 500
+  kernel: spectral
+  precision: double             # double | single | mixed
+output:
+  directory: out/rough          # default: out/<job file stem>
+  fields: [pressure, displacement, gap]     # default: none
+  every: 64                     # steps between saved fields
+checkpoint: {every: 200, keep: 2}           # steps; {minutes: 10} also
+"""
+
+SMALL = """\
+grid: {points: 64, size: 1e-3}
+surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
+material: {model: elastic, shear_modulus: 1e6}
+history:
+  - {pressure: 1e5}
+"""
+
+
+def job_of(tmp_path: Path, text: str, *overrides: str, name: str = "test.yaml") -> Any:
+    """The job of a text; Any, so that a test may say what it knows: this shape has a phase."""
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return load(path, overrides)
+
+
+def replaced(text: str, **sections: str) -> str:
+    """SMALL with whole sections exchanged; sections are one line each."""
+    kept = [line for line in text.split("\n") if line.split(":")[0] not in sections]
+    return "\n".join([*(f"{name}: {value}" for name, value in sections.items()), *kept])
+
+
+def test_contract_loads(tmp_path: Path) -> None:
+    (tmp_path / "road.npy").touch()
+    job = job_of(tmp_path, CONTRACT)
+    assert job.title == "Rubber pressed on a road, then sliding"
+    assert (job.grid.nx, job.grid.ny, job.grid.lx, job.grid.ly) == (1024, 1024, 1e-3, 1e-3)
+    assert job.grid.dx == 1e-3 / 1024
+    assert [shape.shape for shape in job.surface] == ["rough", "sphere", "cylinder", "wave", "file", "flat"]
+    assert job.material.model == "zener"
+    assert [type(branch) for branch in job.material.branches] == [ZenerBranch, PronyBranch]
+    press, slide = job.history
+    assert (press.control, press.load, press.seconds) == ("pressure", Ramp(1e5, 1e5), 1e-3)
+    assert press.time_step == GeometricStep(first=1e-7, growth=1.2)
+    assert (slide.velocity, slide.cells_per_step, slide.time_step) == ((3.0, 0.0), 1.0, None)
+    assert slide.seconds == 5e-4 / 3.0
+    assert job.output.directory == Path("out/rough")
+    assert job.output.fields == ("pressure", "displacement", "gap")
+    assert (job.checkpoint.every, job.checkpoint.minutes, job.checkpoint.keep) == (200, None, 2)
+    assert job.warnings == ()
+
+
+def test_defaults(tmp_path: Path) -> None:
+    job = job_of(tmp_path, SMALL, name="small.yaml")
+    assert job.path == tmp_path / "small.yaml"
+    assert job.directory == tmp_path
+    assert (job.title, job.grid.points, job.grid.size, job.grid.boundary) == ("", (64, 64), (1e-3, 1e-3), "periodic")
+    assert job.surface[0].phase == 0.0
+    assert job.material == Elastic(poisson=0.5, shear_modulus=1e6)
+    assert (job.initial.state, job.initial.velocity, job.initial.pressure) == ("virgin", (0.0, 0.0), None)
+    (stage,) = job.history
+    assert (stage.name, stage.seconds, stage.velocity) == ("stage 1", 0.0, (0.0, 0.0))
+    assert (job.numerics.integrator, job.numerics.tolerance, job.numerics.max_iterations) == ("exponential", 1e-4, 500)
+    assert (job.numerics.kernel, job.numerics.precision, job.numerics.slope) == ("spectral", "double", "spectral")
+    assert (job.numerics.accept_unconverged, job.accuracy) == (False, 1e-3)
+    assert (job.output.directory, job.output.fields, job.output.every) == (Path("out/small"), (), 1)
+    assert (job.output.energy, job.output.branch_dissipation, job.output.spectrum) == (False, False, False)
+    assert (job.checkpoint.every, job.checkpoint.minutes, job.checkpoint.keep) == (None, 10.0, 2)
+    assert job.steady is None
+
+
+def test_surface_defaults(tmp_path: Path) -> None:
+    rough = "{shape: rough, hurst: 1, long_wavelength: 1e-4, short_wavelength: 5e-5, rms_height: 1e-6}"
+    job = job_of(tmp_path, replaced(SMALL, surface=f"[{rough}, {{shape: sphere, radius: 1, center: [0, 1e-4]}}]"))
+    first, second = job.surface
+    assert (first.rolloff_wavelength, first.seed, first.amplitudes) == (1e-4, 0, "random")
+    assert (first.rms_slope, first.rms_height, first.psd_constant) == (None, 1e-6, None)
+    assert (second.profile, second.center) == ("paraboloid", (0.0, 1e-4))
+
+
+def test_free_boundary_takes_the_love_kernel(tmp_path: Path) -> None:
+    assert job_of(tmp_path, SMALL, "grid.boundary=free").numerics.kernel == "love"
+    assert job_of(tmp_path, SMALL, "numerics={kernel: love}").numerics.kernel == "love"
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("1e-3", 1e-3), ("1E3", 1e3), ("+1.e-3", 1e-3), (".5e0", 0.5), ("1_000", 1e3), ("7", 7.0), ("2.", 2.0)],
+)
+def test_numbers(tmp_path: Path, text: str, number: float) -> None:
+    assert job_of(tmp_path, SMALL, f"grid.size={text}").grid.lx == number
+
+
+def test_whole_numbers_may_have_an_exponent(tmp_path: Path) -> None:
+    points = job_of(tmp_path, SMALL, "grid.points=[1e2, 1.0]").grid.points
+    assert points == (100, 1)
+    assert all(type(n) is int for n in points)
+
+
+def test_an_empty_value_is_an_absent_key(tmp_path: Path) -> None:
+    assert job_of(tmp_path, SMALL, "numerics=", "title=").numerics.tolerance == 1e-4
+
+
+def test_anchors_and_merges(tmp_path: Path) -> None:
+    text = SMALL.replace(
+        "  - {pressure: 1e5}\n", "  - &first {pressure: 1e5}\n  - {<<: *first, name: again}\n  - *first\n"
+    )
+    assert [stage.name for stage in job_of(tmp_path, text).history] == ["stage 1", "again", "stage 3"]
+
+
+@pytest.mark.parametrize("control", ["pressure", "force", "approach"])
+def test_ramps(tmp_path: Path, control: str) -> None:
+    stage = f"{{{control}: {{from: 1, to: 3}}, duration: 2, time_step: 0.5, velocity: [0, -1]}}"
+    (stage_read,) = job_of(tmp_path, replaced(SMALL.split("history")[0], history=f"[{stage}]")).history
+    assert (stage_read.control, stage_read.load, stage_read.load.constant) == (control, Ramp(1.0, 3.0), False)
+    assert [stage_read.load.at(fraction) for fraction in (0.0, 0.5, 1.0)] == [1.0, 2.0, 3.0]
+    assert (stage_read.time_step, stage_read.velocity) == (0.5, (0.0, -1.0))
+
+
+def test_complete_unloading_is_a_stage(tmp_path: Path) -> None:
+    text = replaced(SMALL.split("history")[0], history="[{pressure: 1e5}, {pressure: 0}, {approach: -1e-6}]")
+    assert [stage.load.end for stage in job_of(tmp_path, text).history] == [1e5, 0.0, -1e-6]
+
+
+def test_zener_moduli() -> None:
+    branch = ZenerBranch(G0=3e6, G1=1e6, eta1=4e3)
+    assert branch.relaxation_time == 1e-3
+    assert (branch.instant_modulus, branch.long_modulus) == (3e6, 0.75e6)
+    assert ZenerBranch(G0=3e6, G1=1e6, eta1=0.0).instant_modulus == 0.75e6
+    assert ZenerBranch(G0=3e6, G1=0.0, eta1=1.0).long_modulus == 0.0
+    assert ZenerBranch(G0=3e6, G1=1e6, eta1=math.inf).long_modulus == 3e6
+
+
+def test_a_maxwell_fluid_is_legal(tmp_path: Path) -> None:
+    job = job_of(tmp_path, replaced(SMALL, material="{model: zener, branches: [{G0: 1e6, G1: 0, eta1: .inf}]}"))
+    assert job.material.modulus_inf == 0.0
+    job = job_of(tmp_path, replaced(SMALL, material="{model: zener, branches: [{modulus: 1, relaxation_time: 1}]}"))
+    assert job.material.long_modulus == 0.0
+
+
+def test_steady_may_stand_alone(tmp_path: Path) -> None:
+    text = replaced(SMALL.split("history")[0], steady="{velocities: 1e-3:1e1:5, pressures: 1e5, direction: [3, 4]}")
+    job = job_of(tmp_path, text)
+    assert job.history == ()
+    assert job.steady is not None
+    assert job.steady.velocities == pytest.approx((1e-3, 1e-2, 1e-1, 1.0, 10.0), rel=1e-14)
+    assert (job.steady.velocities[0], job.steady.velocities[-1]) == (1e-3, 10.0)
+    assert (job.steady.pressures, job.steady.waves) == ((1e5,), False)
+    assert job.steady.unit_direction == pytest.approx((0.6, 0.8), rel=1e-15)
+
+
+def test_log_range_of_one() -> None:
+    assert log_range("2:2:1") == (2.0,)
+
+
+def test_steady_start(tmp_path: Path) -> None:
+    job = job_of(tmp_path, replaced(SMALL, initial="{state: steady, velocity: 0.01, pressure: 1e5}"))
+    assert (job.initial.state, job.initial.velocity, job.initial.pressure) == ("steady", (0.01, 0.0), 1e5)
+
+
+def test_overrides_of_every_kind(tmp_path: Path) -> None:
+    (tmp_path / "road.npy").touch()
+    job = job_of(
+        tmp_path, CONTRACT, "grid.points=[512, 256]", "history.0.pressure=2e5", "material.branches.1.modulus=7",
+        "accuracy=0", "steady.velocities=[1, 2]", "title=a = b", "history.1.distance=null", "history.1.duration=1",
+        "surface.0.short_wavelength=2e-5",
+    )  # fmt: skip
+    assert job.grid.points == (512, 256)
+    assert job.history[0].load.start == 2e5
+    assert job.material.branches[1].modulus == 7.0
+    assert (job.accuracy, job.title) == (0.0, "a = b")
+    assert job.steady is not None
+    assert job.steady.velocities == (1.0, 2.0)
+    assert (job.history[1].distance, job.history[1].seconds) == (None, 1.0)
+
+
+# --- the job as text --------------------------------------------------------------------------------------------------
+
+ROUND_TRIPS = {
+    "small": SMALL,
+    "contract": CONTRACT,
+    "texts that look like something else": replaced(SMALL, title="'1e-3'").replace(
+        "{pressure", "{name: 'no', pressure"
+    ),
+    "steady": replaced(SMALL, steady="{velocities: '1e-3:1e2:31', waves: true}", title='"ünïcode: [x] # 1"'),
+    "everything": replaced(
+        SMALL.split("history")[0],
+        material="{model: zener, branches: [{G0: 1e6, G1: 0, eta1: .inf}]}",
+        history="[{force: {from: 0, to: 1e-2}, velocity: [1e-7, 2], distance: 1, time_step: 1e-5}, {approach: -1e-9}]",
+        initial="{state: steady, pressure: 3, velocity: 0.123456789012345678}",
+        output="{energy: true, branch_dissipation: true, spectrum: true, directory: /somewhere/else}",
+        numerics="{integrator: backward-euler, precision: mixed, accept_unconverged: true}",
+        checkpoint="{keep: 5}",
+        accuracy="0",
+    ),
+}
+
+
+@pytest.mark.parametrize("text", ROUND_TRIPS.values(), ids=ROUND_TRIPS.keys())
+def test_resolved_round_trip(tmp_path: Path, text: str) -> None:
+    (tmp_path / "road.npy").touch()
+    job = job_of(tmp_path, text)
+    (tmp_path / "deeper").mkdir()
+    again = job_of(tmp_path / "deeper", job.resolved(), name="job.resolved.yaml")
+    assert again == job
+    assert hash(again) == hash(job)
+    assert again.resolved() == job.resolved()
+    assert again.output.directory == job.output.directory
+
+
+def test_jobs_differ(tmp_path: Path) -> None:
+    assert job_of(tmp_path, SMALL) != job_of(tmp_path, SMALL, "history.0.pressure=2e5")
+
+
+def test_a_job_is_frozen(tmp_path: Path) -> None:
+    job = job_of(tmp_path, SMALL)
+    with pytest.raises(ValueError, match="frozen"):
+        job.title = "other"  # type: ignore[misc]
+
+
+def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:
+    (tmp_path / "road.npy").touch()
+    table = " ".join(describe(job_of(tmp_path, CONTRACT)).split())
+    for part in (
+        "grid.points [1024, 1024]", "grid.size [0.001, 0.001] m", "material.modulus_inf 1e+06 Pa", "rms_slope 0.02,",
+        "G0 2.75e+06 Pa, G1 305560 Pa, eta1 3055.6 Pa s", "pressure 100000 Pa", "velocity [3, 0] m/s", "phase 0 rad",
+        "time_step (first 1e-07 s, growth 1.2)", "numerics.accept_unconverged no", "cell [9.76563e-07, 9.76563e-07] m",
+    ):  # fmt: skip
+        assert part in table
+
+
+# --- warnings ---------------------------------------------------------------------------------------------------------
+
+ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1}"
+SLIDING = "[{pressure: 1, velocity: 1, distance: 1e-4, cells_per_step: 2}]"
+
+
+def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
+    long, short = job_of(tmp_path, replaced(SMALL, surface=ROUGH)).warnings
+    assert "only 2 long waves fit into the box along x" in long
+    assert "a size of 0.002 m or a long_wavelength of 0.00025 m" in long
+    assert "only 4 cells per shortest wave along x" in short
+    assert "128 points or a short_wavelength of 0.000125 m" in short
+
+
+def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:
+    zener = "{model: zener, branches: [{modulus: 1, relaxation_time: 1e-3}, {modulus: 1, relaxation_time: 1}]}"
+    history = "[{pressure: 1, duration: 1, time_step: {first: 1e-5, growth: 1.25}}]"
+    text = replaced(SMALL.split("history")[0], material=zener, history=history)
+    (warning,) = job_of(tmp_path, text, "numerics.integrator=backward-euler").warnings
+    assert "time steps up to 0.2 s are longer than the shortest relaxation time 0.001 s" in warning
+    assert job_of(tmp_path, text).warnings == ()
+    assert job_of(tmp_path, text, "numerics.integrator=backward-euler", "history.0.time_step=1e-3").warnings == ()
+
+
+def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
+    text = replaced(SMALL.split("history")[0], surface=ROUGH, history=SLIDING)
+    fine = ("grid.points=128", "surface.long_wavelength=2.5e-4")
+    assert job_of(tmp_path, text, *fine).warnings == ()
+    (warning,) = job_of(tmp_path, text, *fine, "history.0.cells_per_step=4").warnings
+    assert "0.5 of its shortest wave" in warning
+    assert "cells_per_step up to 2)" in warning
+
+
+def test_warning_of_velocity_without_duration(tmp_path: Path) -> None:
+    (warning,) = job_of(tmp_path, SMALL, "history.0.velocity=3").warnings
+    assert warning == "history.0: nothing slides in a stage without duration or distance; its velocity has no effect"
+
+
+def test_parts_can_be_made_without_a_file() -> None:
+    assert Stage(pressure=1e5).load == Ramp(1e5, 1e5)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="needs exactly one of pressure"):
+        Stage()
+
+
+def test_job_error_joins_its_mistakes() -> None:
+    assert str(JobError(["a", "b"])) == "a\nb"

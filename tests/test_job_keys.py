@@ -1,0 +1,237 @@
+"""Jobs with one mistake: the sentence about it, and its line and column."""
+
+from pathlib import Path
+
+import pytest
+
+from parcontact.job import JobError, load
+
+SURFACE = "surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}"
+MATERIAL = "material: {model: elastic, shear_modulus: 1e6}"
+HISTORY = "history: [{pressure: 1e5}]"
+LINES = ["grid: {points: 64, size: 1e-3}", SURFACE, MATERIAL, HISTORY]
+
+
+def mistakes(path: Path, line: str) -> list[str]:
+    """The mistakes in the job of LINES in which `line` replaces that of its section, or comes last."""
+    section = line.split(":")[0]
+    others = [line if other.split(":")[0] == section else other for other in LINES]
+    path.write_text("\n".join(others if line in others else [*others, line]), encoding="utf-8")
+    with pytest.raises(JobError) as caught:
+        load(path)
+    return caught.value.mistakes
+
+
+# what a line says: the one mistake in it, without the name of the file
+
+GRID = {
+    "grid: {points: 64, size: -1.0}": "1:26: grid.size must be a positive length [m], got -1.0",
+    "grid: {points: 64, size: [1, 0]}": "1:30: grid.size.1 must be a positive length [m], got 0",
+    "grid: {points: 64, size: .inf}": "1:26: grid.size must be a positive length [m], got inf",
+    "grid: {points: 64, size: 1 mm}": "1:26: grid.size must be a positive length [m], got '1 mm'",
+    "grid: {points: 64, size: '1e-3'}": "1:26: grid.size must be a positive length [m], got '1e-3'",
+    "grid: {points: 64, size: true}": "1:26: grid.size must be a positive length [m], got true",
+    "grid: {points: 64, size: [1, 1, 1]}": "1:26: grid.size must be a positive length [m], got [1, 1, 1]",
+    "grid: {points: 64, size: [1]}": "1:26: grid.size must be a positive length [m], got [1]",
+    "grid: {points: 64}": "1:7: grid.size is missing; it must be a positive length [m]",
+    "grid: {points: 64, size: }": "1:25: grid.size is missing; it must be a positive length [m]",
+    "grid: {points: 0, size: 1}": "1:16: grid.points must be a positive whole number of points, got 0",
+    "grid: {points: 6.5, size: 1}": "1:16: grid.points must be a positive whole number of points, got 6.5",
+    "grid: {points: 64, size: 1, boundary: open}": "1:39: grid.boundary must be periodic | free, got 'open'",
+    "grid: {pionts: 1, points: 64, size: 1}": "1:8: grid.pionts is not a known key; did you mean points?",
+    "grid: {points: 64, size: 1, zz: 1}": "1:29: grid.zz is not a known key; there are points, size, boundary",
+    "grid: 64": "1:7: grid must be a mapping of keys, got 64",
+}
+
+SURFACES = {
+    "surface: wave": "2:10: surface must be one shape, or a list of shapes, got 'wave'",
+    "surface: []": "2:10: surface needs at least one shape; shape: flat is one",
+    "surface: [3]": (
+        "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | flat, got 3"
+    ),
+    "surface: {radius: 1}": (
+        "2:10: surface.shape is missing; it must be rough | sphere | cylinder | wave | file | flat"
+    ),
+    "surface: [{shape: spher}]": (
+        "2:19: surface.0.shape must be rough | sphere | cylinder | wave | file | flat, got 'spher'; did you "
+        "mean sphere?"
+    ),
+    "surface: {shape: sphere}": "2:10: surface.radius is missing; it must be a positive length [m]",
+    "surface: {shape: sphere, radius: 1, axis: y}": (
+        "2:37: surface.axis is not a key of shape sphere; there are shape, radius, profile, center"
+    ),
+    "surface: {shape: sphere, radius: 1, profile: parabola}": (
+        "2:46: surface.profile must be paraboloid | exact, got 'parabola'; did you mean paraboloid?"
+    ),
+    "surface: {shape: sphere, radius: 1, center: 0}": "2:45: surface.center must be a position [x, y] [m], got 0",
+    "surface: {shape: cylinder, radius: 1, axis: z}": "2:45: surface.axis must be x | y, got 'z'",
+    "surface: {shape: wave, amplitude: .nan, waves: [1, 0]}": (
+        "2:35: surface.amplitude must be a finite height [m], got nan"
+    ),
+    "surface: {shape: wave, amplitude: 1, waves: [1, .5]}": (
+        "2:49: surface.waves.1 must be two whole numbers of waves in the box, along x and along y, got 0.5"
+    ),
+    "surface: {shape: wave, amplitude: 1, waves: 4}": (
+        "2:45: surface.waves must be two whole numbers of waves in the box, along x and along y, got 4"
+    ),
+    "surface: {shape: wave, amplitude: 1, waves: [32, -33]}": (
+        "2:50: surface.waves.1 must be within -32 and 32 waves for 64 points (Nyquist), got -33"
+    ),
+    "surface: {shape: file, path: x.csv}": "2:30: surface.path must end in .npy or .h5 or .txt, got 'x.csv'",
+    "surface: {shape: file, path: 3}": "2:30: surface.path must be the path of a .npy, .h5 or .txt file, got 3",
+}
+
+MATERIALS = {
+    "material: {shear_modulus: 1}": "3:11: material.model is missing; it must be elastic | zener",
+    "material: {model: elastc}": ("3:19: material.model must be elastic | zener, got 'elastc'; did you mean elastic?"),
+    "material: {model: elastic}": ("3:11: material.shear_modulus is missing; it must be a positive shear modulus [Pa]"),
+    "material: {model: elastic, shear_modulus: 1, branches: []}": (
+        "3:46: material.branches is not a key of model elastic; there are model, poisson, shear_modulus"
+    ),
+    "material: {model: elastic, shear_modulus: 1, poisson: -1}": (
+        "3:55: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got -1"
+    ),
+    "material: {model: zener, modulus_inf: -1}": (
+        "3:39: material.modulus_inf must be a shear modulus [Pa] of zero or more, got -1"
+    ),
+    "material: {model: zener}": (
+        "3:11: material has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
+    ),
+    "material: {model: zener, branches: [{G0: 1, G1: 0, eta1: 0}, {modulus: 0, relaxation_time: 1}]}": (
+        "3:11: material has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
+    ),
+    "material: {model: zener, branches: 5}": "3:36: material.branches must be a list of branches, got 5",
+    "material: {model: zener, branches: [5]}": (
+        "3:37: material.branches.0 must be a mapping of G0, G1, eta1 or modulus, relaxation_time, got 5"
+    ),
+    "material: {model: zener, branches: [{g0: 5}]}": (
+        "3:37: material.branches.0 must have the keys G0, G1, eta1 or modulus, relaxation_time, got g0"
+    ),
+    "material: {model: zener, branches: [{G0: 1, modulus: 5}]}": (
+        "3:37: material.branches.0 mixes the two forms of a branch: give G0, G1, eta1 or modulus, "
+        "relaxation_time, got G0, modulus"
+    ),
+    "material: {model: zener, branches: [{G0: 1, G1: 1, eta1: .nan}]}": (
+        "3:58: material.branches.0.eta1 must be a viscosity [Pa s] of zero or more, or .inf, got nan"
+    ),
+    "material: {model: zener, branches: [{modulus: 1, relaxation_time: 0}]}": (
+        "3:67: material.branches.0.relaxation_time must be a positive time [s], got 0"
+    ),
+}
+
+HISTORIES = {
+    "history:": "4:9: history needs at least one stage, unless there is a steady section",
+    "history: []": "4:10: history needs at least one stage, unless there is a steady section",
+    "history: {pressure: 1}": "4:10: history must be a list of stages, got a mapping",
+    "history: [1]": "4:11: history.0 must be a mapping of keys, got 1",
+    "history: [{presure: 1, force: 1}]": "4:12: history.0.presure is not a known key; did you mean pressure?",
+    "history: [{name: x}]": "4:11: history.0 needs exactly one of pressure | force | approach, got none",
+    "history: [{pressure: 1, force: 1}]": (
+        "4:11: history.0 needs exactly one of pressure | force | approach, got pressure and force"
+    ),
+    "history: [{pressure: -1}]": "4:22: history.0.pressure must be a pressure [Pa] of zero or more, got -1",
+    "history: [{force: -1}]": "4:19: history.0.force must be a force [N] of zero or more, got -1",
+    "history: [{approach: deep}]": "4:22: history.0.approach must be a finite approach [m], got 'deep'",
+    "history: [{pressure: 0}, {force: 0}]": (
+        "4:22: history.0.pressure must not be zero in every stage: nothing would ever touch"
+    ),
+    "history: [{pressure: 1, name: 3}]": "4:31: history.0.name must be text (put numbers in quotes), got 3",
+    "history: [{pressure: {from: 1}, duration: 1, time_step: 1}]": (
+        "4:22: history.0.pressure.to is missing; it must be a pressure [Pa] of zero or more"
+    ),
+    "history: [{pressure: {from: 1, to: -2}, duration: 1, time_step: 1}]": (
+        "4:36: history.0.pressure.to must be a pressure [Pa] of zero or more, got -2"
+    ),
+    "history: [{pressure: {from: 1, to: 2, at: 3}, duration: 1, time_step: 1}]": (
+        "4:39: history.0.pressure.at is not a known key; there are from, to"
+    ),
+    "history: [{pressure: {from: 1, to: 2}}]": (
+        "4:22: history.0.pressure changes from one value to another, which needs a duration [s] or a distance [m]"
+    ),
+    "history: [{pressure: 1, duration: 1}]": (
+        "4:11: history.0 needs exactly one of time_step | cells_per_step, got none"
+    ),
+    "history: [{pressure: 1, velocity: 1, duration: 1, time_step: 1, cells_per_step: 1}]": (
+        "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
+    ),
+    "history: [{pressure: 1, velocity: 1, duration: 1, distance: 1, time_step: 1}]": (
+        "4:11: history.0 takes at most one of duration | distance, got duration and distance"
+    ),
+    "history: [{pressure: 1, time_step: 1}]": (
+        "4:36: history.0.time_step needs a duration [s] or a distance [m]: without them a stage is one solve"
+    ),
+    "history: [{pressure: 1, distance: 1, time_step: 1}]": (
+        "4:35: history.0.distance needs a velocity [m/s] that is not zero"
+    ),
+    "history: [{pressure: 1, duration: 1, cells_per_step: 1}]": (
+        "4:54: history.0.cells_per_step needs a velocity [m/s] that is not zero"
+    ),
+    "history: [{pressure: 1, duration: 0, time_step: 1}]": (
+        "4:35: history.0.duration must be a positive time [s], got 0"
+    ),
+    "history: [{pressure: 1, duration: 1, time_step: fine}]": (
+        "4:49: history.0.time_step must be a positive time step [s], or {first, growth}, got 'fine'"
+    ),
+    "history: [{pressure: 1, duration: 1, time_step: {first: 1, growth: 0.9}}]": (
+        "4:68: history.0.time_step.growth must be a factor [-] of one or more, got 0.9"
+    ),
+    "history: [{pressure: 1, duration: 1, time_step: {first: 1}}]": (
+        "4:49: history.0.time_step.growth is missing; it must be a factor [-] of one or more"
+    ),
+    "history: [{pressure: 1, velocity: [1, b]}]": (
+        "4:39: history.0.velocity.1 must be a velocity [m/s]: a number along x, or [vx, vy], got 'b'"
+    ),
+}
+
+OTHERS = {
+    "initial: {state: steady}": "5:10: initial needs a pressure [Pa] for the steady state to start from",
+    "initial: {velocity: 1}": (
+        "5:10: initial.state must be steady when velocity or pressure is given: a virgin body has felt nothing"
+    ),
+    "initial: {state: stedy, pressure: 1}": (
+        "5:18: initial.state must be virgin | steady, got 'stedy'; did you mean steady?"
+    ),
+    "numerics: {tolerance: 1}": "5:23: numerics.tolerance must be a tolerance [-] above 0 and below 1, got 1",
+    "numerics: {max_iterations: 0}": (
+        "5:28: numerics.max_iterations must be a positive whole number of iterations, got 0"
+    ),
+    "numerics: {integrator: backward_euler}": (
+        "5:24: numerics.integrator must be exponential | backward-euler, got 'backward_euler'; did you mean "
+        "backward-euler?"
+    ),
+    "numerics: {accept_unconverged: 1}": "5:32: numerics.accept_unconverged must be true or false, got 1",
+    "accuracy: -1e-3": "5:11: accuracy must be an error of friction [-], zero or more and below 1, got -0.001",
+    "output: {fields: [gap, presure]}": (
+        "5:24: output.fields.1 must be pressure | displacement | gap, got 'presure'; did you mean pressure?"
+    ),
+    "output: {fields: [gap, gap]}": "5:24: output.fields.1 names gap a second time",
+    "output: {every: 0}": "5:17: output.every must be a positive whole number of steps, got 0",
+    "output: {directory: 3}": "5:21: output.directory must be the path of a directory (text), got 3",
+    "output: {branch_dissipation: true}": "5:30: output.branch_dissipation needs energy: true",
+    "checkpoint: {every: 1, minutes: 1}": (
+        "5:13: checkpoint takes at most one of every | minutes, got every and minutes"
+    ),
+    "checkpoint: {keep: 0}": "5:20: checkpoint.keep must be a positive whole number of checkpoints, got 0",
+    "steady: {velocities: '1:2'}": (
+        "5:22: steady.velocities must be numbers or a range first:last:count like 1e-3:1e2:31, both positive, got '1:2'"
+    ),
+    "steady: {velocities: 0:2:3}": (
+        "5:22: steady.velocities must be numbers or a range first:last:count like 1e-3:1e2:31, both positive, "
+        "got '0:2:3'"
+    ),
+    "steady: {velocities: [1, -2]}": (
+        "5:26: steady.velocities.1 must be positive speeds [m/s]: a list, or first:last:count, got -2"
+    ),
+    "steady: {velocities: []}": "5:22: steady.velocities must have at least one number, got none",
+    "steady: {velocities: 1, direction: [0, 0]}": (
+        "5:36: steady.direction must not be zero in both components, got [0, 0]"
+    ),
+    "titel: x": "5:1: titel is not a known key; did you mean title?",
+    "title: 2024": "5:8: title must be text (put numbers in quotes), got 2024",
+}
+
+
+@pytest.mark.parametrize(("line", "mistake"), (GRID | SURFACES | MATERIALS | HISTORIES | OTHERS).items())
+def test_one_mistake(tmp_path: Path, line: str, mistake: str) -> None:
+    path = tmp_path / "rough.yaml"
+    assert mistakes(path, line) == [f"{path}:{mistake}"]

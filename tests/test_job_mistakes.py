@@ -1,0 +1,180 @@
+"""All mistakes of a job at once, and those that take several keys or sections to see."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from parcontact.job import JobError, load
+
+SMALL = """\
+grid: {points: 64, size: 1e-3}
+surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
+material: {model: elastic, shear_modulus: 1e6}
+history:
+  - {pressure: 1e5}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages call files by their path from the working directory."""
+    monkeypatch.chdir(tmp_path)
+
+
+def job_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> Any:
+    """The job of a text; Any, so that a test may say what it knows: this material has branches."""
+    Path(path).parent.mkdir(exist_ok=True, parents=True)
+    Path(path).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return load(path, overrides)
+
+
+def mistakes_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> list[str]:
+    with pytest.raises(JobError) as caught:
+        job_of(text, *overrides, path=path)
+    assert str(caught.value) == "\n".join(caught.value.mistakes)
+    return caught.value.mistakes
+
+
+def with_material(line: str) -> str:
+    return SMALL.replace("{model: elastic, shear_modulus: 1e6}", line)
+
+
+BAD = """\
+titel: Rubber
+grid:
+  points: [64, 0]
+  size: -1.0
+  boundary: peridic
+surface:
+  - {shape: wave, amplitude: 1e-6, waves: [1, 0.5]}
+  - {shape: sphere, radius: 0, hurst: 1}
+  - {shape: file, path: road.npy}
+material:
+  model: zener
+  poisson: 0.6
+  branches:
+    - {G0: 2.75e6, G1: -1, eta1: .inf}
+    - {modulus: 2.475e6}
+history:
+  - {pressure: 1.0e5, force: 1, duration: 1.0e-3}
+  - {name: 3, velocity: 3.0, distance: 5.0e-4, duration: 1, cells_per_step: 1, time_step: {first: 0, growth: 0.5}}
+  - {pressure: {from: -1, too: 2}, distance: 1, cells_per_step: 1}
+numerics:
+  tolerance: 2
+  tolerance: 1e-3
+output: {fields: [gaps], branch_dissipation: true}
+"""
+
+
+def test_every_mistake_in_order(tmp_path: Path) -> None:
+    assert mistakes_of(BAD, "numerics.kernel=spec", "nonsense", "history.9.name=x") == [
+        "job.yaml:1:1: titel is not a known key; did you mean title?",
+        "job.yaml:3:16: grid.points.1 must be a positive whole number of points, got 0",
+        "job.yaml:4:9: grid.size must be a positive length [m], got -1.0",
+        "job.yaml:5:13: grid.boundary must be periodic | free, got 'peridic'; did you mean periodic?",
+        "job.yaml:7:47: surface.0.waves.1 must be two whole numbers of waves in the box, along x and along y, got 0.5",
+        "job.yaml:8:29: surface.1.radius must be a positive length [m], got 0",
+        "job.yaml:8:32: surface.1.hurst is not a key of shape sphere; there are shape, radius, profile, center",
+        f"job.yaml:9:25: surface.2.path must be an existing file, got 'road.npy' (looked for {tmp_path / 'road.npy'})",
+        "job.yaml:12:12: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got 0.6",
+        "job.yaml:14:24: material.branches.0.G1 must be a shear modulus [Pa] of zero or more, got -1",
+        "job.yaml:15:7: material.branches.1.relaxation_time is missing; it must be a positive time [s]",
+        "job.yaml:17:5: history.0 needs exactly one of pressure | force | approach, got pressure and force",
+        "job.yaml:17:5: history.0 needs exactly one of time_step | cells_per_step, got none",
+        "job.yaml:18:5: history.1 needs exactly one of pressure | force | approach, got none",
+        "job.yaml:18:5: history.1 takes at most one of duration | distance, got duration and distance",
+        "job.yaml:18:5: history.1 takes at most one of time_step | cells_per_step, got time_step and cells_per_step",
+        "job.yaml:18:12: history.1.name must be text (put numbers in quotes), got 3",
+        "job.yaml:18:99: history.1.time_step.first must be a positive time step [s], got 0",
+        "job.yaml:18:110: history.1.time_step.growth must be a factor [-] of one or more, got 0.5",
+        "job.yaml:19:16: history.2.pressure.to is missing; it must be a pressure [Pa] of zero or more",
+        "job.yaml:19:23: history.2.pressure.from must be a pressure [Pa] of zero or more, got -1",
+        "job.yaml:19:27: history.2.pressure.too is not a known key; did you mean to?",
+        "job.yaml:19:46: history.2.distance needs a velocity [m/s] that is not zero",
+        "job.yaml:19:65: history.2.cells_per_step needs a velocity [m/s] that is not zero",
+        "job.yaml:21:14: numerics.tolerance must be a tolerance [-] above 0 and below 1, got 2",
+        "job.yaml:22:3: numerics.tolerance is given twice, first in line 21",
+        "job.yaml:23:19: output.fields.0 must be pressure | displacement | gap, got 'gaps'; did you mean gap?",
+        "job.yaml:23:46: output.branch_dissipation needs energy: true",
+        "--set history.9.name=x: history is a list of 3, numbered from 0; it has no 9",
+        "--set nonsense: must have the form key.path=value, like grid.points=512",
+        "--set numerics.kernel=spec: numerics.kernel must be spectral | love, got 'spec'; did you mean spectral?",
+    ]
+
+
+def test_missing_sections() -> None:
+    assert mistakes_of("title: nothing else\n") == [
+        "job.yaml:1:1: grid is missing; it must be a mapping with points and size",
+        "job.yaml:1:1: surface is missing; it must be one shape, or a list of shapes",
+        "job.yaml:1:1: material is missing; it must be a mapping with model: elastic | zener",
+        "job.yaml:1:1: history needs at least one stage, unless there is a steady section",
+    ]
+
+
+ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 1e-4, rms_slope: 0.1}"
+
+
+@pytest.mark.parametrize("group", [("rms_slope",), ("rms_height",), ("psd_constant",)])
+def test_each_scale_of_roughness(group: tuple[str]) -> None:
+    text = SMALL.replace("{shape: wave, amplitude: 1e-6, waves: [1, 0]}", ROUGH.replace("rms_slope", group[0]))
+    assert getattr(job_of(text).surface[0], group[0]) == 0.1
+
+
+def test_roughness() -> None:
+    text = SMALL.replace("{shape: wave, amplitude: 1e-6, waves: [1, 0]}", ROUGH)
+    wave = "surface.short_wavelength"
+    none_of = "surface needs exactly one of rms_slope | rms_height | psd_constant, got"
+    for override, sentence in {
+        "surface.rms_slope=": f"job.yaml:2:10: {none_of} none",
+        "surface.rms_height=1": f"job.yaml:2:10: {none_of} rms_slope and rms_height",
+        f"{wave}=3e-4": f"{wave} must not be longer than rolloff_wavelength = 0.0002 m, got 0.0003",
+        f"{wave}=3.1e-5": f"{wave} must be at least two cells, 3.125e-05 m (Nyquist), got 3.1e-05",
+        "surface.rolloff_wavelength=3e-4": "surface.rolloff_wavelength must not be longer than long_wavelength "
+        "= 0.0002 m, got 0.0003",
+        "surface.long_wavelength=-1": "surface.long_wavelength must be a positive wavelength [m], got -1",
+        "surface.hurst=1.5": "surface.hurst must be a Hurst exponent above 0 and up to 1, got 1.5",
+        "surface.seed=-1": "surface.seed must be a whole number of zero or more, got -1",
+        "surface.seed=true": "surface.seed must be a whole number of zero or more, got true",
+        "surface.psd_constant=0": "surface.psd_constant must be a positive spectral constant [m^4], got 0",
+        "surface.amplitudes=fix": "surface.amplitudes must be random | fixed, got 'fix'; did you mean fixed?",
+        "grid.size=1e-5": "surface.short_wavelength must fit into the box of 1e-05 m, got 0.0001",
+    }.items():
+        found = mistakes_of(text, override)
+        expected = sentence if sentence.startswith("job") else f"--set {override}: {sentence}"
+        assert expected.replace("--set grid.size=1e-5", "job.yaml:2:78") in found
+    assert job_of(text, "surface.short_wavelength=3.125e-5").surface[0].short_wavelength == 3.125e-5
+
+
+def test_nyquist_ignores_a_direction_with_one_point() -> None:
+    text = SMALL.replace("{shape: wave, amplitude: 1e-6, waves: [1, 0]}", ROUGH)
+    assert job_of(text, "grid.points=[64, 1]").grid.ny == 1
+
+
+def test_checks_between_sections_run_beside_other_mistakes() -> None:
+    text = SMALL.replace("surface: {", "surface:\n  - {shape: ball}\n  - {").replace("waves: [1, 0]", "waves: [99, 0]")
+    assert mistakes_of(text, "numerics.kernel=spectral", "grid.boundary=free", "accuracy=2") == [
+        "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | flat, got 'ball'",
+        "job.yaml:4:44: surface.1.waves.0 must be within -32 and 32 waves for 64 points (Nyquist), got 99",
+        "--set accuracy=2: accuracy must be an error of friction [-], zero or more and below 1, got 2",
+        (
+            "--set numerics.kernel=spectral: numerics.kernel must be love when grid.boundary is free: "
+            "the spectral kernel is periodic"
+        ),
+    ]
+
+
+def test_steady_needs_pressures_and_a_solid_at_rest() -> None:
+    assert mistakes_of(SMALL.replace("pressure: 1e5", "force: 1"), "steady.velocities=1") == [
+        (
+            "--set steady.velocities=1: steady.pressures is missing; "
+            "it must be positive pressures [Pa] when no stage of the history has one"
+        )
+    ]
+    fluid = with_material("{model: zener, branches: [{modulus: 1, relaxation_time: 1}]}")
+    assert mistakes_of(fluid + "initial: {state: steady, pressure: 1}\n") == [
+        (
+            "job.yaml:6:10: initial.velocity must not be zero: the material has no long-term modulus, "
+            "and a fluid at rest no steady contact"
+        )
+    ]

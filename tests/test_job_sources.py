@@ -1,0 +1,248 @@
+"""Where a job's text comes from: YAML and its mistakes, overrides, included materials."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from parcontact.job import JobError, load
+
+SMALL = """\
+grid: {points: 64, size: 1e-3}
+surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
+material: {model: elastic, shear_modulus: 1e6}
+history:
+  - {pressure: 1e5}
+"""
+
+COMPOUND = """\
+model: zener
+modulus_inf: 1e6
+branches:
+  - {modulus: 3e6, relaxation_time: 1e-3}
+  - {modulus: 2e6, relaxation_time: 1e-2}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages call files by their path from the working directory."""
+    monkeypatch.chdir(tmp_path)
+
+
+def job_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> Any:
+    """The job of a text; Any, so that a test may say what it knows: this material has branches."""
+    Path(path).parent.mkdir(exist_ok=True, parents=True)
+    Path(path).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return load(path, overrides)
+
+
+def mistakes_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> list[str]:
+    with pytest.raises(JobError) as caught:
+        job_of(text, *overrides, path=path)
+    assert str(caught.value) == "\n".join(caught.value.mistakes)
+    return caught.value.mistakes
+
+
+def with_material(line: str) -> str:
+    return SMALL.replace("{model: elastic, shear_modulus: 1e6}", line)
+
+
+# --- YAML
+
+
+@pytest.mark.parametrize(
+    ("text", "mistake"),
+    [
+        ("", "job.yaml:1:1: the job must be a mapping of keys, got nothing"),
+        ("- 1\n", "job.yaml:1:1: the job must be a mapping of keys, got [1]"),
+        ("a: 1\nb: [1,\n  2\n", ("job.yaml:4:1: cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
+         "(while parsing a flow sequence in line 2)")),
+        ("a: b: c\n", "job.yaml:1:5: cannot be read as YAML: mapping values are not allowed here"),
+        ("a: 1\n\tb: 2\n", "job.yaml:2:1: cannot be read as YAML: found character '\\t' that cannot start any token"),
+        ("a: *b\n", "job.yaml:1:4: cannot be read as YAML: found undefined alias 'b'"),
+        ("a: 1\n---\nb: 1\n", ("job.yaml:2:1: cannot be read as YAML: but found another document "
+         "(expected a single document in the stream in line 1)")),
+        (b"title: caf\xe9\n", "job.yaml:1:1: is not a text file in UTF-8: invalid continuation byte at position 10"),
+    ],
+)  # fmt: skip
+def test_text_that_cannot_be_read(text: str | bytes, mistake: str) -> None:
+    assert mistakes_of(text) == [mistake]
+
+
+@pytest.mark.parametrize(
+    ("line", "mistake"),
+    [
+        ("title: x\ntitle: y", "7:1: title is given twice, first in line 6"),
+        ("title: &x [*x]", "6:8: this alias holds itself"),
+        ("title: !!timestamp 2001-01-01", "6:8: !!timestamp does not belong in a job"),
+        ("title: !!python/object:os.system {}", "6:8: !!python/object:os.system does not belong in a job"),
+        ("1: x", "6:1: a key must be a word, got '1'"),
+        ("? [a]\n: x", "6:3: a key must be a word, got a list or a mapping"),
+        ("<<: 3", "6:5: << takes a mapping, or a list of mappings"),
+    ],
+)
+def test_what_yaml_allows_and_a_job_does_not(line: str, mistake: str) -> None:
+    assert mistakes_of(f"{SMALL}{line}\n") == [f"job.yaml:{mistake}"]
+
+
+def test_duplicates_deep_inside() -> None:
+    assert mistakes_of(SMALL.replace("pressure: 1e5", "pressure: 1e5, pressure: 1e4")) == [
+        "job.yaml:5:21: history.0.pressure is given twice, first in line 5"
+    ]
+
+
+def test_a_missing_file_and_a_directory(tmp_path: Path) -> None:
+    with pytest.raises(JobError, match=r"^nowhere\.yaml: cannot be read: there is no such file$"):
+        load("nowhere.yaml")
+    with pytest.raises(JobError, match="cannot be read: Is a directory"):
+        load(tmp_path)
+
+
+# --- overrides
+
+
+def test_overrides_of_every_kind() -> None:
+    text = SMALL.replace("- {", "- {velocity: 1, distance: 2, time_step: 1, ")
+    job = job_of(
+        text, "grid.points=[512, 256]", "history.0.pressure={from: 1, to: 2e5}", "accuracy=0", "title=a = b",
+        "steady.velocities=1e-1:1e1:3", "history.0.distance=null", "history.0.duration=3", "grid.boundary=free",
+    )  # fmt: skip
+    assert (job.grid.points, job.grid.boundary, job.numerics.kernel) == ((512, 256), "free", "love")
+    assert (job.history[0].load.start, job.history[0].load.end) == (1.0, 2e5)
+    assert (job.history[0].distance, job.history[0].seconds) == (None, 3.0)
+    assert (job.accuracy, job.title) == (0.0, "a = b")
+    assert job.steady.velocities == pytest.approx((0.1, 1.0, 10.0), rel=1e-15)
+
+
+def test_later_overrides_win() -> None:
+    assert job_of(SMALL, "grid={points: 32, size: 2}", "grid.points=16", "grid.points=8").grid.nx == 8
+
+
+def test_overrides_reach_a_lone_surface_by_number_and_without() -> None:
+    assert job_of(SMALL, "surface.0.amplitude=2e-6").surface[0].amplitude == 2e-6
+    assert job_of(SMALL, "surface.amplitude=2e-6").surface[0].amplitude == 2e-6
+    assert job_of(SMALL, "surface.0={shape: flat}").surface[0].shape == "flat"
+
+
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        ("grid.points=-512", "grid.points must be a positive whole number of points, got -512"),
+        ("grid.pionts=512", "grid.pionts is not a known key; did you mean points?"),
+        ("gird.points=512", "gird is not a known key; did you mean grid?"),
+        ("grid={points: 4, size: 1, points: 5}", "points is given twice, first in line 1"),
+        ("grid.points", "must have the form key.path=value, like grid.points=512"),
+        ("=512", "must have the form key.path=value, like grid.points=512"),
+        ("grid..points=512", "must have the form key.path=value, like grid.points=512"),
+        ("grid.points=[1", ("cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
+         "(while parsing a flow sequence in line 1)")),
+        ("grid.points.0=1", "grid.points is 64, which has no key 0"),
+        ("history.1.pressure=1", "history is a list of 1, numbered from 0; it has no 1"),
+        ("history.last.pressure=1", "history is a list of 1, numbered from 0; it has no last"),
+        ("history.0.pressure.to=-1", "history.0.pressure is 100000.0, which has no key to"),
+        ("history.0.pressure=-1", "history.0.pressure must be a pressure [Pa] of zero or more, got -1"),
+        ("history.0.velocity=[1, x]", ("history.0.velocity.1 must be a velocity [m/s]: a number along x, or [vx, vy], "
+         "got 'x'")),
+        ("numerics.tolerance=0", "numerics.tolerance must be a tolerance [-] above 0 and below 1, got 0"),
+        ("material.model=zenner", "material.model must be elastic | zener, got 'zenner'; did you mean zener?"),
+    ],
+)  # fmt: skip
+def test_mistakes_in_overrides(override: str, sentence: str) -> None:
+    assert mistakes_of(SMALL, override) == [f"--set {override}: {sentence}"]
+
+
+def test_overrides_of_a_file_that_cannot_be_read() -> None:
+    assert mistakes_of("a: [", "a.b=1", "c") == [
+        (
+            "job.yaml:1:5: cannot be read as YAML: expected the node content, but found '<stream end>' "
+            "(while parsing a flow node in line 1)"
+        ),
+        "--set c: must have the form key.path=value, like grid.points=512",
+    ]
+
+
+# --- included materials
+
+
+def write(path: str, text: str) -> None:
+    Path(path).parent.mkdir(exist_ok=True, parents=True)
+    Path(path).write_text(text, encoding="utf-8")
+
+
+def test_include_by_name_from_a_folder_above() -> None:
+    write("materials/rubber.yaml", COMPOUND)
+    job = job_of(with_material("{include: rubber, poisson: 0.4}"), path="paper/figures/fig.yaml")
+    assert (job.material.model, job.material.poisson, job.material.modulus_inf) == ("zener", 0.4, 1e6)
+    assert [branch.modulus for branch in job.material.branches] == [3e6, 2e6]
+    assert "include" not in job.resolved()
+
+
+def test_the_nearest_material_wins() -> None:
+    write("materials/m.yaml", "{model: elastic, shear_modulus: 1}")
+    write("near/materials/m.yaml", "{model: elastic, shear_modulus: 2}")
+    assert job_of(with_material("{include: m}"), path="near/job.yaml").material.shear_modulus == 2.0
+
+
+def test_include_by_path_and_a_file_that_says_material() -> None:
+    write("jobs/mine.yaml", "material:\n  model: elastic\n  shear_modulus: 3\n")
+    assert job_of(with_material("{include: mine.yaml}"), path="jobs/job.yaml").material.shear_modulus == 3.0
+
+
+def test_overrides_reach_into_an_included_material() -> None:
+    write("mine.yaml", COMPOUND)
+    text = with_material("{include: elsewhere.yaml}")
+    job = job_of(text, "material.branches.1.modulus=9", "material.include=mine.yaml", "material.poisson=0.3")
+    assert [branch.modulus for branch in job.material.branches] == [3e6, 9.0]
+    assert job.material.poisson == 0.3
+
+
+def test_mistakes_in_an_included_material_are_found_there() -> None:
+    write("materials/bad.yaml", COMPOUND.replace("3e6", "-3.0").replace("modulus_inf", "modulus_iff") + "poisson: 1\n")
+    assert mistakes_of(with_material("{include: bad, poisson: 2}"), "material.branches.1.relaxation_time=0") == [
+        "job.yaml:3:35: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got 2",
+        (
+            "--set material.branches.1.relaxation_time=0: "
+            "material.branches.1.relaxation_time must be a positive time [s], got 0"
+        ),
+        "materials/bad.yaml:2:1: material.modulus_iff is not a key of model zener; did you mean modulus_inf?",
+        ("materials/bad.yaml:4:15: material.branches.0.modulus must be a shear modulus [Pa] of zero or more, got -3.0"),
+    ]
+
+
+def test_a_mistake_in_an_included_file_that_says_material_is_found_there() -> None:
+    write("m.yaml", "material:\n  model: elastic\n  shear_modulus: 0\n  poisson: 0\n  poisson: 0.5\n")
+    assert mistakes_of(with_material("{include: m.yaml}")) == [
+        "m.yaml:3:18: material.shear_modulus must be a positive shear modulus [Pa], got 0",
+        "m.yaml:5:3: material.poisson is given twice, first in line 4",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "mistake"),
+    [
+        ("[1, 2", ("m.yaml:1:6: cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
+         "(while parsing a flow sequence in line 1)")),
+        ("[1, 2]", "m.yaml:1:1: must be one mapping with the keys of a material"),
+        ("", "m.yaml:1:1: must be one mapping with the keys of a material"),
+        ("{include: n, model: elastic, shear_modulus: 1}", ("m.yaml:1:2: material.include is not a key of model "
+         "elastic; there are model, poisson, shear_modulus")),
+        ("{shear_modulus: 1}", "m.yaml:1:1: material.model is missing; it must be elastic | zener"),
+    ],
+)  # fmt: skip
+def test_included_files_that_are_no_material(content: str, mistake: str) -> None:
+    write("m.yaml", content)
+    assert mistakes_of(with_material("{include: m.yaml}")) == [mistake]
+
+
+def test_an_include_that_is_not_there() -> None:
+    must = "material.include must name a material file"
+    assert mistakes_of(with_material("{include: rubbr}")) == [
+        f"job.yaml:3:21: {must}, got 'rubbr' (looked for materials/rubbr.yaml from the job file upwards)"
+    ]
+    assert mistakes_of(with_material("{include: no/m.yaml, poisson: 9}")) == [
+        f"job.yaml:3:21: {must}, got 'no/m.yaml' (looked from the job file)"
+    ]
+    assert mistakes_of(SMALL, "material.include=3") == [
+        f"--set material.include=3: {must}, got 3 (looked for materials/3.yaml from the job file upwards)"
+    ]
