@@ -87,6 +87,11 @@ def relaxation_of(job: Job) -> Prony:
     )
 
 
+def remarks(built: Scene) -> list[str]:
+    """What a user should know about the surface before trusting a result."""
+    return []
+
+
 # -- parts ------------------------------------------------------------------------------------------------------------
 
 

@@ -2,8 +2,8 @@
 
 import logging
 import sys
-import time
 from pathlib import Path
+from typing import TextIO
 
 from tqdm import tqdm
 
@@ -33,13 +33,16 @@ class Console:
         self._quiet, self._total = quiet, total
         self._bar: tqdm[None] | None = None
         self._headed = False
-        self._began = time.perf_counter()
 
     def say(self, text: str) -> None:
         """A message for the user and the log."""
         self._log.info(text)
         if not self._quiet:
             self._write(text)
+
+    def log(self, text: str) -> None:
+        """For run.log only."""
+        self._log.info(text)
 
     def warn(self, text: str) -> None:
         """A message that is shown even to those who asked for quiet."""
@@ -67,17 +70,19 @@ class Console:
         for handler in self._log.handlers:
             handler.close()
 
-    def _write(self, text: str, file: object = None) -> None:
+    def _write(self, text: str, file: TextIO | None = None) -> None:
         if self._bar is not None:
-            self._bar.write(text)
+            self._bar.write(text, file=file)
         else:
-            print(text, file=file or sys.stdout, flush=True)  # type: ignore[call-overload]
+            print(text, file=file, flush=True)
 
 
 class Silence:
     """The console of every other rank."""
 
     def say(self, text: str) -> None: ...
+
+    def log(self, text: str) -> None: ...
 
     def warn(self, text: str) -> None: ...
 
