@@ -6,6 +6,7 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -15,7 +16,7 @@ from .errors import InputError, RunError
 from .parallel.slab import Slab
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-VERBS = ("run", "check")
+VERBS = ("run", "check", "plot")
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # say how many were started
 STAGGER = 0.5  # seconds for which other ranks let root report an error that all of them have
 
@@ -76,6 +77,10 @@ def _parser() -> argparse.ArgumentParser:
     check = verbs.add_parser("check", help="list all mistakes of a job, or what it says with every default")
     _job_arguments(check)
     check.set_defaults(act=_check)
+
+    plot = verbs.add_parser("plot", help="draw a picture of a run")
+    plot.add_argument("directory", type=Path, help="output directory of a run")
+    plot.set_defaults(act=_plot)
     return parser
 
 
@@ -111,6 +116,14 @@ def _check(options: argparse.Namespace, world: MPI.Intracomm) -> int:
         print(job.describe(loaded))
         for warning in loaded.warnings:
             print(f"warning: {warning}")
+    return DONE
+
+
+def _plot(options: argparse.Namespace, world: MPI.Intracomm) -> int:
+    from .record import plots  # matplotlib is for pictures only
+
+    if world.rank == 0:
+        print(f"picture: {plots.plot(options.directory)}")
     return DONE
 
 

@@ -4,7 +4,7 @@ Sums may be reordered to use vector units; NaN and infinity keep their meaning, 
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -13,5 +13,5 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def loop(function: Function) -> Function:
     """Compile a loop over this rank's rows; kept on disk, so that only a first run waits."""
-    compiled: Function = numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")(function)
-    return compiled
+    compile_ = numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+    return cast(Function, compile_(function))

@@ -10,7 +10,7 @@ import numpy as np
 from . import job as jobs
 from .clock import Step, steps
 from .job import Job
-from .parallel.fft import FFT
+from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
 from .physics import halfspace, heightfile
 from .physics.energy import ElasticEnergy, ZenerEnergy
@@ -78,13 +78,12 @@ def relaxation_of(job: Job) -> Prony:
     material = job.material
     if isinstance(material, jobs.Elastic):
         return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
-    zener = [(b.G0, b.G1, b.eta1) for b in material.branches if isinstance(b, jobs.ZenerBranch)]
-    plain = [(b.modulus, b.relaxation_time) for b in material.branches if isinstance(b, jobs.PronyBranch)]
-    springs = zener_to_prony(*zip(*zener, strict=True), material.modulus_inf) if zener else None
-    modulus_inf, moduli, times = springs or (material.modulus_inf, (), ())
-    return normal_form(
-        modulus_inf, [*moduli, *(modulus for modulus, _ in plain)], [*times, *(time for _, time in plain)]
-    )
+    zener = [b for b in material.branches if isinstance(b, jobs.ZenerBranch)]
+    plain = [b for b in material.branches if isinstance(b, jobs.PronyBranch)]
+    series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
+    prony = zener_to_prony(series, kelvin, viscosity, material.modulus_inf)
+    moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
+    return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], [*prony.relaxation_times, *times])
 
 
 def remarks(built: Scene) -> list[str]:
@@ -97,7 +96,7 @@ def remarks(built: Scene) -> list[str]:
 
 def _surface(job: Job, fft: FFT) -> Surface:
     grid, slab = job.grid, fft.slab
-    waves: Array | None = None
+    waves: Spectrum | None = None
     shapes: list[Shape] = []
     for part in job.surface:
         if isinstance(part, jobs.Sphere | jobs.Cylinder):
@@ -116,7 +115,7 @@ def _surface(job: Job, fft: FFT) -> Surface:
     )
 
 
-def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple[float, float]) -> Array:
+def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple[float, float]) -> Spectrum:
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.HeightFile):

@@ -11,7 +11,8 @@ from ..parallel.slab import Array
 class Shape(Protocol):
     """Heights and slopes at distances (x, y) from the shape's centre; any unit, the same for all lengths."""
 
-    centre: tuple[float, float]
+    @property
+    def centre(self) -> tuple[float, float]: ...
 
     def height(self, x: Array, y: Array) -> Array: ...
 
