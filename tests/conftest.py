@@ -3,7 +3,6 @@
 import io
 import math
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -62,14 +61,12 @@ def run_parcontact(tmp_path: Path) -> RunParcontact:
         # MPI has left marks in the environment of this process that would confuse the next mpirun.
         clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
         pipe = subprocess.PIPE
-        process = subprocess.Popen(
-            command, cwd=cwd or tmp_path, env=clean, stdout=pipe, stderr=pipe, text=True, start_new_session=True
-        )
+        process = subprocess.Popen(command, cwd=cwd or tmp_path, env=clean, stdout=pipe, stderr=pipe, text=True)
         try:
             out, err = process.communicate(timeout=timeout)
         except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)  # mpirun and all its ranks
-            out, err = process.communicate()
+            process.terminate()  # mpirun ends its ranks; were it killed, they would go on
+            out, err = process.communicate(timeout=30.0)
             pytest.fail(f"{' '.join(command)} took more than {timeout:g} s\n{out}\n{err}")
         return subprocess.CompletedProcess(command, process.returncode, out, err)
 

@@ -19,6 +19,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"record"},
     {"scene"},
     {"march"},
+    {"runner"},
     {"study"},
     {"__main__"},
 ]
