@@ -5,7 +5,9 @@ local there, so the second pass needs no further message. With lengths larger th
 of the map are transformed along x, and only they are sent.
 
 The pass along x works through blocks of rows that stay in cache: what belongs to another rank is copied out of a block
-while it is hot, what stays goes straight to its place in the spectrum.
+while it is hot, what stays goes straight to its place in the spectrum. Maps that FFTW cannot take as they are (padded
+along x, of another precision, not aligned) pass through a block too. Besides its blocks a transform holds one map, and
+on several ranks what it sends, which is less than another one.
 """
 
 import numpy as np
@@ -16,14 +18,28 @@ from numpy.typing import DTypeLike, NDArray
 from .slab import Array, Slab, allocate, deal
 
 Spectrum = NDArray[np.complexfloating]
-BLOCK_BYTES = 1 << 19  # of one block of transformed rows: fits a usual second-level cache
+BLOCK_BYTES = 1 << 19  # of one block of transformed rows at most: fits a usual second-level cache
+SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
+
+
+def export_wisdom() -> bytes:
+    """Which plans FFTW found the fastest in this process; another one may choose others, whose last bits differ."""
+    return SEPARATOR.join(pyfftw.export_wisdom())
+
+
+def import_wisdom(wisdom: bytes) -> bool:
+    """From now on make the plans of the process that exported this; False if that cannot be (another FFTW)."""
+    pyfftw.forget_wisdom()
+    precisions = tuple(wisdom.split(SEPARATOR))
+    return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))
 
 
 class FFT:
     """Plans and buffers of one transform size, made once.
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)` (default: equal to
-    it); `dtype` float64 or float32. Making and calling one are collective.
+    it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either. Making and calling one are
+    collective.
     """
 
     def __init__(self, slab: Slab, lengths: tuple[int, int] | None = None, dtype: DTypeLike = np.float64) -> None:
@@ -33,11 +49,13 @@ class FFT:
             raise ValueError(f"transform lengths {self.mx, self.my} are shorter than the map {slab.nx, slab.ny}")
         self.dtype = np.dtype(dtype)
         self.complex = np.dtype(np.complex128 if self.dtype == np.float64 else np.complex64)
-        self._dealt = deal(self.mx // 2 + 1, slab.comm.size)
-        self.columns = self._dealt[slab.comm.rank]
+        dealt = deal(self.mx // 2 + 1, slab.comm.size)
+        self.columns = dealt[slab.comm.rank]
         self.shape = (self.my, self.columns.stop - self.columns.start)
+        self.spectrum: Spectrum = allocate(self.shape, self.complex, slab.tally)
+        self._transpose = Transpose(slab, dealt, self.spectrum) if slab.comm.size > 1 else None
         self._name = f"fft {self.mx}x{self.my} {self.dtype.name}"
-        self._make_buffers()
+        self._make_blocks()
         self._make_plans()
 
     @property
@@ -54,7 +72,7 @@ class FFT:
         return np.where((along_x == 0) | (2 * along_x == self.mx), 1.0, 2.0)
 
     def forward(self, field: Array) -> Spectrum:
-        """Spectrum `sum h exp(-i q x)` of a map; collective. It is this object's buffer: use it before the next call."""
+        """Spectrum `sum h exp(-i q x)` of a map; collective. It is this object's buffer: valid until the next call."""
         self._along_x(field)
         if self.spectrum.size:
             self._y_forward.execute()
@@ -63,123 +81,144 @@ class FFT:
     def backward(self, spectrum: Spectrum, out: Array) -> Array:
         """Map of a spectrum, so that `backward(forward(h), out)` equals h; collective."""
         if spectrum is not self.spectrum:
-            self.spectrum[:] = spectrum
-        if self.spectrum.size:
-            self._y_backward.execute()
-        self._back_along_x(out, 1.0 / (self.mx * self.my))
-        return out
+            self.spectrum[...] = spectrum
+        return self._to_map(out, 1.0 / (self.mx * self.my))
 
     def convolve(self, field: Array, symbol: NDArray[np.inexact], out: Array) -> Array:
         """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective."""
         spectrum = self.forward(field)
         np.multiply(spectrum, symbol, out=spectrum)
+        return self._to_map(out, 1.0)
+
+    def _to_map(self, out: Array, scale: float) -> Array:
         if self.spectrum.size:
             self._y_backward.execute()
-        self._back_along_x(out, 1.0)
+        self._back_along_x(out, scale)
         return out
 
-    # -- the pass along x and the transpose ---------------------------------------------------------------------------
+    # -- the pass along x ---------------------------------------------------------------------------------------------
 
     def _along_x(self, field: Array) -> None:
         self._count()
         for rows in self._blocks:
-            height = rows.stop - rows.start
-            plan = self._x_forward[height]
-            block = self._block(rows)
-            source = field[rows]
-            if source.shape[1] != self.mx or not pyfftw.is_byte_aligned(source, plan.input_alignment):
-                source = self._row_block[:height]
+            source, waves = field[rows], self._waves(rows)
+            plan = self._x_forward[len(waves)]
+            if not self._direct(source, plan.input_alignment):
+                source = self._row_block[: len(waves)]
                 source[:, : self.slab.nx] = field[rows]
-            plan.update_arrays(source, block)
+                source[:, self.slab.nx :] = 0.0
+            plan.update_arrays(source, waves)
             plan.execute()
-            self._post(rows, block)
-        if self.slab.comm.size > 1:
-            self.slab.comm.Alltoallv(self._rows_message, self._columns_message)
+            if self._transpose:
+                self._transpose.post(rows, waves)
+        if self._transpose:
+            self._transpose.to_columns()
         self.spectrum[self.slab.ny :] = 0.0
 
     def _back_along_x(self, out: Array, scale: float) -> None:
         self._count()
-        if self.slab.comm.size > 1:
-            self.slab.comm.Alltoallv(self._columns_message, self._rows_message)
+        if self._transpose:
+            self._transpose.to_rows()
         for rows in self._blocks:
-            height = rows.stop - rows.start
-            plan = self._x_backward[height]
-            block = self._collect(rows)
+            target, waves = out[rows], self._waves(rows)
+            plan = self._x_backward[len(waves)]
+            if self._transpose:
+                self._transpose.collect(rows, waves)
             if scale != 1.0:
-                block *= self.dtype.type(scale)
-            target = out[rows]
-            direct = target.shape[1] == self.mx and pyfftw.is_byte_aligned(target, plan.output_alignment)
-            real = target if direct else self._row_back_block[:height]
-            plan.update_arrays(block, real)
+                np.multiply(waves, scale, out=waves)
+            direct = self._direct(target, plan.output_alignment)
+            result = target if direct else self._row_block[: len(waves)]
+            plan.update_arrays(waves, result)
             plan.execute()
             if not direct:
-                target[...] = real[:, : self.slab.nx]
+                target[...] = result[:, : self.slab.nx]
 
-    def _block(self, rows: slice) -> Spectrum:
-        """Where the transform along x of these rows is put: on one rank at once in its place."""
-        return self.spectrum[rows] if self.slab.comm.size == 1 else self._wave_block[: rows.stop - rows.start]
+    def _waves(self, rows: slice) -> Spectrum:
+        """Where the transform along x of these rows is: on one rank at once in its place."""
+        return self._wave_block[: rows.stop - rows.start] if self._transpose else self.spectrum[rows]
 
-    def _post(self, rows: slice, block: Spectrum) -> None:
-        """Copy a block of transformed rows to this rank's part of the spectrum and to the parcels for the others."""
-        if self.slab.comm.size > 1:
-            for parcel, columns in zip(self._parcels, self._dealt, strict=True):
-                parcel[rows] = block[:, columns]
-
-    def _collect(self, rows: slice) -> Spectrum:
-        """The reverse of `_post`."""
-        block = self._block(rows)
-        if self.slab.comm.size > 1:
-            for parcel, columns in zip(self._parcels, self._dealt, strict=True):
-                block[:, columns] = parcel[rows]
-        return block
+    def _direct(self, rows: Array, alignment: int) -> bool:
+        """Whether a plan can take these rows of a map as they are."""
+        fits = rows.shape[1] == self.mx and rows.dtype == self.dtype and rows.flags.c_contiguous
+        return fits and pyfftw.is_byte_aligned(rows, alignment)
 
     def _count(self) -> None:
         tally = self.slab.tally
         tally["fft"] += 1
         tally[self._name] += 1
-        tally["bytes sent"] += self._sent
+        if self._transpose:
+            tally["bytes sent"] += self._transpose.sent
 
-    # -- buffers and plans --------------------------------------------------------------------------------------------
+    # -- blocks and plans ---------------------------------------------------------------------------------------------
 
-    def _make_buffers(self) -> None:
-        comm, tally = self.slab.comm, self.slab.tally
-        ny_loc, waves, mine = self.slab.shape[0], self.mx // 2 + 1, self.shape[1]
-        self.spectrum = allocate(self.shape, self.complex, tally)
-        height = min(ny_loc, max(8, BLOCK_BYTES // (waves * self.complex.itemsize) // 8 * 8))
+    def _make_blocks(self) -> None:
+        ny_loc, waves, tally = self.slab.shape[0], self.mx // 2 + 1, self.slab.tally
+        height = self._block_bytes() // (waves * self.complex.itemsize)
+        height = min(ny_loc, max(8, height // 8 * 8))  # by eights each block is aligned, whatever the length of a row
         self._blocks = [slice(start, min(start + height, ny_loc)) for start in range(0, ny_loc, max(height, 1))]
-        self._row_block = pyfftw.zeros_aligned((height, self.mx), self.dtype, n=64)
-        self._row_back_block = pyfftw.zeros_aligned((height, self.mx), self.dtype, n=64)
-        self._wave_block = pyfftw.zeros_aligned((height, waves), self.complex, n=64)
-        widths = [0 if rank == comm.rank else part.stop - part.start for rank, part in enumerate(self._dealt)]
-        row_counts = [ny_loc * width for width in widths]
-        row_starts = [sum(row_counts[:rank]) for rank in range(comm.size)]
-        wire = allocate((sum(row_counts),), self.complex, tally)
-        self._parcels = [
-            wire[start : start + count].reshape(ny_loc, width) if rank != comm.rank else self.spectrum[self.slab.rows]
-            for rank, (start, count, width) in enumerate(zip(row_starts, row_counts, widths, strict=True))
-        ]
-        heights = [0 if rank == comm.rank else part.stop - part.start for rank, part in enumerate(self.slab.dealt)]
-        column_counts = [height * mine for height in heights]
-        column_starts = [part.start * mine for part in self.slab.dealt]
-        kind = MPI.C_DOUBLE_COMPLEX if self.dtype == np.float64 else MPI.C_FLOAT_COMPLEX
-        self._rows_message = [wire, (row_counts, row_starts), kind]
-        self._columns_message = [self.spectrum, (column_counts, column_starts), kind]
-        self._sent = sum(row_counts) * self.complex.itemsize
+        self._row_block = allocate((height, self.mx), self.dtype, tally)
+        self._wave_block = allocate((height if self._transpose else 0, waves), self.complex, tally)
+
+    def _block_bytes(self) -> int:
+        """On several ranks the blocks are more memory than one rank needs: an eighth of a map, unless that is tiny."""
+        eighth = self.spectrum.nbytes // 8 if self._transpose else BLOCK_BYTES
+        return min(max(eighth, BLOCK_BYTES // 8), BLOCK_BYTES)
 
     def _make_plans(self) -> None:
         heights = {rows.stop - rows.start for rows in self._blocks}
-        blocks = {height: self._block(slice(0, height)) for height in heights}
-        self._x_forward = {
-            height: self._plan(self._row_block[:height], block, axis=1) for height, block in blocks.items()
-        }
-        self._x_backward = {
-            height: self._plan(block, self._row_back_block[:height], axis=1) for height, block in blocks.items()
-        }
+        waves = {height: self._waves(slice(0, height)) for height in heights}
+        self._x_forward = {height: _plan(self._row_block[:height], waves[height], axis=1) for height in heights}
+        self._x_backward = {height: _plan(waves[height], self._row_block[:height], axis=1) for height in heights}
         if self.spectrum.size:
-            self._y_forward = self._plan(self.spectrum, self.spectrum, axis=0)
-            self._y_backward = self._plan(self.spectrum, self.spectrum, axis=0, backward=True)
+            self._y_forward = _plan(self.spectrum, self.spectrum, axis=0)
+            self._y_backward = _plan(self.spectrum, self.spectrum, axis=0, backward=True)
 
-    def _plan(self, source: NDArray, target: NDArray, axis: int, backward: bool = False) -> pyfftw.FFTW:
-        backward = backward or target.dtype == self.dtype
-        flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT") if backward else ("FFTW_MEASURE",)
-        return pyfftw.FFTW(source, target, (axis,), "FFTW_BACKWARD" if backward else "FFTW_FORWARD", flags)
+
+def _plan(source: NDArray[np.inexact], target: NDArray[np.inexact], axis: int, backward: bool = False) -> pyfftw.FFTW:
+    backward = backward or np.isrealobj(target)
+    flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT") if backward else ("FFTW_MEASURE",)
+    return pyfftw.FFTW(source, target, (axis,), "FFTW_BACKWARD" if backward else "FFTW_FORWARD", flags)
+
+
+class Transpose:
+    """Between blocks of rows with all x-wavenumbers and the `spectrum` with all rows of this rank's x-wavenumbers.
+
+    Each rank has a parcel for every other one; what it keeps itself never passes through the wire.
+    """
+
+    def __init__(self, slab: Slab, dealt: list[slice], spectrum: Spectrum) -> None:
+        comm, own = slab.comm, slab.comm.rank
+        self._comm, self._dealt = comm, dealt
+        ny_loc, mine = slab.shape[0], spectrum.shape[1]
+        counts = [0 if rank == own else ny_loc * (part.stop - part.start) for rank, part in enumerate(dealt)]
+        starts = [sum(counts[:rank]) for rank in range(comm.size)]
+        wire = allocate((sum(counts),), spectrum.dtype, slab.tally)
+        self._parcels: list[Spectrum] = [
+            wire[start : start + count].reshape(ny_loc, count // max(ny_loc, 1))
+            for start, count in zip(starts, counts, strict=True)
+        ]
+        self._parcels[own] = spectrum[slab.rows]
+        column_counts = [0 if rank == own else mine * (part.stop - part.start) for rank, part in enumerate(slab.dealt)]
+        column_starts = [mine * part.start for part in slab.dealt]
+        kind = MPI.C_DOUBLE_COMPLEX if spectrum.dtype == np.complex128 else MPI.C_FLOAT_COMPLEX
+        self._in_rows = [wire, (counts, starts), kind]
+        self._in_columns = [spectrum, (column_counts, column_starts), kind]
+        self.sent = wire.nbytes
+
+    def post(self, rows: slice, waves: Spectrum) -> None:
+        """Copy a block of rows to its place in the spectrum and to the parcels."""
+        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
+            parcel[rows] = waves[:, columns]
+
+    def to_columns(self) -> None:
+        """Collective. Exchange the parcels."""
+        self._comm.Alltoallv(self._in_rows, self._in_columns)
+
+    def to_rows(self) -> None:
+        """Collective. The reverse of `to_columns`."""
+        self._comm.Alltoallv(self._in_columns, self._in_rows)
+
+    def collect(self, rows: slice, waves: Spectrum) -> None:
+        """The reverse of `post`."""
+        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
+            waves[:, columns] = parcel[rows]

@@ -5,7 +5,8 @@ do not divide `ny`, and ranks without rows, are normal.
 """
 
 from collections.abc import Sequence
-from typing import TypeVar
+from itertools import pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 import pyfftw
@@ -19,9 +20,9 @@ Array = NDArray[np.floating]
 
 
 def deal(count: int, ranks: int) -> list[slice]:
-    """Split `count` items evenly and in order; the first ranks take one more where it does not divide."""
+    """Split `count` items in order into one part per rank; parts differ by at most one item, and may be empty."""
     bounds = [count * rank // ranks for rank in range(ranks + 1)]
-    return [slice(start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [slice(start, stop) for start, stop in pairwise(bounds)]
 
 
 class Slab:
@@ -36,7 +37,6 @@ class Slab:
         self.rows = self.dealt[comm.rank]
         self.shape = (self.rows.stop - self.rows.start, nx)
         self.tally = Tally() if tally is None else tally
-        self._operations: dict[int, MPI.Op] = {}
 
     def resized(self, nx: int, ny: int) -> "Slab":
         """The slab of a map of another size on the same ranks."""
@@ -60,17 +60,24 @@ class Slab:
         return field
 
     def sum(self, *values: float) -> list[float]:
-        """Collective. Sums over all ranks of several numbers, in one Allreduce."""
+        """Collective. Sums over all ranks of several numbers, in one message."""
         return self.reduce(values, ())
 
     def reduce(self, sums: Sequence[float], maxima: Sequence[float]) -> list[float]:
-        """Collective. Sums and maxima over all ranks, sums first, in one Allreduce."""
+        """Collective. Sums and maxima over all ranks, sums first, in one message; a NaN anywhere stays one.
+
+        Every rank receives the numbers of all and adds them in the order of ranks. So all ranks get the same bits, and
+        get them again when the run is repeated; an Allreduce would leave both to the MPI library, and a sum and a
+        maximum in one would need an operator of our own, which MPI may apply to any part of the numbers.
+        """
         self.tally["allreduce"] += 1
-        values = np.array([*sums, *maxima], dtype=np.float64)
-        if self.comm.size > 1:
-            operation = MPI.SUM if not maxima else self._sums_then_maxima(len(sums))
-            self.comm.Allreduce(MPI.IN_PLACE, values, operation)
-        return [float(value) for value in values]
+        own = np.array([*sums, *maxima], dtype=np.float64)
+        if self.comm.size == 1:
+            return own.tolist()
+        everyone = np.empty((self.comm.size, own.size))
+        self.comm.Allgather(own, everyone)
+        summed, largest = everyone[:, : len(sums)].sum(axis=0), everyone[:, len(sums) :].max(axis=0)
+        return [*summed.tolist(), *largest.tolist()]
 
     def agree(self, value: T) -> T:
         """Collective. Root's value, on every rank."""
@@ -80,19 +87,8 @@ class Slab:
         """Collective. The value of every rank, in order, on every rank."""
         return self.comm.allgather(value)
 
-    def _sums_then_maxima(self, count: int) -> MPI.Op:
-        if count not in self._operations:
 
-            def combine(source: MPI.buffer, target: MPI.buffer, _: MPI.Datatype) -> None:
-                a, b = np.frombuffer(source), np.frombuffer(target)
-                b[:count] += a[:count]
-                np.maximum(b[count:], a[count:], out=b[count:])
-
-            self._operations[count] = MPI.Op.Create(combine, commute=True)
-        return self._operations[count]
-
-
-def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> Array:
+def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[Any]:
     """An uninitialised array aligned for SIMD transforms, its bytes counted."""
     array = pyfftw.empty_aligned(shape, dtype=dtype, n=64)
     tally["map bytes"] += array.nbytes

@@ -1,0 +1,240 @@
+"""The distributed transform against SciPy's, on any grid and any number of ranks.
+
+Tolerances: 1e-12 of the largest value in double precision, 1e-6 in single; rounding errors are some 1e-16 and 1e-7
+times the logarithm of the number of points.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pyfftw
+import pytest
+import scipy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpi4py import MPI
+from numpy.typing import DTypeLike, NDArray
+
+from parcontact.parallel import fft as transforms
+from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
+from parcontact.parallel.slab import Slab
+
+pytestmark = pytest.mark.mpi
+
+TOLERANCES: dict[DTypeLike, float] = {np.float64: 1e-12, np.float32: 1e-6}
+SIZES = [(64, 48), (63, 45), (31, 37), (48, 61), (1, 24), (24, 1), (1, 1), (2, 2), (5, 3), (2, 3), (97, 2)]  # nx, ny
+
+
+def random_map(nx: int, ny: int) -> NDArray[np.float64]:
+    """The same on every rank."""
+    return np.random.default_rng([nx, ny]).standard_normal((ny, nx))
+
+
+def close(mine: NDArray[Any], reference: NDArray[Any], dtype: DTypeLike = np.float64, scale: float = 0.0) -> None:
+    """Equal to within rounding of the largest value of the whole reference."""
+    assert mine.shape == reference.shape
+    largest = scale or np.abs(reference).max(initial=0.0)
+    assert np.abs(mine - reference).max(initial=0.0) <= TOLERANCES[dtype] * largest
+
+
+def check(slab: Slab, lengths: tuple[int, int], dtype: DTypeLike) -> None:
+    """Forward equals SciPy's zero-padded transform, and backward after forward is the identity."""
+    fft = FFT(slab, lengths, dtype)
+    whole = random_map(slab.nx, slab.ny)
+    field, out = slab.empty(dtype), slab.empty(dtype)
+    field[...] = whole[slab.rows]
+    reference = scipy.fft.rfft2(whole, s=lengths[::-1])
+    spectrum = fft.forward(field)
+    assert spectrum.shape == fft.shape
+    assert spectrum.dtype == fft.complex
+    close(spectrum, reference[:, fft.columns], dtype, np.abs(reference).max())
+    assert fft.backward(spectrum, out) is out
+    close(out, whole[slab.rows], dtype, np.abs(whole).max())
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
+def test_equals_scipy(communicators: list[MPI.Intracomm], nx: int, ny: int, dtype: DTypeLike) -> None:
+    for comm in communicators:
+        check(Slab(comm, nx, ny), (nx, ny), dtype)
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+@pytest.mark.parametrize(("nx", "ny", "mx", "my"), [(16, 9, 32, 18), (7, 8, 10, 8), (8, 7, 8, 11), (1, 5, 2, 10)])
+def test_zero_padding(communicators: list[MPI.Intracomm], nx: int, ny: int, mx: int, my: int, dtype: DTypeLike) -> None:
+    for comm in communicators:
+        check(Slab(comm, nx, ny), (mx, my), dtype)
+
+
+@settings(max_examples=15)
+@given(nx=st.integers(1, 50), ny=st.integers(1, 50), more_x=st.integers(0, 9), more_y=st.integers(0, 9))
+def test_any_size(comm: MPI.Intracomm, nx: int, ny: int, more_x: int, more_y: int) -> None:
+    check(Slab(comm, nx, ny), (nx + more_x, ny + more_y), np.float64)
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+@pytest.mark.parametrize("nx", [64, 33])
+def test_many_blocks(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, nx: int, dtype: DTypeLike) -> None:
+    """Each rank works through blocks of eight rows, the last one shorter."""
+    monkeypatch.setattr(transforms, "BLOCK_BYTES", 1)
+    check(Slab(comm, nx, 75), (nx, 75), dtype)
+
+
+def test_shorter_than_the_map(comm: MPI.Intracomm) -> None:
+    with pytest.raises(ValueError, match="shorter than the map"):
+        FFT(Slab(comm, 8, 8), (8, 7))
+
+
+def test_convolution_is_linear(communicators: list[MPI.Intracomm]) -> None:
+    """Padded to nx + kx - 1 it is the direct sum over all products."""
+    nx, ny, kx, ky = 13, 10, 6, 9
+    whole, kernel = random_map(nx, ny), random_map(kx, ky)
+    reference = scipy.signal.convolve(whole, kernel, method="direct")[:ny, :nx]
+    for comm in communicators:
+        slab = Slab(comm, nx, ny)
+        fft = FFT(slab, (nx + kx - 1, ny + ky - 1))
+        symbol = scipy.fft.rfft2(kernel, s=(fft.my, fft.mx))[:, fft.columns] / (fft.mx * fft.my)
+        out = fft.convolve(whole[slab.rows], symbol, slab.empty())
+        close(out, reference[slab.rows], scale=np.abs(reference).max())
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+def test_maps_that_fftw_cannot_take(comm: MPI.Intracomm, dtype: DTypeLike) -> None:
+    """Of another precision, not aligned, or not contiguous: the result is the same."""
+    slab = Slab(comm, 18, 11)
+    fft = FFT(slab, dtype=dtype)
+    whole = random_map(18, 11)
+    reference = fft.forward(whole[slab.rows].astype(dtype)).copy()
+    scale = np.abs(whole).max()
+    for other in TOLERANCES:
+        coarser = np.float32 if np.float32 in (dtype, other) else np.float64
+        wide = np.zeros((slab.shape[0], 40), dtype=other)
+        shifted = np.zeros(slab.shape[0] * 18 + 1, dtype=other)[1:].reshape(slab.shape)
+        for field in (wide[:, :18], wide[:, 1:37:2], shifted):
+            field[...] = whole[slab.rows]
+            close(fft.forward(field), reference, coarser, np.abs(reference).max(initial=1.0))
+            field.fill(0.0)
+            fft.backward(reference, field)
+            close(field, whole[slab.rows], coarser, scale)
+
+
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
+def test_parseval(comm: MPI.Intracomm, nx: int, ny: int) -> None:
+    """Each wave of the half spectrum counted as often as it stands in the full one; relative error 1e-13."""
+    slab = Slab(comm, nx, ny)
+    fft = FFT(slab)
+    whole = random_map(nx, ny)
+    spectrum = fft.forward(whole[slab.rows])
+    power = slab.sum(float(np.sum(fft.multiplicity * np.abs(spectrum) ** 2)))[0] / slab.points
+    assert power == pytest.approx(float(np.sum(whole**2)), rel=1e-13)
+
+
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
+def test_modes(comm: MPI.Intracomm, nx: int, ny: int) -> None:
+    """Those of numpy, except that the shortest wave of an even count is positive."""
+    fft = FFT(Slab(comm, nx, ny))
+    along_x, along_y = fft.modes
+    assert along_x.shape == (1, fft.shape[1])
+    assert np.array_equal(along_x[0], np.rint(np.fft.rfftfreq(nx, 1 / nx))[fft.columns])
+    expected = np.rint(np.fft.fftfreq(ny, 1 / ny))
+    expected[2 * expected == -ny] = ny / 2
+    assert np.array_equal(along_y[:, 0], expected)
+
+
+def test_only_rows_of_the_map_are_sent(communicators: list[MPI.Intracomm]) -> None:
+    """Not those of the padding: 16 bytes for each wave of each row of the map that another rank owns."""
+    for comm in communicators:
+        slab = Slab(comm, 20, 14)
+        fft = FFT(slab, (40, 64))
+        fft.forward(slab.zeros())
+        others = 21 - fft.shape[1]
+        assert slab.tally["bytes sent"] == 16 * slab.shape[0] * others
+        fft.backward(fft.spectrum, slab.empty())
+        assert slab.tally["bytes sent"] == 32 * slab.shape[0] * others
+        assert slab.tally["fft"] == slab.tally["fft 40x64 float64"] == 2
+
+
+class Counting(pyfftw.FFTW):
+    """Counts the rows that plans along x transform."""
+
+    rows = 0
+
+    def execute(self) -> None:
+        if self.axes == (1,):
+            Counting.rows += self.input_shape[0]
+        super().execute()
+
+
+def test_only_rows_of_the_map_are_transformed(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pyfftw, "FFTW", Counting)
+    slab = Slab(comm, 20, 14)
+    fft = FFT(slab, (40, 64))
+    monkeypatch.setattr(Counting, "rows", 0)
+    fft.forward(slab.zeros())
+    assert Counting.rows == slab.shape[0]
+    fft.backward(fft.spectrum, slab.empty())
+    assert Counting.rows == 2 * slab.shape[0]
+
+
+def test_memory(communicators: list[MPI.Intracomm]) -> None:
+    """One map on one rank and less than two on several, and blocks of an eighth of one."""
+    n = 1024
+    for comm in communicators:
+        slab = Slab(comm, n, n)
+        FFT(slab)
+        share = slab.tally["map bytes"] / (8 * n * n / comm.size)
+        spectrum, parcels, blocks = 1.0, 1.0 - 1.0 / comm.size, 0.125 if comm.size == 1 else 0.25
+        assert share <= (spectrum + parcels) * (1 + 2 / n * comm.size) + blocks
+
+
+@pytest.fixture
+def forgetful() -> Iterator[None]:
+    """A process that has not measured anything, before and after."""
+    pyfftw.forget_wisdom()
+    yield
+    pyfftw.forget_wisdom()
+
+
+class WisdomOnly(pyfftw.FFTW):
+    """Refuses to measure."""
+
+    def __new__(cls, source: Any, target: Any, axes: Any, direction: str, flags: tuple[str, ...]) -> "WisdomOnly":
+        return super().__new__(cls, source, target, axes, direction, (*flags, "FFTW_WISDOM_ONLY"))
+
+    def __init__(self, source: Any, target: Any, axes: Any, direction: str, flags: tuple[str, ...]) -> None:
+        super().__init__(source, target, axes, direction, (*flags, "FFTW_WISDOM_ONLY"))
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+@pytest.mark.parametrize("lengths", [(96, 80), (192, 160)])
+@pytest.mark.usefixtures("forgetful")
+def test_wisdom_gives_the_same_bits(
+    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, lengths: tuple[int, int], dtype: DTypeLike
+) -> None:
+    """A restarted run imports what its ranks have measured: it measures nothing and repeats every bit."""
+
+    def both_ways() -> tuple[NDArray[Any], NDArray[Any]]:
+        slab = Slab(comm, 96, 80)
+        fft = FFT(slab, lengths, dtype)
+        spectrum = fft.forward(random_map(96, 80)[slab.rows]).copy()
+        return spectrum, fft.backward(spectrum, slab.empty())
+
+    first = both_ways()
+    wisdom = export_wisdom()
+    pyfftw.forget_wisdom()
+    monkeypatch.setattr(pyfftw, "FFTW", WisdomOnly)
+    if first[0].size:
+        with pytest.raises(RuntimeError, match="plan"):
+            both_ways()
+    assert import_wisdom(wisdom)
+    again = both_ways()
+    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_foreign_wisdom(comm: MPI.Intracomm) -> None:
+    assert not import_wisdom(b"")
+    assert not import_wisdom(b"(fftw-9.9 fftw_wisdom)\x1e\x1e")
+    assert import_wisdom(export_wisdom())
+    check(Slab(comm, 16, 16), (16, 16), np.float64)

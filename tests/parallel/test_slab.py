@@ -1,0 +1,98 @@
+"""Who owns which rows, and sums over all of them, on any number of ranks."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpi4py import MPI
+
+from parcontact.parallel.slab import Slab, deal
+from parcontact.parallel.tally import Tally
+
+pytestmark = pytest.mark.mpi
+
+
+@given(count=st.integers(0, 200), ranks=st.integers(1, 50))
+def test_parts_follow_each_other_and_are_even(count: int, ranks: int) -> None:
+    parts = deal(count, ranks)
+    assert [index for part in parts for index in range(count)[part]] == list(range(count))
+    sizes = [part.stop - part.start for part in parts]
+    assert max(sizes) - min(sizes) <= 1
+
+
+@pytest.mark.parametrize("ny", [1, 2, 3, 7, 64])
+def test_rows(communicators: list[MPI.Intracomm], ny: int) -> None:
+    for comm in communicators:
+        slab = Slab(comm, 5, ny)
+        assert slab.shape == (slab.rows.stop - slab.rows.start, 5)
+        assert sum(slab.from_all(slab.shape[0])) == ny
+        assert slab.points == 5 * ny
+        finer = slab.resized(10, 2 * ny)
+        assert (finer.nx, finer.ny, finer.comm) == (10, 2 * ny, comm)
+        assert finer.tally is slab.tally
+
+
+def test_sums_and_maxima(communicators: list[MPI.Intracomm]) -> None:
+    """In one message; exact because all numbers are small integers."""
+    for comm in communicators:
+        slab = Slab(comm, 4, 4)
+        rank, size = comm.rank, comm.size
+        triangle = size * (size - 1) / 2
+        assert slab.sum(1.0, rank, -rank) == [size, triangle, -triangle]
+        assert slab.reduce([1.0, rank], [rank, -rank]) == [size, triangle, size - 1, 0.0]
+        assert slab.reduce([], [float(rank)]) == [size - 1]
+        assert slab.tally["allreduce"] == 3
+        assert all(type(value) is float for value in slab.reduce([1], [rank]))
+
+
+def test_nothing_hides_a_nan(comm: MPI.Intracomm) -> None:
+    slab = Slab(comm, 4, 4)
+    mine = math.nan if comm.rank == comm.size - 1 else 1.0
+    total, largest = slab.reduce([mine], [mine])
+    assert math.isnan(total)
+    assert math.isnan(largest)
+
+
+def test_all_ranks_get_the_same_bits(communicators: list[MPI.Intracomm]) -> None:
+    """Also the same as the sum in the order of ranks: a run repeated on as many ranks takes the same decisions."""
+    for comm in communicators:
+        slab = Slab(comm, 4, 4)
+        values = 10.0 ** np.random.default_rng(comm.rank).uniform(-8, 8, 7)
+        result = slab.reduce(values.tolist(), values.tolist())
+        everyone = np.array(slab.from_all(values))
+        assert result == [*(sum(column) for column in everyone.T), *everyone.max(axis=0)]
+        assert slab.from_all(result) == [result] * comm.size
+
+
+def test_any_number_of_slabs(comm: MPI.Intracomm) -> None:
+    """MPI has few handles for operators; none are used."""
+    for count in range(100):
+        assert Slab(comm, 1, 1).reduce([1.0] * count, [1.0]) == [comm.size] * count + [1.0]
+
+
+def test_root_is_believed(communicators: list[MPI.Intracomm]) -> None:
+    for comm in communicators:
+        slab = Slab(comm, 4, 4)
+        assert slab.root == (comm.rank == 0)
+        assert slab.agree(comm.rank) == 0
+        assert slab.from_all(comm.rank) == list(range(comm.size))
+
+
+def test_maps_are_aligned_and_counted(comm: MPI.Intracomm) -> None:
+    slab = Slab(comm, 7, 9)
+    double, single = slab.zeros(), slab.empty(np.float32)
+    assert double.shape == single.shape == slab.shape
+    assert not double.any()
+    assert double.ctypes.data % 64 == single.ctypes.data % 64 == 0
+    assert slab.tally["map bytes"] == double.nbytes + single.nbytes == 12 * double.size
+
+
+def test_tally_since() -> None:
+    tally = Tally(fft=2)
+    before = tally.copy()
+    tally["fft"] += 3
+    tally["shift"] += 1
+    assert tally.since(before) == {"fft": 3, "shift": 1}
+    assert tally["never counted"] == 0
