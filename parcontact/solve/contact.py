@@ -11,14 +11,16 @@ iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C
 2. residual `r = C R g`, preconditioned `z = C R K r` with K close to the inverse of A;
 3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is no descent;
 4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, then scaled to the mean P0;
-5. f must not rise but for a few times and less and less, as cutting a warm start to the new contact may do: else the step
-   is shortened along the projected path and the direction is forgotten.
+5. f must not rise: else the step is halved along this path and the direction is forgotten.
 
-With d given there is neither centring nor scaling. The unpreconditioned ancestor is I. A. Polonsky and L. M. Keer, Wear
-231 (1999) 206; K makes the number of iterations nearly independent of the grid. Everything here is dimensionless.
+With d given there is neither centring nor scaling. With P0 given, d is the mean of `A p - h` weighted by p, so that
+`<p, g> = 0`: scaling p then does not change f to first order, and cutting t off at p = 0, which a small step does only
+where g < 0, only helps. Thus f falls for every step that is small enough (D. P. Bertsekas, SIAM J. Control Optim. 20
+(1982) 221, for d given). The unpreconditioned ancestor is I. A. Polonsky and L. M. Keer, Wear 231 (1999) 206; K makes
+the number of iterations nearly independent of the grid. Everything here is dimensionless.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -27,8 +29,9 @@ from ..parallel.slab import Array, Slab
 from . import kernels
 
 STALL = 60  # iterations without a better certificate after which a solve gives up
-SHORTENINGS = 12  # halvings of a step along the projected path
-LEEWAY = 1e-2  # of <p, A p>/2: by how much the first step that raises f may do so; each later one by half as much
+HALVINGS = 12  # of a step that raises f; then it is taken as it is
+ROUND_OFF = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
+NOT_FINITE = "met numbers that are not finite"
 
 
 class Operator(Protocol):
@@ -53,7 +56,7 @@ class Approach:
 
 @dataclass(frozen=True)
 class Certificate:
-    """How well a returned pressure meets the contact conditions, all three recomputed from it.
+    """How well a returned pressure meets the contact conditions, all three computed from it.
 
     complementarity: `sum(p |g|) / sum(p)`, the gap where there is pressure, weighted by it, over the surface's height;
     penetration: `max(-g, 0)` over all points, over the surface's height;
@@ -66,12 +69,16 @@ class Certificate:
 
     @property
     def worst(self) -> float:
-        return max(self.complementarity, self.penetration, self.load)
+        return float(np.max((self.complementarity, self.penetration, self.load)))  # NaN if one is
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A solved (or given up) contact: maps `p` and `u = A p` are the solver's own, valid until its next solve."""
+    """A solved (or given up) contact: maps `p` and `u = A p` are the solver's own, valid until its next solve.
+
+    `failure` is empty, or says what the solve did instead of reaching the tolerance; `shortened` counts the iterations
+    in which the step was halved.
+    """
 
     p: Array
     u: Array
@@ -87,11 +94,32 @@ class Contact:
         return not self.failure
 
 
+@dataclass(frozen=True)
+class Balance:
+    """An iterate in numbers, for an approach d: the sums of p and of p g, and `energy = <p, A p>/2`."""
+
+    d: float
+    load: float
+    gaps: float
+    energy: float
+
+    @property
+    def f(self) -> float:
+        """`<p, A p>/2 - <p, h + d>`, with `h + d = A p - g`: no large numbers where h has a large offset."""
+        return self.gaps - self.energy
+
+    def settled(self) -> "Balance":
+        """The same iterate, for the d at which `<p, g> = 0`, but for the rounding of d."""
+        d = self.d + self.gaps / self.load
+        return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load)
+
+
 class ContactSolver:
     """Buffers and loop for contacts on one grid.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
-    lowest to its highest point, in the unit of h: what gaps are compared with; `tolerance` on the certificate; `max_iterations`; `dtype` of maps.
+    lowest to its highest point, in the unit of h: what gaps are compared with; `tolerance` on the certificate;
+    `max_iterations`; `dtype` of maps.
     """
 
     def __init__(
@@ -106,33 +134,32 @@ class ContactSolver:
     ) -> None:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
-        self.round_off = 8 * float(np.finfo(dtype).eps)
+        self.round_off = ROUND_OFF * float(np.finfo(dtype).eps)
         self.p, self.u, self.w, self.t, self.r, self.spare = (slab.zeros(dtype) for _ in range(6))
-        self.working = np.zeros(slab.shape, dtype=np.bool_)
+        self.working = slab.zeros(np.bool_)
 
     def solve(self, h: Array, control: MeanPressure | Approach) -> Contact:
-        """Solve for heights `h`, starting from the pressure in `self.p`; collective.
+        """Solve for heights `h`, starting from the pressure in `self.p` (no value of it negative); collective.
 
         Under load control the start is scaled to the load, or uniform where it is zero everywhere. A solve that does
         not reach the tolerance says why in `failure`; its maps are then the last iterate, not a solution.
         """
-        if isinstance(control, MeanPressure) and control.value == 0.0:
-            return self._separated(h)
         centred = isinstance(control, MeanPressure)
-        gaps, count = self._begin(h, control)
-        old_product, best, best_at, shortened, iteration = 0.0, np.inf, 0, 0, 0
+        if centred and control.value == 0.0:
+            return self._separated(h)
+        balance = self._begin(h, control)
+        best, old_product, shortened, iteration = (np.inf, 0), 0.0, 0, 0
         while True:
-            d = gaps / count if centred else control.value
-            load, members, excess, certificate = self._certify(h, d, control)
-            if certificate.worst < best:
-                best, best_at = certificate.worst, iteration
-            failure = self._verdict(certificate, iteration, iteration - best_at)
+            members, excess, certificate = self._certify(h, balance, control)
+            best = min(best, (certificate.worst, iteration))
+            failure = self._verdict(certificate.worst, iteration, *best)
             if failure is not None:
-                return Contact(self.p, self.u, d, load, certificate, iteration, shortened, failure)
+                load = balance.load / self.slab.points
+                return Contact(self.p, self.u, balance.d, load, certificate, iteration, shortened, failure)
             self.r, self.spare = self.spare, self.r
-            kernels.residual(self.working, self.u, h, d + (excess / members if centred else 0.0), self.r)
+            kernels.residual(self.working, self.u, h, balance.d + (excess / members if centred else 0.0), self.r)
             slope, old_product = self._turn(old_product, members, centred)
-            gaps, count, halvings = self._descend(h, d, slope, control)
+            balance, halvings = self._descend(h, balance, slope, control)
             iteration += 1
             if halvings:
                 shortened += 1
@@ -140,41 +167,48 @@ class ContactSolver:
 
     # -- the steps of one iteration -----------------------------------------------------------------------------------
 
-    def _begin(self, h: Array, control: MeanPressure | Approach) -> tuple[float, float]:
-        """Make the start admissible; returns the sum of `u - h` over the contact and its points."""
+    def _begin(self, h: Array, control: MeanPressure | Approach) -> Balance:
+        """Make the start admissible and forget the last solve's direction."""
         self.t.fill(0.0)
         self.r.fill(0.0)
-        self.leeway = LEEWAY
         if isinstance(control, MeanPressure):
-            load = self.slab.sum(kernels.total(self.p))[0] / self.slab.points
+            load = self.slab.sum(kernels.total(self.p))[0]
             if load > 0.0:
-                kernels.scale(self.p, control.value / load)
+                kernels.scale(self.p, control.value * self.slab.points / load)
             else:
                 self.p.fill(control.value)
         self.operator.apply(self.p, self.u)
-        gaps, count = self.slab.sum(*kernels.touching(self.p, self.u, h))
-        return gaps, count
+        if isinstance(control, Approach):
+            return self._weigh(h, control.value)
+        return self._weigh(h, 0.0).settled()
 
-    def _certify(self, h: Array, d: float, control: MeanPressure | Approach) -> tuple[float, float, float, Certificate]:
-        """Mark the working set; returns the load, the set's size and sum of gaps, and the certificate."""
-        *sums, deepest = kernels.certify(self.p, self.u, h, d, self.working)
-        total, wrong, members, excess, deepest = self.slab.reduce(sums, [deepest])
-        load = total / self.slab.points
-        error = abs(load / control.value - 1.0) if isinstance(control, MeanPressure) else 0.0
-        complementarity = wrong / total / self.height if total > 0.0 else 0.0
+    def _weigh(self, h: Array, d: float) -> Balance:
+        load, work, gaps = self.slab.sum(*kernels.weigh(self.p, self.u, h, d))
+        return Balance(d, load, gaps, 0.5 * work)
+
+    def _certify(
+        self, h: Array, balance: Balance, control: MeanPressure | Approach
+    ) -> tuple[float, float, Certificate]:
+        """Mark the working set; returns its size, its sum of gaps, and the certificate."""
+        *sums, deepest = kernels.certify(self.p, self.u, h, balance.d, self.working)
+        wrong, members, excess, deepest = self.slab.reduce(sums, [deepest])
+        load = balance.load
+        complementarity = wrong / (load or 1.0) / self.height
         penetration = max(deepest / self.height, 0.0)
-        return load, members, excess, Certificate(complementarity, penetration, error)
+        error = abs(load / self.slab.points / control.value - 1.0) if isinstance(control, MeanPressure) else 0.0
+        return members, excess, Certificate(complementarity, penetration, error)
 
-    def _verdict(self, certificate: Certificate, iteration: int, unimproved: int) -> str | None:
-        """None: go on; empty: solved; else why the solve is given up."""
-        if certificate.worst <= self.tolerance:
+    def _verdict(self, worst: float, iteration: int, best: float, best_at: int) -> str | None:
+        """None: go on; empty: solved; else what happened instead."""
+        if worst <= self.tolerance:
             return ""
-        if not np.isfinite(certificate.worst):
-            return "the pressure is not finite"
-        if unimproved >= STALL:
-            return f"stalled: no better certificate than {certificate.worst:.3g} in {STALL} iterations"
+        if not np.isfinite(worst):
+            return NOT_FINITE
+        asked = f"{worst:.3g} where {self.tolerance:.3g} was asked for"
+        if iteration - best_at >= STALL:
+            return f"stalled: no better certificate than {best:.3g} in {STALL} iterations, now {asked}"
         if iteration >= self.max_iterations:
-            return f"not converged after max_iterations = {iteration}: certificate {certificate.worst:.3g}"
+            return f"did not converge in max_iterations = {iteration}: the certificate is {asked}"
         return None
 
     def _turn(self, old_product: float, members: float, centred: bool) -> tuple[float, float]:
@@ -189,33 +223,29 @@ class ContactSolver:
         kernels.turn(self.working, z, beta, mean_z + beta * mean_t, self.t)
         return r_z + beta * r_t, r_z
 
-    def _descend(self, h: Array, d: float, slope: float, control: MeanPressure | Approach) -> tuple[float, float, int]:
-        """Step against `self.t`; returns the sum of `u - h` over the contact, its points, and how often it was halved."""
-        w = self.operator.apply(self.t, self.w)
-        curvature = self.slab.sum(kernels.dot(self.t, w))[0]
+    def _descend(
+        self, h: Array, old: Balance, slope: float, control: MeanPressure | Approach
+    ) -> tuple[Balance, int]:
+        """Step against `self.t`; returns the new balance and how often the step was halved."""
+        curvature = self.slab.sum(kernels.dot(self.t, self.operator.apply(self.t, self.w)))[0]
         step = slope / curvature if curvature > 0.0 else 0.0
         self.p, self.spare = self.spare, self.p
-        for halvings in range(SHORTENINGS):
+        for halvings in range(HALVINGS + 1):
             load, cut = self.slab.sum(*kernels.advance(self.spare, self.t, step, self.p))
-            if cut == 0.0:  # the exact minimum along t, and A p is known
-                kernels.subtract(self.u, step, w if halvings == 0 else self.operator.apply(self.t, self.w))
-                return *self.slab.sum(*kernels.touching(self.p, self.u, h)), halvings
-            if isinstance(control, MeanPressure):
+            if cut and isinstance(control, MeanPressure):
                 kernels.scale(self.p, control.value * self.slab.points / load)
-            self.operator.apply(self.p, self.w)
-            rise, energy, gaps, count = self.slab.sum(*kernels.change(self.p, self.spare, self.w, self.u, h, d))
-            if rise <= self.round_off * energy:
+            self.u, self.w = self.operator.apply(self.p, self.w), self.u
+            new = self._weigh(h, old.d)
+            if new.f - old.f <= self.round_off * new.energy or halvings == HALVINGS:
                 break
-            if rise <= self.leeway * energy:
-                self.leeway *= 0.5
-                break
+            self.u, self.w = self.w, self.u
             step *= 0.5
-        self.u, self.w = self.w, self.u
-        return gaps, count, halvings
+        return new.settled() if isinstance(control, MeanPressure) else new, halvings
 
     def _separated(self, h: Array) -> Contact:
         """No load: no pressure, the surface just touches the body."""
         self.p.fill(0.0)
         self.u.fill(0.0)
         highest = self.slab.reduce((), [float(h.max(initial=-np.inf))])[0]
-        return Contact(self.p, self.u, -highest, 0.0, Certificate(0.0, 0.0, 0.0), 0, 0, "")
+        failure = "" if np.isfinite(highest) else NOT_FINITE
+        return Contact(self.p, self.u, -highest, 0.0, Certificate(0.0, 0.0, 0.0), 0, 0, failure)

@@ -10,73 +10,53 @@ from ..compiled import loop
 
 
 @loop
-def touching(p, u, h):
-    """Over points with pressure: sum of `u - h` and their count."""
-    gaps, count = 0.0, 0.0
+def weigh(p, u, h, d):
+    """Sums of p, p u and p g, with the gap `g = u - h - d`."""
+    load, work, gaps = 0.0, 0.0, 0.0
     for j in range(p.shape[0]):
-        row_gaps, row_count = 0.0, 0.0
+        row_load, row_work, row_gaps = 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
-            inside = 1.0 if p[j, i] > 0.0 else 0.0
-            row_gaps += inside * (u[j, i] - h[j, i])
-            row_count += inside
+            row_load += p[j, i]
+            row_work += p[j, i] * u[j, i]
+            row_gaps += p[j, i] * (u[j, i] - h[j, i] - d)
+        load += row_load
+        work += row_work
         gaps += row_gaps
-        count += row_count
-    return gaps, count
-
-
-@loop
-def change(p, p_old, u, u_old, h, d):
-    """Rise of `<p, Ap>/2 - <p, h + d>` from `p_old` to `p` without cancellation, `<p, Ap>/2`, and `touching(p, u, h)`."""
-    rise, energy, gaps, count = 0.0, 0.0, 0.0, 0.0
-    for j in range(p.shape[0]):
-        row_rise, row_energy, row_gaps, row_count = 0.0, 0.0, 0.0, 0.0
-        for i in range(p.shape[1]):
-            inside = 1.0 if p[j, i] > 0.0 else 0.0
-            gap, gap_old = u[j, i] - h[j, i], u_old[j, i] - h[j, i]
-            row_rise += (p[j, i] - p_old[j, i]) * (0.5 * (gap + gap_old) - d)
-            row_energy += p[j, i] * u[j, i]
-            row_gaps += inside * gap
-            row_count += inside
-        rise += row_rise
-        energy += row_energy
-        gaps += row_gaps
-        count += row_count
-    return rise, 0.5 * energy, gaps, count
+    return load, work, gaps
 
 
 @loop
 def certify(p, u, h, d, working):
-    """Mark the working set (pressure, or penetration) and return what certifies a solution.
+    """Mark the working set: pressure, or penetration. With the gap `g = u - h - d`: sum of p |g|, over the working set
+    the count and the sum of g, and max(-g).
 
-    With the gap `g = u - h - d`: sum of p, sum of p |g|, over the working set the count and the sum of g; and max(-g).
+    The lowest gap is kept for each column: that is as fast as a sum, which a single running minimum is not.
     """
-    load, wrong, count, gaps, deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
+    wrong, count, gaps = 0.0, 0.0, 0.0
+    lowest = np.full(p.shape[1], np.inf)
     for j in range(p.shape[0]):
-        row_load, row_wrong, row_count, row_gaps, row_deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
+        row_wrong, row_count, row_gaps = 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
             gap = u[j, i] - h[j, i] - d
-            inside = p[j, i] > 0.0 or gap < 0.0
+            inside = (p[j, i] > 0.0) | (gap < 0.0)
             working[j, i] = inside
             weight = 1.0 if inside else 0.0
-            row_load += p[j, i]
             row_wrong += p[j, i] * abs(gap)
             row_count += weight
             row_gaps += weight * gap
-            row_deepest = max(row_deepest, -gap)
-        load += row_load
+            lowest[i] = min(lowest[i], gap)
         wrong += row_wrong
         count += row_count
         gaps += row_gaps
-        deepest = max(deepest, row_deepest)
-    return load, wrong, count, gaps, deepest
+    return wrong, count, gaps, -lowest.min()
 
 
 @loop
-def residual(working, u, h, shift, r):
-    """`r = u - h - shift` on the working set and 0 elsewhere."""
+def residual(working, u, h, d, r):
+    """`r = u - h - d` on the working set and 0 elsewhere."""
     for j in range(r.shape[0]):
         for i in range(r.shape[1]):
-            r[j, i] = u[j, i] - h[j, i] - shift if working[j, i] else 0.0
+            r[j, i] = u[j, i] - h[j, i] - d if working[j, i] else 0.0
 
 
 @loop
@@ -137,16 +117,16 @@ def total(a):
 
 @loop
 def advance(p_old, t, step, p):
-    """`p = max(p_old - step t, 0)`; returns the sum of p and how many points were cut to 0."""
+    """`p = max(p_old - step t, 0)`; returns the sum of p and how much of it was added by cutting off at 0."""
     load, cut = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_cut = 0.0, 0.0
         for i in range(p.shape[1]):
             value = p_old[j, i] - step * t[j, i]
-            row_cut += 1.0 if value < 0.0 else 0.0
-            value = 0.0 if value < 0.0 else value
-            p[j, i] = value
-            row_load += value
+            kept = 0.0 if value < 0.0 else value
+            p[j, i] = kept
+            row_load += kept
+            row_cut += kept - value
         load += row_load
         cut += row_cut
     return load, cut
@@ -158,11 +138,3 @@ def scale(p, factor):
     for j in range(p.shape[0]):
         for i in range(p.shape[1]):
             p[j, i] *= factor
-
-
-@loop
-def subtract(u, step, w):
-    """`u <- u - step w`."""
-    for j in range(u.shape[0]):
-        for i in range(u.shape[1]):
-            u[j, i] -= step * w[j, i]

@@ -1,0 +1,79 @@
+"""Small contact problems in the units of a solver: a box of length 1, a body of shear modulus 1."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics import halfspace
+from parcontact.physics.roughness import Roughness
+from parcontact.solve.contact import Certificate, Contact, ContactSolver
+
+Map = NDArray[np.float64]
+
+
+def solver(
+    heights: Map,
+    size: tuple[float, float] = (1.0, 1.0),
+    boundary: str = "periodic",
+    kernel: str = "spectral",
+    tolerance: float = 1e-6,
+    max_iterations: int = 500,
+    dtype: Any = np.float64,
+    poisson: float = 0.5,
+) -> ContactSolver:
+    """A solver for maps of the shape of `heights`, on one rank."""
+    ny, nx = heights.shape
+    slab = Slab(MPI.COMM_SELF, nx, ny)
+    fft = FFT(slab, dtype=dtype)
+    if boundary == "free":
+        operator = halfspace.free(slab, size, poisson, dtype)
+    else:
+        operator = halfspace.periodic(fft, size, poisson, kernel)
+    height = float(np.ptp(heights)) or size[0] / nx
+    return ContactSolver(
+        slab, operator, halfspace.inverse(fft, size, poisson), height, tolerance, max_iterations, dtype
+    )
+
+
+def rough(points: int, seed: int = 1) -> Map:
+    """SOLVER.md's surface: Hurst 0.9, four longest waves in the box, the shortest of 8 cells, rms slope 1."""
+    fft = FFT(Slab(MPI.COMM_SELF, points, points))
+    waves = Roughness(0.9, 0.25, 0.25, 8 / points, seed, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
+    return np.asarray(fft.backward(waves, np.empty((points, points))), dtype=np.float64)
+
+
+def white(shape: tuple[int, int], seed: int = 1) -> Map:
+    """Heights without any correlation between neighbours: as rough as a grid can be."""
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A contact whose maps outlive the next solve."""
+
+    p: Map
+    u: Map
+    d: float
+    load: float
+    certificate: Certificate
+    iterations: int
+    failure: str
+
+
+def keep(contact: Contact) -> Kept:
+    """A copy of a contact that must have converged."""
+    assert contact.converged, contact.failure
+    return Kept(
+        contact.p.astype(np.float64),
+        contact.u.astype(np.float64),
+        contact.d,
+        contact.load,
+        contact.certificate,
+        contact.iterations,
+        contact.failure,
+    )

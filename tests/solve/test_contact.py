@@ -1,0 +1,399 @@
+"""The contact solver against the textbook one, closed forms, symmetries and its own certificate.
+
+Tolerances: a pressure follows the gap it is certified by, so two solves to 1e-11 agree to 1e-9 of the highest pressure;
+what is exact in real numbers is asked for to some hundred roundings.
+"""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics import halfspace
+from parcontact.solve import contact
+from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
+
+from . import polonsky_keer
+from .bodies import Kept, Map, keep, rough, solver, white
+
+TIGHT = 1e-11
+ROUNDING = 1e-13
+MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
+BODIES = [("periodic", "spectral"), ("periodic", "love"), ("free", "love")]
+
+
+def solve(h: Map, mean: float, **options: Any) -> Kept:
+    return keep(solver(h, **options).solve(h, MeanPressure(mean)))
+
+
+# -- against others ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("load", [0.02, 0.1, 0.5])
+def test_agrees_with_polonsky_and_keer(load: float) -> None:
+    """Pressures to 1e-8 of their mean, the oracle's own error: it ends when an iteration changes them by 1e-10."""
+    h = rough(64)
+    expected, iterations = polonsky_keer.solve(h, load * MODULUS, (1.0, 1.0), 1e-10)
+    found = solve(h, load * MODULUS, tolerance=TIGHT)
+    assert np.abs(found.p - expected).sum() < 1e-8 * expected.sum()
+    assert_allclose(found.p > 1e-6 * load, expected > 1e-6 * load)
+    assert found.iterations < iterations
+
+
+@pytest.mark.parametrize("points", [256, 512, pytest.param(1024, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_iterations_from_a_cold_start(points: int, seed: int) -> None:
+    """The promise: at most 32 to 1e-6 on every grid, for 5 to 75 % of contact; at most 14 where contact is 99.8 %."""
+    h = rough(points, seed)
+    for load, limit in ((0.02, 32), (0.1, 32), (0.5, 32), (1.5, 14)):
+        found = solve(h, load * MODULUS, tolerance=1e-6)
+        area = np.count_nonzero(found.p) / found.p.size
+        print(f"{points} points, seed {seed}, p/(E* slope) = {load}: {found.iterations} iterations, {area:.1%} contact")
+        assert found.iterations <= limit
+    assert 0.995 < area < 1.0
+
+
+def test_full_contact_is_solved_in_one_iteration() -> None:
+    """`p = P0 + K h`: the preconditioner is the inverse of the operator, and nothing is cut."""
+    h = rough(64)
+    body = solver(h, tolerance=TIGHT)
+    found = keep(body.solve(h, MeanPressure(20.0)))
+    expected = 20.0 + body.preconditioner.apply(h - h.mean(), np.empty_like(h))
+    assert found.iterations == 1
+    assert_allclose(found.p, expected, atol=1e-11 * expected.max())
+    assert_allclose(found.d, -h.mean(), atol=1e-12)
+
+
+def test_single_cell_on_a_free_body() -> None:
+    """The middle of a square cell of side a under the pressure p sinks by `asinh(1) p a/(pi G)` (Love, nu = 1/2)."""
+    h = np.zeros((16, 16))
+    h[5, 9] = 1.0
+    found = solve(h, 1e-3, boundary="free", tolerance=TIGHT)
+    pressure = 1e-3 * h.size
+    assert np.flatnonzero(found.p).tolist() == [5 * 16 + 9]
+    assert_allclose(found.p[5, 9], pressure, rtol=ROUNDING)
+    assert_allclose(found.d, np.arcsinh(1.0) * pressure / 16 / np.pi - 1.0, rtol=1e-12)
+
+
+# -- the certificate ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("control", ["load", "approach"])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-8])
+def test_certificate_follows_from_the_returned_fields(tolerance: float, control: str) -> None:
+    """Recomputed with scipy's FFT; equal to 1e-3 of itself, or to what the rounding of gaps allows."""
+    h = rough(96) + 3.0
+    found = solve(h, 0.4, tolerance=tolerance)
+    if control == "approach":
+        found = keep(solver(h, tolerance=tolerance).solve(h, Approach(found.d)))
+    gap = polonsky_keer.displacement(found.p, (1.0, 1.0)) - h - found.d
+    height = np.ptp(h)
+    certificate = found.certificate
+    complementarity = np.sum(found.p * np.abs(gap)) / np.sum(found.p) / height
+    assert_allclose(certificate.complementarity, complementarity, rtol=1e-3, atol=1e-13)
+    assert_allclose(certificate.penetration, max(-gap.min(), 0.0) / height, rtol=1e-3, atol=1e-13)
+    assert certificate.load <= ROUNDING
+    assert certificate.worst <= tolerance
+    assert found.p.min() >= 0.0
+    assert_allclose(found.load, found.p.mean(), rtol=ROUNDING)
+    if control == "load":
+        assert_allclose(found.p.mean(), 0.4, rtol=ROUNDING)
+
+
+@settings(max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    load=st.floats(-4, 3),
+    body=st.sampled_from(BODIES),
+    start=st.sampled_from(["zero", "random", "point"]),
+)
+def test_any_surface(seed: int, shape: tuple[int, int], load: float, body: tuple[str, str], start: str) -> None:
+    """White noise, from a single cell to full contact, from any start: certified, never negative, load to 1e-13."""
+    h = white(shape, seed)
+    mean = 10.0**load
+    solving = solver(h, boundary=body[0], kernel=body[1], tolerance=1e-8)
+    if start == "random":
+        solving.p[...] = white(shape, seed + 1) ** 2
+    elif start == "point":
+        solving.p[0, 0] = 1.0
+    found = keep(solving.solve(h, MeanPressure(mean)))
+    assert found.p.min() >= 0.0
+    assert_allclose(found.p.mean(), mean, rtol=ROUNDING)
+    assert np.min(found.u - h - found.d) >= -1e-8 * (np.ptp(h) or 1.0)
+
+
+# -- controls ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("boundary", "kernel"), BODIES)
+@pytest.mark.parametrize("mean", [0.01, 0.4, 2.0])
+def test_load_and_approach_give_the_same_contact(boundary: str, kernel: str, mean: float) -> None:
+    h = rough(48)
+    options: dict[str, Any] = {"boundary": boundary, "kernel": kernel, "tolerance": TIGHT}
+    loaded = solve(h, mean, **options)
+    moved = keep(solver(h, **options).solve(h, Approach(loaded.d)))
+    assert_allclose(moved.p, loaded.p, atol=1e-8 * loaded.p.max())
+    assert_allclose(moved.load, mean, rtol=1e-8)
+
+
+def test_approach_that_leaves_no_contact() -> None:
+    """Also where the last solve left pressure."""
+    h = rough(48)
+    for start in (0.0, 1.0):
+        solving = solver(h)
+        solving.p[...] = start
+        apart = keep(solving.solve(h, Approach(-2.0 * h.max())))
+        assert not apart.p.any()
+        assert not apart.u.any()
+        assert apart.load == 0.0
+
+
+def test_no_load() -> None:
+    """Nothing is pressed, and the highest point touches."""
+    h = rough(48)
+    solving = solver(h)
+    solving.p[...] = 1.0
+    touching = keep(solving.solve(h, MeanPressure(0.0)))
+    assert not touching.p.any()
+    assert not touching.u.any()
+    assert touching.d == -h.max()
+    assert touching.iterations == 0
+
+
+def test_flat_surface() -> None:
+    h = np.full((12, 16), 3.0)
+    flat = solve(h, 0.7, tolerance=TIGHT)
+    assert flat.iterations == 0
+    assert_allclose(flat.p, 0.7, rtol=1e-15)
+    assert_allclose(flat.d, -3.0, rtol=1e-15)
+
+
+def test_periodic_approach_beyond_full_contact_fails() -> None:
+    """There is no such state of a periodic body (a march refuses it before); the solver ends and says so."""
+    h = rough(48)
+    assert solver(h).solve(h, Approach(-h.mean() + 0.1)).failure
+
+
+# -- symmetries --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("load", [0.05, 1.0])
+def test_height_offset(load: float) -> None:
+    """An offset of 1e6 times the roughness leaves its heights 1e-10 of themselves: the contact to 1e-8."""
+    h = rough(64)
+    offset = 1e6 * np.ptp(h)
+    found, shifted = (solve(heights, load, tolerance=1e-9) for heights in (h, h + offset))
+    assert_allclose(shifted.p, found.p, atol=1e-7 * found.p.max())
+    assert_allclose(shifted.d + offset, found.d, atol=1e-8 * np.ptp(h))
+    assert abs(shifted.iterations - found.iterations) <= 2
+
+
+@pytest.mark.parametrize("factor", [2.0**-40, 2.0**60])
+def test_scaling_by_powers_of_two_is_exact(factor: float) -> None:
+    """The problem is linear in heights and loads together."""
+    h = rough(48)
+    body = solver(h)
+    found = keep(body.solve(h, MeanPressure(0.4)))
+    body.p.fill(0.0)
+    body.height *= factor
+    scaled = keep(body.solve(factor * h, MeanPressure(factor * 0.4)))
+    assert np.array_equal(scaled.p, factor * found.p)
+    assert scaled.d == factor * found.d
+    assert scaled.certificate == found.certificate
+
+
+def test_scaling_of_lengths() -> None:
+    """Lengths times c at the same heights: pressures over c."""
+    h = rough(48)
+    found = solve(h, 0.4, tolerance=TIGHT)
+    wide = solve(h, 0.4 / 1e3, tolerance=TIGHT, size=(1e3, 1e3))
+    assert_allclose(1e3 * wide.p, found.p, atol=1e-9 * found.p.max())
+
+
+@pytest.mark.parametrize(("boundary", "kernel"), BODIES)
+def test_mirror_images_and_transposition(boundary: str, kernel: str) -> None:
+    h = white((24, 36))
+    options: dict[str, Any] = {"boundary": boundary, "kernel": kernel, "tolerance": TIGHT}
+    found = solve(h, 2.0, size=(1.5, 1.0), **options)
+    limit = 1e-9 * found.p.max()
+    assert_allclose(solve(h[:, ::-1].copy(), 2.0, size=(1.5, 1.0), **options).p[:, ::-1], found.p, atol=limit)
+    assert_allclose(solve(h[::-1].copy(), 2.0, size=(1.5, 1.0), **options).p[::-1], found.p, atol=limit)
+    assert_allclose(solve(h.T.copy(), 2.0, size=(1.0, 1.5), **options).p.T, found.p, atol=limit)
+
+
+def test_whole_cell_shifts() -> None:
+    h = white((24, 36))
+    found = solve(h, 2.0, tolerance=TIGHT)
+    moved = solve(np.roll(h, (5, 7), axis=(0, 1)), 2.0, tolerance=TIGHT)
+    assert_allclose(moved.p, np.roll(found.p, (5, 7), axis=(0, 1)), atol=1e-9 * found.p.max())
+
+
+def test_long_thin_box() -> None:
+    """A wave along x on a box of 1e4 : 1 is the one-dimensional wave, whatever the other direction is."""
+    wave = np.cos(2 * np.pi * np.arange(64) / 64)
+    square = solve(np.tile(wave, (64, 1)), 1.0, tolerance=TIGHT)
+    for rows in (1, 5):
+        thin = solve(np.tile(wave, (rows, 1)), 1.0, tolerance=TIGHT, size=(1.0, 1e-4))
+        assert_allclose(thin.p, np.tile(square.p[0], (rows, 1)), atol=1e-9 * square.p.max())
+
+
+# -- starts, precision, cost -------------------------------------------------------------------------------------------
+
+
+def test_warm_start_from_the_solution() -> None:
+    """Nothing is left to do but to see that it is one."""
+    h = rough(64)
+    solving = solver(h)
+    first = keep(solving.solve(h, MeanPressure(0.4)))
+    operators = solving.slab.tally["operator"]
+    again = keep(solving.solve(h, MeanPressure(0.4)))
+    assert again.iterations == 0
+    assert solving.slab.tally["operator"] == operators + 1
+    assert_allclose(again.p, first.p, rtol=1e-14)
+
+
+def test_cost_of_an_iteration() -> None:
+    """At most three operators and five messages, however many numbers they carry."""
+    h = rough(64)
+    solving = solver(h)
+    before = solving.slab.tally.copy()
+    found = solving.solve(h, MeanPressure(0.4))
+    assert found.shortened == 0
+    spent = solving.slab.tally.since(before)
+    assert spent["operator"] <= 1 + 3 * found.iterations
+    assert spent["allreduce"] <= 3 + 5 * found.iterations
+    assert "map bytes" not in spent
+
+
+def test_single_precision() -> None:
+    """To the default tolerance; the pressures then agree to some ten times it."""
+    h = rough(128)
+    double = solve(h, 0.4, tolerance=1e-4)
+    single = solve(h.astype(np.float32), 0.4, tolerance=1e-4, dtype=np.float32)
+    assert abs(single.iterations - double.iterations) <= 2
+    assert_allclose(single.p, double.p, atol=1e-3 * double.p.max())
+    assert_allclose(single.p.mean(), 0.4, rtol=1e-6)
+
+
+def test_preconditioner_in_single_precision() -> None:
+    """It need not be exact: as many iterations, the same pressures in double precision."""
+    h = rough(128)
+    double = solve(h, 0.4, tolerance=1e-9)
+    solving = solver(h, tolerance=1e-9)
+    narrow = FFT(Slab(MPI.COMM_SELF, 128, 128), dtype=np.float32)
+    solving.preconditioner = halfspace.Narrowed(halfspace.inverse(narrow, (1.0, 1.0)))
+    mixed = keep(solving.solve(h, MeanPressure(0.4)))
+    assert abs(mixed.iterations - double.iterations) <= 2
+    assert_allclose(mixed.p, double.p, atol=1e-7 * double.p.max())
+
+
+# -- the safeguard -----------------------------------------------------------------------------------------------------
+
+
+class Dense:
+    """An operator given by its matrix."""
+
+    def __init__(self, matrix: list[list[float]]) -> None:
+        self.matrix = np.array(matrix)
+
+    def apply(self, field: NDArray[Any], out: NDArray[Any]) -> NDArray[Any]:
+        out[...] = (self.matrix @ field.ravel()).reshape(field.shape)
+        return out
+
+
+# Found by trial among small matrices B B' + 1 of whole numbers: no half space of ours needed the safeguard.
+LOADED = [[23, -4, -23, -4, 12], [-4, 20, 2, 23, -13], [-23, 2, 29, 0, -6], [-4, 23, 0, 30, -17]]
+LOADED += [[12, -13, -6, -17, 22]]
+MOVED = [[28, -10, -8, -11, 4], [-10, 16, 9, -10, 9], [-8, 9, 11, -3, 3], [-11, -10, -3, 27, -16], [4, 9, 3, -16, 12]]
+CYCLES = [
+    (LOADED, [-5.0, -5.0, 3.0, 1.0, 3.0], MeanPressure(20.0)),
+    (MOVED, [-1.0, 3.0, -2.0, -1.0, 4.0], Approach(-2.0)),
+]
+
+
+@pytest.mark.parametrize(("matrix", "heights", "control"), CYCLES)
+def test_without_halving_steps_it_may_cycle(
+    matrix: list[list[float]], heights: list[float], control: MeanPressure | Approach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unpreconditioned, on positive definite matrices with eigenvalues from 1 to some 60."""
+    h = np.array([heights])
+
+    def attempt() -> contact.Contact:
+        body = ContactSolver(Slab(MPI.COMM_SELF, 5, 1), Dense(matrix), Dense(np.eye(5).tolist()), 10.0, 1e-8, 500)
+        return body.solve(h, control)
+
+    guarded = attempt()
+    assert guarded.converged
+    assert guarded.shortened > 0
+    gap = np.array(matrix) @ guarded.p[0] - h[0] - guarded.d
+    assert gap.min() > -1e-7
+    monkeypatch.setattr(contact, "HALVINGS", 0)
+    assert "stalled" in attempt().failure
+
+
+@pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(0.5)])
+def test_every_iteration_lowers_the_energy(control: MeanPressure | Approach) -> None:
+    """From a start that is nowhere near; but for rounding."""
+    h, start = rough(48), white((48, 48), 3) ** 2
+    energies = []
+    for limit in range(1, 15):
+        solving = solver(h, boundary="free", max_iterations=limit, tolerance=1e-10)
+        solving.p[...] = start
+        found = solving.solve(h, control)
+        d = found.d if isinstance(control, Approach) else 0.0
+        energies.append(float(np.sum(found.p * (0.5 * found.u - h - d))))
+    assert np.all(np.diff(energies) <= 1e-13 * np.abs(energies[0]))
+
+
+# -- what cannot be solved ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("control", [MeanPressure(0.4), MeanPressure(0.0), Approach(0.1)])
+def test_heights_that_are_not_finite(value: float, control: MeanPressure | Approach) -> None:
+    h = rough(48)
+    solving = solver(h)
+    h[3, 4] = value
+    if value == -np.inf and control == MeanPressure(0.0):
+        return  # a hole without a bottom, and the highest point touches
+    assert solving.solve(h, control).failure == "met numbers that are not finite"
+
+
+@pytest.mark.parametrize("control", [MeanPressure(np.nan), MeanPressure(np.inf), Approach(np.nan), Approach(np.inf)])
+def test_loads_that_are_not_finite(control: MeanPressure | Approach) -> None:
+    h = rough(48)
+    assert solver(h).solve(h, control).failure == "met numbers that are not finite"
+
+
+def test_iterations_run_out() -> None:
+    h = rough(64)
+    found = solver(h, max_iterations=3).solve(h, MeanPressure(0.4))
+    assert not found.converged
+    assert found.iterations == 3
+    assert found.failure.startswith("did not converge in max_iterations = 3: the certificate is ")
+    assert found.failure.endswith(" where 1e-06 was asked for")
+
+
+@pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(-0.02)])
+def test_stall(control: MeanPressure | Approach) -> None:
+    """More than rounding allows is refused long before the iterations run out; the last iterate is still a good one."""
+    h = rough(48)
+    found = solver(h, tolerance=1e-300, max_iterations=10_000).solve(h, control)
+    assert not found.converged
+    assert found.failure.startswith("stalled: no better certificate than ")
+    assert found.iterations < 300
+    assert found.certificate.worst < 1e-12
+
+
+def test_what_a_contact_reports_is_documented() -> None:
+    for field in dataclasses.fields(contact.Certificate):
+        assert f"{field.name}: " in str(contact.Certificate.__doc__)

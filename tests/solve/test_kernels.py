@@ -1,0 +1,141 @@
+"""Fused loops against the same expressions of numpy, on random maps with zeros, ranks without rows, and NaN.
+
+Tolerance: sums of a few hundred terms in another order, 1e-13 of the sum of their absolute values; with maps in single
+precision the terms themselves are rounded, 1e-6.
+"""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from parcontact.solve import kernels
+
+pytestmark = pytest.mark.parametrize("dtype", [np.float64, np.float32])
+SHAPES = pytest.mark.parametrize("shape", [(7, 33), (1, 1), (3, 64), (0, 16)])
+ROUNDING = {np.float64: 1e-15, np.float32: 1e-6}  # of what is written into maps
+SUMMING = {np.float64: 1e-13, np.float32: 1e-6}
+
+
+class Maps:
+    """Random maps: a pressure with zeros, others without, and a working set."""
+
+    def __init__(self, shape: tuple[int, int], dtype: type[np.floating]) -> None:
+        random = np.random.default_rng(1)
+        self.dtype = dtype
+        self.p = np.maximum(random.standard_normal(shape), 0.0).astype(dtype)
+        self.u, self.h, self.t, self.z, self.r, self.old = (
+            random.standard_normal(shape).astype(dtype) for _ in range(6)
+        )
+        self.working = random.random(shape) < 0.5
+
+    def wide(self, name: str) -> NDArray[np.float64]:
+        return np.asarray(getattr(self, name), dtype=np.float64)
+
+    def close(self, found: float, terms: NDArray[np.float64]) -> bool:
+        """Whether a number is the sum of these."""
+        return bool(abs(found - terms.sum()) <= SUMMING[self.dtype] * np.abs(terms).sum())
+
+
+@SHAPES
+def test_weigh(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    load, work, gaps = kernels.weigh(maps.p, maps.u, maps.h, 0.25)
+    p, u, h = maps.wide("p"), maps.wide("u"), maps.wide("h")
+    assert maps.close(load, p)
+    assert maps.close(work, p * u)
+    assert maps.close(gaps, np.stack([p * u, -p * h, -0.25 * p]))
+
+
+@SHAPES
+def test_certify(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    working = np.ones(shape, dtype=np.bool_)
+    wrong, count, gaps, deepest = kernels.certify(maps.p, maps.u, maps.h, 0.25, working)
+    p, gap = maps.wide("p"), maps.wide("u") - maps.wide("h") - 0.25
+    assert np.array_equal(working, (p > 0) | (gap < 0))
+    assert maps.close(wrong, p * np.abs(gap))
+    assert count == np.count_nonzero(working)
+    assert maps.close(gaps, gap[working])
+    assert deepest == -np.inf if gap.size == 0 else abs(deepest + gap.min()) <= 4 * ROUNDING[dtype]
+
+
+@SHAPES
+def test_residual(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    kernels.residual(maps.working, maps.u, maps.h, 0.25, maps.r)
+    expected = np.where(maps.working, maps.wide("u") - maps.wide("h") - 0.25, 0.0)
+    assert np.allclose(maps.r, expected, rtol=0.0, atol=4 * ROUNDING[dtype])
+
+
+@SHAPES
+def test_products(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    """Residuals are zero outside their working set, the last one's is another set."""
+    maps = Maps(shape, dtype)
+    maps.r[~maps.working] = 0.0
+    inside = maps.working
+    sums = kernels.products(maps.working, maps.r, maps.old, maps.z, maps.t)
+    r, old, z, t = (maps.wide(name)[inside] for name in ("r", "old", "z", "t"))
+    for found, terms in zip(sums, (z, t, old, r * z, old * z, r * t), strict=True):
+        assert maps.close(found, terms)
+
+
+@SHAPES
+def test_turn(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    expected = np.where(maps.working, maps.wide("z") + 0.7 * maps.wide("t") - 0.3, 0.0)
+    kernels.turn(maps.working, maps.z, 0.7, 0.3, maps.t)
+    assert np.allclose(maps.t, expected, rtol=0.0, atol=8 * ROUNDING[dtype])
+
+
+@SHAPES
+def test_dot_and_total(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    u, t = maps.wide("u"), maps.wide("t")
+    assert maps.close(kernels.total(maps.u), u)
+    assert maps.close(kernels.dot(maps.u, maps.t), u * t)
+
+
+@SHAPES
+def test_advance(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    free = maps.wide("p") - 0.3 * maps.wide("t")
+    load, cut = kernels.advance(maps.p, maps.t, 0.3, maps.r)
+    assert np.allclose(maps.r, np.maximum(free, 0.0), rtol=0.0, atol=8 * ROUNDING[dtype])
+    assert maps.r.min(initial=0.0) >= 0.0
+    assert maps.close(load, np.maximum(free, 0.0))
+    assert maps.close(cut, np.maximum(-free, 0.0))
+    assert kernels.advance(maps.p, maps.t, 0.0, maps.r)[1] == 0.0
+    assert np.array_equal(maps.r, maps.p)
+
+
+@SHAPES
+def test_scale(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    expected = 1.7 * maps.wide("p")
+    kernels.scale(maps.p, 1.7)
+    assert np.allclose(maps.p, expected, rtol=4 * ROUNDING[dtype], atol=0.0)
+
+
+def test_sums_are_double_whatever_the_maps_are(dtype: type[np.floating]) -> None:
+    """A million equal numbers: to 1e-14, where a running sum in single precision would lose the third digit."""
+    p = np.full((1000, 1000), 0.1, dtype=dtype)
+    zero = np.zeros_like(p)
+    exact = 1e6 * float(p[0, 0])
+    for found in (kernels.total(p), kernels.weigh(p, zero, zero, 0.0)[0], kernels.advance(p, zero, 0.0, p)[0]):
+        assert abs(found / exact - 1.0) < 1e-14
+
+
+def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
+    """Although sums may be reordered; a NaN in a gap shows even where there is no pressure."""
+    for name in ("p", "u", "h"):
+        maps = Maps((5, 32), dtype)
+        getattr(maps, name)[2, 3] = np.nan
+        assert np.isnan(kernels.certify(maps.p, maps.u, maps.h, 0.0, maps.working)[0])
+        assert np.isnan(kernels.weigh(maps.p, maps.u, maps.h, 0.0)[2])
+    maps = Maps((5, 32), dtype)
+    maps.t[2, 3] = np.nan
+    load, cut = kernels.advance(maps.p, maps.t, 0.1, maps.r)
+    assert np.isnan(load)
+    assert np.isnan(cut)
+    assert np.isnan(maps.r[2, 3])
+    assert np.isnan(kernels.dot(maps.t, maps.t))
