@@ -1,0 +1,56 @@
+"""Maps between a grid and a coarser one whose cells are made of whole cells of it; collective."""
+
+import numpy as np
+
+from .slab import Array, Slab
+
+
+def factors(fine: Slab, coarse: Slab) -> tuple[int, int]:
+    """Cells of the fine grid per cell of the coarse one, along y and x."""
+    return fine.ny // coarse.ny, fine.nx // coarse.nx
+
+
+def restrict(fine: Slab, coarse: Slab, field: Array) -> Array:
+    """The means over the cells of the coarse grid."""
+    fy, fx = factors(fine, coarse)
+    rows = fetch(fine, field, [slice(fy * part.start, fy * part.stop) for part in coarse.dealt])
+    out = coarse.empty(field.dtype)
+    out[...] = rows.reshape(coarse.shape[0], fy, coarse.nx, fx).mean(axis=(1, 3))
+    return out
+
+
+def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
+    """The same value in all fine cells of a coarse one: no point gets a pressure that had none."""
+    fy, fx = factors(fine, coarse)
+    wanted = [slice(part.start // fy, -(-part.stop // fy)) if part.stop > part.start else slice(0, 0) for part in fine.dealt]
+    rows = np.repeat(np.repeat(fetch(coarse, field, wanted), fy, axis=0), fx, axis=1)
+    first = fine.rows.start - fy * (fine.rows.start // fy)
+    out[...] = rows[first : first + fine.shape[0]]
+    return out
+
+
+def fetch(slab: Slab, field: Array, wanted: list[slice]) -> Array:
+    """The rows that this rank wants of a map, `wanted` telling for every rank which those are."""
+    comm, mine = slab.comm, wanted[slab.comm.rank]
+    if comm.size == 1:
+        return field[mine]
+    out = np.empty((mine.stop - mine.start, slab.nx), field.dtype)
+    sent = [_overlap(slab.rows, theirs) for theirs in wanted]
+    got = [_overlap(mine, theirs) for theirs in slab.dealt]
+    width = slab.nx * field.itemsize
+    source = [np.ascontiguousarray(field).view(np.uint8), *_message(sent, slab.rows.start, width)]
+    target = [out.view(np.uint8), *_message(got, mine.start, width)]
+    comm.Alltoallv([source[0], (source[1], source[2]), "B"], [target[0], (target[1], target[2]), "B"])
+    slab.tally["bytes sent"] += sum(source[1]) - source[1][comm.rank]
+    return out
+
+
+def _overlap(a: slice, b: slice) -> slice:
+    start = max(a.start, b.start)
+    return slice(start, max(start, min(a.stop, b.stop)))
+
+
+def _message(parts: list[slice], origin: int, width: int) -> tuple[list[int], list[int]]:
+    """Counts and displacements in bytes."""
+    counts = [(part.stop - part.start) * width for part in parts]
+    return counts, [(part.start - origin) * width if count else 0 for part, count in zip(parts, counts, strict=True)]

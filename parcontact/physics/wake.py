@@ -1,0 +1,126 @@
+"""Operators of steady sliding, seen from the rigid surface: what it meets of the body still remembers what it left.
+
+At the velocity v a body point that is now at x was at `x + v t` a time t ago. A wave `exp(i q x)` of pressure that moves
+with the surface loads the body at the angular frequency `-q v`, so that on a periodic body
+
+    u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
+
+Around an isolated contact the wake is not periodic. There, with the creep function `J(t) = J_g + sum J_i (1 - exp(-t/l_i))`,
+the influence coefficients are Love's A(x) plus, for each term, those along the wake (all with G = 1):
+
+    K(x) = J_g A(x) + sum J_i int_0^inf exp(-t/l_i)/l_i A(x + v t) dt.
+"""
+
+import numba
+import numpy as np
+import pyfftw
+from numpy.typing import DTypeLike
+
+from ..errors import InputError
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.slab import Array, Slab
+from ..theory.viscoelastic import CreepSpectrum, Prony, complex_modulus, creep_spectrum
+from .halfspace import Convolution, love, over_cell, tabulate, wavenumbers
+
+Vector = tuple[float, float]
+GAUSS = np.polynomial.legendre.leggauss(6)
+LOCAL = 1e-4  # a creep length below this share of a cell is taken as 0: the body has crept before it has moved
+FAR = 16.0  # cells: from here on two terms of the expansion in the size of the cell are good to 1e-7
+DECAYED = 40.0  # creep lengths after which the memory is over, exp(-40)
+
+
+def modulus(fft: FFT, size: Vector, velocity: Vector, prony: Prony) -> Spectrum:
+    """G*(-q v) on the wavenumbers of a spectrum; at a Nyquist wavenumber, which has two signs, that of both together.
+
+    Lengths of `size` and `velocity` are in one unit.
+    """
+    qx, qy = wavenumbers(fft, size)
+    compliance = np.zeros(fft.shape, dtype=np.complex128)
+    at_x, at_y = (2 * np.abs(mode) == count for mode, count in zip(fft.modes, (fft.mx, fft.my), strict=True))
+    for sign_x, sign_y in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+        along_x, along_y = np.where(at_x, sign_x * qx, qx), np.where(at_y, sign_y * qy, qy)
+        compliance += 0.25 / complex_modulus(-(along_x * velocity[0] + along_y * velocity[1]), *prony)
+    return np.asarray(1.0 / compliance)
+
+
+def periodic(fft: FFT, size: Vector, poisson: float, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
+    """Pressure -> displacement under a sliding surface on a periodic body, and its inverse (as `halfspace.inverse`)."""
+    q = np.hypot(*wavenumbers(fft, size))
+    moduli = modulus(fft, size, velocity, prony) / (1.0 - poisson)
+    with np.errstate(divide="ignore"):
+        inverse = np.where(q > 0.0, 1.0 / q, 0.0)
+    forward = Convolution(fft, inverse / moduli)
+    q[q == 0.0] = 2 * np.pi / max(size)
+    return forward, Convolution(fft, q * moduli)
+
+
+def free(
+    slab: Slab, size: Vector, poisson: float, velocity: Vector, prony: Prony, dtype: DTypeLike = np.float64
+) -> Convolution:
+    """Pressure -> displacement under an isolated sliding contact; collective.
+
+    Raises InputError for a body that flows: its wake never ends.
+    """
+    creep = creep_spectrum(*prony)
+    if creep.fluidity > 0.0:
+        raise InputError("material: a body without long-term modulus leaves an endless wake; give it modulus_inf > 0")
+    fft = FFT(slab, (pyfftw.next_fast_len(2 * slab.nx), pyfftw.next_fast_len(2 * slab.ny)), dtype)
+
+    def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:
+        return wake(x, y, dx, dy, velocity, creep) * (2.0 * (1.0 - poisson))
+
+    return Convolution(fft, tabulate(fft, size, coefficient))
+
+
+def wake(x: Array, y: Array, dx: float, dy: float, velocity: Vector, creep: CreepSpectrum) -> Array:
+    """K(x, y) of the module's text for a `dx x dy` cell under unit pressure, nu = 1/2; shapes broadcast."""
+    speed = float(np.hypot(*velocity))
+    lengths = speed * creep.retardation_times
+    short = lengths <= LOCAL * min(dx, dy)
+    local = creep.glass + float(creep.compliances[short].sum())
+    near = local * love(x, y, dx, dy)
+    if np.all(short):
+        return near
+    direction = (velocity[0] / speed, velocity[1] / speed)
+    x, y = np.broadcast_arrays(x, y)
+    weights, lasting = creep.compliances[~short], lengths[~short]
+    along = np.empty(x.shape)
+    _integrate(np.ascontiguousarray(x), np.ascontiguousarray(y), dx, dy, direction, weights, lasting, *GAUSS, along)
+    return near + along
+
+
+@numba.njit(cache=True)
+def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  # type: ignore[no-untyped-def]
+    """Integral over s > 0 of `sum weights/lengths exp(-s/lengths) A(x + s direction)`, nu = 1/2.
+
+    Gauss panels no longer than what changes there: the memory at its shortest length, and later at s itself; the
+    displacement at half the distance from the cell.
+    """
+    cell = min(dx, dy)
+    shortest, end = lengths.min(), DECAYED * lengths.max()
+    for j in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            total, s = 0.0, 0.0
+            while s < end:
+                distance = np.hypot(x[j, i] + s * direction[0], y[j, i] + s * direction[1])
+                step = min(max(shortest, s), 0.25 * cell + 0.5 * distance, end - s)
+                for node, share in zip(nodes, shares):  # noqa: B905  # numba has no strict zip
+                    t = s + 0.5 * step * (1.0 + node)
+                    memory = 0.0
+                    for k in range(lengths.size):
+                        memory += weights[k] / lengths[k] * np.exp(-t / lengths[k])
+                    there = _love(x[j, i] + t * direction[0], y[j, i] + t * direction[1], dx, dy)
+                    total += 0.5 * step * share * memory * there
+                s += step
+            out[j, i] = total
+
+
+@numba.njit(cache=True)
+def _love(x, y, dx, dy):  # type: ignore[no-untyped-def]
+    """Love's displacement for nu = 1/2; far away the first two terms of its expansion in the size of the cell."""
+    r2 = x * x + y * y
+    if r2 > FAR**2 * max(dx, dy) ** 2:
+        r = np.sqrt(r2)
+        correction = (dx * dx * (3 * x * x - r2) + dy * dy * (3 * y * y - r2)) / (24 * r2 * r2)
+        return dx * dy / r * (1.0 + correction) / (4 * np.pi)
+    return over_cell(x, y, dx, dy) / (4 * np.pi)

@@ -1,0 +1,169 @@
+"""Generalized conjugate residuals on a set of points, under a given sum.
+
+Improve x on a set c, keeping its sum over c, so that `A x - h` becomes as constant on c as it can: each step adds the
+direction `t = C R K r` (R: values on c, C: subtract the mean over c) made orthogonal, in `C R A t`, to the earlier ones, and
+the step that makes the sum of squares of `r = C R (A x - h)` smallest. A need not be symmetric. (S. C. Eisenstat,
+H. C. Elman, M. H. Schultz, SIAM J. Numer. Anal. 20 (1983) 345.)
+"""
+
+import math
+
+import numpy as np
+
+from ..compiled import loop
+from ..parallel.slab import Array, Slab
+from .contact import Operator
+
+
+class Directions:
+    """Buffers for up to `count` directions t and their images A t."""
+
+    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, count: int, dtype: type) -> None:
+        self.slab, self.operator, self.preconditioner, self.count = slab, operator, preconditioner, count
+        self.t = [slab.empty(dtype) for _ in range(count)]
+        self.w = [slab.empty(dtype) for _ in range(count)]
+        self.z = slab.empty(dtype)
+        self.r = slab.empty(dtype)
+
+    def improve(self, x: Array, u: Array, h: Array, working: Array, limit: int, reduction: float) -> int:
+        """Up to `limit` steps on `working`, until the residual has fallen by `reduction`; u stays A x. Collective."""
+        members, total = self.slab.sum(*gaps_on(working, u, h))
+        if members == 0.0:
+            return 0
+        size = self.slab.sum(_residual(working, u, h, total / members, self.r))[0]
+        goal = reduction**2 * size
+        norms: list[float] = []
+        means: list[float] = []
+        for step in range(limit):
+            if size <= goal or size == 0.0:
+                return step
+            t, w = self.t[step], self.w[step]
+            self.preconditioner.apply(self.r, self.z)
+            _, mean = self.slab.sum(*_sum_on(working, self.z))
+            _spread(working, self.z, mean / members, t)
+            self.operator.apply(t, w)
+            self._orthogonalize(working, members, norms, means)
+            total, square, product = self.slab.sum(*_products(working, w, self.r))
+            means.append(total / members)
+            norms.append(square - total * means[-1])
+            if not norms[-1] > 0.0 or not math.isfinite(product):
+                return step
+            alpha = product / norms[-1]
+            size = self.slab.sum(_step(working, alpha, t, w, means[-1], x, u, self.r))[0]
+        return limit
+
+    def _orthogonalize(self, working: Array, members: float, norms: list[float], means: list[float]) -> None:
+        """Take from the newest direction what its image has in common with the earlier images, on the set."""
+        last = len(norms)
+        if last == 0:
+            return
+        w = self.w[last]
+        sums = [_common(working, w, self.w[k]) for k in range(last)]
+        total, *common = self.slab.sum(_sum_on(working, w)[1], *sums)
+        for k in range(last):
+            beta = (common[k] - total * means[k]) / norms[k]
+            _subtract(beta, self.t[k], self.t[last])
+            _subtract(beta, self.w[k], w)
+
+
+@loop
+def gaps_on(working, u, h):
+    """Points of the set, and the sum of `u - h` over it."""
+    count, total = 0.0, 0.0
+    for j in range(u.shape[0]):
+        row_count, row_total = 0.0, 0.0
+        for i in range(u.shape[1]):
+            weight = 1.0 if working[j, i] else 0.0
+            row_count += weight
+            row_total += weight * (u[j, i] - h[j, i])
+        count += row_count
+        total += row_total
+    return count, total
+
+
+@loop
+def _residual(working, u, h, mean, r):
+    """`r = u - h - mean` on the set, 0 elsewhere; returns its sum of squares."""
+    size = 0.0
+    for j in range(u.shape[0]):
+        row = 0.0
+        for i in range(u.shape[1]):
+            value = u[j, i] - h[j, i] - mean if working[j, i] else 0.0
+            r[j, i] = value
+            row += value * value
+        size += row
+    return size
+
+
+@loop
+def _sum_on(working, z):
+    count, total = 0.0, 0.0
+    for j in range(z.shape[0]):
+        row_count, row_total = 0.0, 0.0
+        for i in range(z.shape[1]):
+            weight = 1.0 if working[j, i] else 0.0
+            row_count += weight
+            row_total += weight * z[j, i]
+        count += row_count
+        total += row_total
+    return count, total
+
+
+@loop
+def _spread(working, z, mean, t):
+    """`t = z - mean` on the set, 0 elsewhere."""
+    for j in range(z.shape[0]):
+        for i in range(z.shape[1]):
+            t[j, i] = z[j, i] - mean if working[j, i] else 0.0
+
+
+@loop
+def _common(working, a, b):
+    total = 0.0
+    for j in range(a.shape[0]):
+        row = 0.0
+        for i in range(a.shape[1]):
+            row += a[j, i] * b[j, i] if working[j, i] else 0.0
+        total += row
+    return total
+
+
+@loop
+def _products(working, w, r):
+    """Over the set: sums of w, of w^2 and of w r."""
+    total, square, product = 0.0, 0.0, 0.0
+    for j in range(w.shape[0]):
+        row_total, row_square, row_product = 0.0, 0.0, 0.0
+        for i in range(w.shape[1]):
+            value = w[j, i] if working[j, i] else 0.0
+            row_total += value
+            row_square += value * value
+            row_product += value * r[j, i]
+        total += row_total
+        square += row_square
+        product += row_product
+    return total, square, product
+
+
+@loop
+def _subtract(beta, a, b):
+    """`b <- b - beta a`."""
+    for j in range(b.shape[0]):
+        for i in range(b.shape[1]):
+            b[j, i] -= beta * a[j, i]
+
+
+@loop
+def _step(working, alpha, t, w, mean, x, u, r):
+    """Advance x, u and r along t; returns the sum of squares of r."""
+    size = 0.0
+    for j in range(x.shape[0]):
+        row = 0.0
+        for i in range(x.shape[1]):
+            x[j, i] -= alpha * t[j, i]
+            u[j, i] -= alpha * w[j, i]
+            value = r[j, i] - alpha * (w[j, i] - mean) if working[j, i] else 0.0
+            r[j, i] = value
+            row += value * value
+        size += row
+    return size

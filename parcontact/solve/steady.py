@@ -1,0 +1,174 @@
+"""Contact with an operator that is not symmetric: steady sliding, seen from the rigid surface.
+
+Find p >= 0 with mean P0 and `g = A p - h - d >= 0`, `p g = 0`, where A is positive but, for a lossy body sliding at a
+constant velocity, not symmetric: there is no energy to minimize. An active set with an inexact linear solve is used:
+
+1. on the set c, with x = 0 elsewhere, a few generalized conjugate residuals towards `A x - h = d` under the load;
+2. the new set: points with `x > kappa g`, that is x > 0 where the gap is closed, and g < 0 where there is no pressure;
+3. when x and its gap look solved, the admissible pressure `p = max(x, 0)`, scaled to the load, is certified with a new
+   application of A. Only this certificate counts: an iteration that cycles may look finished.
+
+A start from coarser grids makes it cheap (`nested`); from far away it may cycle, and then it says so.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import loop
+from ..parallel.slab import Array, Slab
+from . import kernels
+from .contact import Certificate, Operator
+from .gcr import Directions, gaps_on
+
+FAR = 0.03  # a guess of the certificate above which the set is so wrong that a few linear steps do
+FEW = 4
+PATIENCE = 25  # changes of the set without coming nearer to a solution after which a solve gives up
+
+
+@dataclass(frozen=True)
+class SteadyContact:
+    """A solved (or given up) steady contact; p and `u = A p` are the solver's own maps."""
+
+    p: Array
+    u: Array
+    d: float
+    certificate: Certificate
+    sets: int
+    steps: int
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        return not self.failure
+
+
+class SteadySolver:
+    """Buffers and loop on one grid.
+
+    Parameters: `operator` A and `preconditioner` K near its inverse; `stiffness`, the pressure on a point over the
+    displacement it causes there; `height` of the surface, which gaps are compared with; `tolerance` on the certificate;
+    `max_steps` of the linear solves in all; `directions` kept in each, and the `reduction` of the residual they aim at.
+    """
+
+    def __init__(
+        self,
+        slab: Slab,
+        operator: Operator,
+        preconditioner: Operator,
+        stiffness: float,
+        height: float,
+        tolerance: float,
+        max_steps: int,
+        directions: int = 10,
+        reduction: float = 0.05,
+        dtype: type[np.floating] = np.float64,
+    ) -> None:
+        self.slab, self.operator = slab, operator
+        self.kappa = 0.1 * stiffness
+        self.height, self.tolerance, self.max_steps, self.reduction = height, tolerance, max_steps, reduction
+        self.linear = Directions(slab, operator, preconditioner, directions, dtype)
+        self.p, self.u = slab.zeros(dtype), slab.zeros(dtype)
+        self.working = np.zeros(slab.shape, dtype=np.bool_)
+
+    def solve(self, h: Array, mean: float) -> SteadyContact:
+        """Solve for heights h under the mean pressure, starting from the pressure in `self.p`; collective."""
+        x, u, slab = self.p, self.u, self.slab
+        self._begin(h, mean)
+        guess, best, since, sets, steps = np.inf, np.inf, 0, 0, 0
+        while True:
+            total, members = slab.sum(*_restrict(self.working, x))
+            _add(self.working, (mean * slab.points - total) / members, x)
+            self.operator.apply(x, u)
+            limit = FEW if guess > FAR else self.linear.count
+            steps += max(1, self.linear.improve(x, u, h, self.working, limit, self.reduction))
+            sets += 1
+            guess = self._next_set(h)
+            if guess <= self.tolerance:
+                d, certificate = self._certify(h, mean)
+                if certificate.worst <= self.tolerance:
+                    return SteadyContact(x, u, d, certificate, sets, steps, "")
+                guess = certificate.worst
+            since = 0 if guess < best else since + 1
+            best = min(best, guess)
+            if not np.isfinite(guess) or since >= PATIENCE or steps >= self.max_steps:
+                d, certificate = self._certify(h, mean)
+                return SteadyContact(x, u, d, certificate, sets, steps, self._failure(certificate, since, steps))
+
+    def _failure(self, certificate: Certificate, since: int, steps: int) -> str:
+        if certificate.worst <= self.tolerance:
+            return ""
+        reason = f"no progress in {since} sets" if since >= PATIENCE else f"not converged in {steps} linear steps"
+        return f"{reason}: certificate {certificate.worst:.3g}"
+
+    def _begin(self, h: Array, mean: float) -> None:
+        """First set: the contact of the start (everywhere if there is none) and what penetrates then."""
+        if not self.slab.sum(kernels.total(self.p))[0] > 0.0:
+            self.p.fill(mean)
+        self._certify(h, mean)
+
+    def _next_set(self, h: Array) -> float:
+        """Mark the next set; returns how far from a solution x seems to be."""
+        count, gaps = self.slab.sum(*gaps_on(self.working, self.u, h))
+        *sums, deepest = _choose(self.p, self.u, h, gaps / count, self.kappa, self.working)
+        positive, negative, wrong, members, deepest = self.slab.reduce(sums, [deepest])
+        if members == 0.0 or positive <= 0.0:
+            return np.inf
+        return max(wrong / positive / self.height, deepest / self.height, negative / positive)
+
+    def _certify(self, h: Array, mean: float) -> tuple[float, Certificate]:
+        """Make x admissible and recompute everything from it; the set is then that of this pressure."""
+        load, _ = self.slab.sum(*kernels.advance(self.p, self.p, 0.0, self.p))
+        kernels.scale(self.p, mean * self.slab.points / load)
+        self.operator.apply(self.p, self.u)
+        load, _, gaps = self.slab.sum(*kernels.weigh(self.p, self.u, h, 0.0))
+        d = gaps / load
+        *sums, deepest = kernels.certify(self.p, self.u, h, d, self.working)
+        wrong, _, _, deepest = self.slab.reduce(sums, [deepest])
+        error = abs(load / self.slab.points / mean - 1.0)
+        return d, Certificate(wrong / load / self.height, max(deepest / self.height, 0.0), error)
+
+
+@loop
+def _restrict(working, x):
+    """Put 0 outside the set; returns the sum of x and the points of the set."""
+    total, count = 0.0, 0.0
+    for j in range(x.shape[0]):
+        row_total, row_count = 0.0, 0.0
+        for i in range(x.shape[1]):
+            x[j, i] = x[j, i] if working[j, i] else 0.0
+            row_total += x[j, i]
+            row_count += 1.0 if working[j, i] else 0.0
+        total += row_total
+        count += row_count
+    return total, count
+
+
+@loop
+def _add(working, value, x):
+    for j in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            x[j, i] += value if working[j, i] else 0.0
+
+
+@loop
+def _choose(x, u, h, d, kappa, working):
+    """Mark points with `x > kappa g`; sums of x > 0, of -x < 0, of |x g|, of marked points; and max(-g)."""
+    positive, negative, wrong, count, deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
+    for j in range(x.shape[0]):
+        row_positive, row_negative, row_wrong, row_count, row_deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
+        for i in range(x.shape[1]):
+            gap = u[j, i] - h[j, i] - d
+            inside = x[j, i] > kappa * gap
+            working[j, i] = inside
+            row_positive += max(x[j, i], 0.0)
+            row_negative += max(-x[j, i], 0.0)
+            row_wrong += abs(x[j, i] * gap)
+            row_count += 1.0 if inside else 0.0
+            row_deepest = max(row_deepest, -gap)
+        positive += row_positive
+        negative += row_negative
+        wrong += row_wrong
+        count += row_count
+        deepest = max(deepest, row_deepest)
+    return positive, negative, wrong, count, deepest
