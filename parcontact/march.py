@@ -8,6 +8,7 @@ import numpy as np
 
 from .clock import Step, steps
 from .errors import RunError
+from .parallel import rows
 from .parallel.slab import Array
 from .physics import loops
 from .physics.energy import ElasticEnergy, ZenerEnergy
@@ -69,14 +70,21 @@ class March:
     # -- the parts of a step ------------------------------------------------------------------------------------------
 
     def _start(self, step: Step, alpha: float) -> None:
-        """Put the start of the next solve into the solver: the last pressure, moved with the surface and extrapolated."""
+        """Put the start of the next solve into the solver: the last pressure, moved with the surface by whole cells and
+        extrapolated."""
         if self.p_old is None:
             return
-        cells = (step.position[0] - self.position[0]) / self.scene.job.grid.dx
-        whole = math.floor(cells + 1e-6)
-        fraction = cells - whole if cells - whole > 1e-6 else 0.0
+        grid, slab, solver = self.scene.job.grid, self.scene.slab, self.scene.solver
         now, before = (1.0 + step.growth) * self.alpha / alpha, step.growth * self.alpha_old / alpha
-        loops.travel(self.p, self.p_old, now, before, whole, fraction)
+        along_x, along_y = (
+            round((new - old) / cell)
+            for new, old, cell in zip(step.position, self.position, (grid.dx, grid.dy), strict=True)
+        )
+        if along_y:
+            self.p_old, solver.w = rows.roll(slab, self.p_old, along_y, solver.w), self.p_old
+        loops.travel(self.p, self.p_old, now, before, along_x)
+        if along_y:
+            solver.p, solver.w = rows.roll(slab, self.p, along_y, solver.w), self.p
 
     def _control(self, step: Step, alpha: float, effective: Array) -> MeanPressure | Approach:
         scene, grid = self.scene, self.scene.job.grid

@@ -11,7 +11,7 @@ from .units import Units
 
 @dataclass(frozen=True)
 class Measures:
-    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; areas as a share of the nominal one."""
+    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; area as a share of the nominal."""
 
     pressure: float = 0.0
     force_x: float = 0.0

@@ -93,41 +93,31 @@ def work(p, alpha, p_old, alpha_old, du):
 
 
 @loop
-def travel(p, p_old, factor, factor_old, shift, fraction):
-    """Extrapolate a pressure that moves with the surface: `p <- max(S (factor p - factor_old S p_old), 0)`, `p_old <- p`.
+def travel(p, p_old, factor, factor_old, shift):
+    """Extrapolate a pressure that moves with the surface: `p <- max(S (factor p - factor_old S p_old), 0)`.
 
-    S moves by `shift + fraction` cells along x (cyclic), 0 <= fraction < 1, between cells linearly.
+    The former p goes into `p_old`. S moves by `shift` cells along x (cyclic). Whole cells keep the contact sharp:
+    interpolated between cells it would spread, which costs a solver more than being off by half a cell.
     """
     ny, nx = p.shape
-    moved, now = np.empty(nx, p.dtype), np.empty(nx, p.dtype)
+    start = shift % nx
+    moved = np.empty(nx, p.dtype)
     for j in range(ny):
-        _shift(p_old[j], shift, fraction, moved)
+        moved[start:] = p_old[j, : nx - start]
+        moved[:start] = p_old[j, nx - start :]
         for i in range(nx):
             p_old[j, i] = p[j, i]
-            now[i] = factor * p[j, i] - factor_old * moved[i]
-        _shift(now, shift, fraction, moved)
-        for i in range(nx):
-            p[j, i] = max(moved[i], 0.0)
-
-
-@loop
-def _shift(row, shift, fraction, out):
-    start = shift % row.size
-    out[start:] = row[: row.size - start]
-    out[:start] = row[row.size - start :]
-    if fraction > 0.0:
-        last = out[-1]
-        for i in range(row.size - 1, 0, -1):
-            out[i] += fraction * (out[i - 1] - out[i])
-        out[0] += fraction * (last - out[0])
+            moved[i] = max(factor * p[j, i] - factor_old * moved[i], 0.0)
+        p[j, start:] = moved[: nx - start]
+        p[j, :start] = moved[nx - start :]
 
 
 @loop
 def tangential(p, h, along_x, along_y, weight):
-    """Tangential forces of a pressure on a surface from their spectra: `sum weight Re(conj(p) i along h)` along x and y.
+    """Tangential forces of a pressure on a surface from their spectra: `sum weight Re(conj(p) i along h)`.
 
-    `along_x`, `along_y` are the slope symbols (the wavenumber for the exact slope), `weight` the multiplicity of a
-    column of the half spectrum.
+    Along x and y: `along_x`, `along_y` are the slope symbols (the wavenumber for the exact slope), `weight` the
+    multiplicity of a column of the half spectrum.
     """
     force_x, force_y = 0.0, 0.0
     for j in range(p.shape[0]):

@@ -9,8 +9,9 @@ A step advances `h_k <- decay_k h_k + gain_k (u_new - u)` with, for z = dt/tau_k
     exponential      decay = exp(-z),     gain = G_k (1 - exp(-z))/z    exact for u linear in time,
     backward-euler   decay = 1/(1 + z),   gain = G_k/(1 + z)            the paper's Eqs. (7)-(9), in another form,
 
-so that `A p = alpha u_new + r`, `alpha = G_inf + sum gain_k`, `r = sum decay_k h_k - (sum gain_k) u`. The contact problem
-of a step is then that of an elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, Eq. 9).
+so that `A p = alpha u_new + r`, `alpha = G_inf + sum gain_k`, `r = sum decay_k h_k - (sum gain_k) u`. The contact
+problem of a step is then that of an elastic body of modulus alpha under the effective heights `h + r/alpha` (paper,
+Eq. 9).
 """
 
 from dataclasses import dataclass
@@ -83,9 +84,13 @@ class Zener:
     def _still(self) -> tuple[Array, Array]:
         return np.ones_like(self.prony.moduli), np.zeros_like(self.prony.moduli)
 
+    def elapsed(self, dt: float) -> Array:
+        """`z = dt/tau` of each branch, at most 1e100 so that nothing overflows."""
+        return dt / np.maximum(self.prony.relaxation_times, 1e-100 * dt)
+
     def coefficients(self, dt: float) -> tuple[Array, Array]:
         """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
-        z = dt / self.prony.relaxation_times
+        z = self.elapsed(dt)
         if self.integrator == "backward-euler":
             return 1.0 / (1.0 + z), self.prony.moduli / (1.0 + z)
         phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)

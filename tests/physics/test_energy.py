@@ -1,0 +1,163 @@
+"""The energy balance of a body without space (operator 1: a map is a row of independent points)."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.energy import Balance, ElasticEnergy, ZenerEnergy, bend_weights, dissipation_weights
+from parcontact.physics.material import Heights, Zener
+from parcontact.theory.viscoelastic import Integrator, Prony, complex_modulus
+
+BODY = Prony(0.3, np.array([0.5, 2.0, 1.0]), np.array([0.05, 0.4, 1e2]))
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
+
+
+@pytest.mark.parametrize("z", [1e-12, 1e-6, 3e-3, 0.00999, 0.01001, 0.1, 1.0, 10.0, 30.0])
+def test_weights_are_integrals_over_the_step(z: float) -> None:
+    """By Gauss's rule: `h + s h'` with u growing by 1 is `exp(-x) h + (1 - exp(-x))/z G`. Ten digits; see SMALL."""
+    x, weights = 0.5 * z * (NODES + 1), 0.5 * z * WEIGHTS
+    memory, change = np.exp(-x), -np.expm1(-x) / z
+    squares = [memory**2, 2 * memory * change, change**2]
+    assert_allclose(dissipation_weights(np.array(z)), [weights @ square for square in squares], rtol=2e-10)
+    ends = [0.5 * (1 + np.exp(-z)), -0.5 * np.expm1(-z) / z]
+    means = [weights @ memory / z, weights @ change / z]
+    assert_allclose(bend_weights(np.array(z)), np.subtract(means, ends), rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("z", [0.0, 1e-300, 1e100])
+def test_weights_at_the_ends_are_finite(z: float) -> None:
+    first, second, third = dissipation_weights(np.array(z))
+    assert_allclose([first, second, third], [0.5, 1 / z, 1 / z] if z > 1 else [z, z, z / 3], rtol=1e-15)
+    assert_allclose(bend_weights(np.array(z)), [-0.5, 0.5 / z] if z > 1 else [0.0, z / 12], rtol=1e-15)
+
+
+class Driven:
+    """Four points of a body whose displacements are prescribed, and its energy."""
+
+    def __init__(self, integrator: Integrator) -> None:
+        slab = Slab(MPI.COMM_SELF, 4, 1)
+        self.zener = Zener(slab, BODY, integrator)
+        self.energy = ZenerEnergy(slab, self.zener, lambda p, dt, du: du)
+        self.p, self.alpha = slab.zeros(), 1.0
+
+    def to(self, u: Array, dt: float) -> Balance:
+        heights = Heights(u.reshape(1, 4))
+        alpha, effective = self.zener.begin(dt, heights)
+        p = effective.copy()
+        self.zener.commit(p, heights)
+        self.energy.advance(dt, p, alpha, self.p, self.alpha)
+        self.p, self.alpha = p, alpha
+        return self.energy.balance
+
+    def stored(self) -> float:
+        """From the maps themselves."""
+        self.zener.settle()
+        branches = sum(np.sum(h**2) / modulus for h, modulus in zip(self.zener.branches, BODY.moduli, strict=True))
+        return float(0.5 * (BODY.modulus_inf * np.sum(self.zener.u**2) + branches))
+
+
+def motion(t: float) -> Array:
+    return np.array([1.0, 0.5, -2.0, 0.0]) * np.sin(3.0 * t) + np.array([0.0, t, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
+def test_stored_energy_is_that_of_the_maps(integrator: Integrator) -> None:
+    """After jumps and 200 uneven steps, to the rounding of the sums."""
+    driven, t = Driven(integrator), 0.0
+    for n in range(200):
+        dt = 0.0 if n % 50 == 0 else 1e-3 * 1.03 ** (n % 70)
+        t += dt or 0.1
+        balance = driven.to(motion(t), dt)
+        if n % 40 == 0:
+            assert_allclose(balance.stored, driven.stored(), rtol=1e-12)
+
+
+def test_exponential_balance_closes() -> None:
+    """Work is of pressures, stored and dissipated energies are of branches; equal but for the rounding of 300 steps."""
+    driven, t = Driven("exponential"), 0.0
+    for n in range(300):
+        dt = 0.0 if n % 60 == 0 else 10.0 ** (-5 + n % 7)
+        t += dt or 0.1
+        balance = driven.to(motion(t), dt)
+        assert np.all(balance.dissipated >= 0.0)
+    assert_allclose(balance.stored + balance.dissipated.sum(), balance.work, rtol=1e-12)
+
+
+def test_work_on_a_ramp_is_exact() -> None:
+    """Against the integral of `int_0^t G ds dt` for u = t from rest, whatever the steps; rounding."""
+    driven, t = Driven("exponential"), 0.0
+    for dt in (1e-4, 1e-2, 3.0, 0.5):
+        t += dt
+        balance = driven.to(np.full(4, t), dt)
+    moduli, times = BODY.moduli, BODY.relaxation_times
+    exact = 0.5 * BODY.modulus_inf * t**2 + moduli @ (times * (t + times * np.expm1(-t / times)))
+    assert_allclose(balance.work, 4 * exact, rtol=1e-13)
+
+
+def test_holding_dissipates_what_has_been_stored() -> None:
+    """After a jump each branch loses `G (1 - exp(-2 t/tau))/2` in any number of steps; the work is done at once."""
+    driven = Driven("exponential")
+    jumped = driven.to(np.ones(4), 0.0)
+    assert_allclose(jumped.work, 2 * (BODY.modulus_inf + BODY.moduli.sum()), rtol=1e-15)
+    assert np.all(jumped.dissipated == 0.0)
+    work = jumped.work
+    for dt in (1e-4, 1e-2, 2.0):
+        balance = driven.to(np.ones(4), dt)
+    lost = -2 * BODY.moduli * np.expm1(-2 * 2.0101 / BODY.relaxation_times)
+    assert_allclose(balance.dissipated, lost, rtol=1e-14)
+    assert balance.work == work
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+def test_dissipation_of_each_branch_converges(integrator: Integrator, order: float) -> None:
+    """Sixth period of a sine: branch k loses `pi G'' per period; orders within 5 %."""
+    omega = 4.0
+    alone = [complex_modulus(omega, 0.0, *branch) for branch in zip(BODY.moduli, BODY.relaxation_times, strict=True)]
+    exact = 4 * np.pi * np.imag(alone)[:2]  # of four points
+
+    def errors(count: int) -> Array:
+        driven, dt = Driven(integrator), 2 * np.pi / omega / count
+        lost: Array = np.zeros(3)
+        for n in range(1, 6 * count + 1):
+            if n == 5 * count + 1:
+                lost = driven.energy.balance.dissipated.copy()
+            driven.to(np.full(4, np.sin(n * dt * omega)), dt)
+        return np.abs((driven.energy.balance.dissipated - lost)[:2] / exact - 1.0)  # the third has not settled
+
+    coarse, fine = errors(160), errors(320)
+    assert fine.max() < 0.03
+    assert_allclose(np.log2(coarse / fine), order, rtol=0.05)
+
+
+def test_backward_euler_balance_closes_to_first_order() -> None:
+    """On a ramp; the order within 5 %."""
+
+    def gap(count: int) -> float:
+        driven, dt = Driven("backward-euler"), 5.0 / count
+        for n in range(1, count + 1):
+            balance = driven.to(np.full(4, n * dt), dt)
+        return float(abs(balance.work - balance.stored - balance.dissipated.sum()) / balance.work)
+
+    gaps = [gap(count) for count in (400, 800, 1600)]
+    assert gaps[-1] < 0.01
+    assert_allclose(np.log2(np.array(gaps[:-1]) / gaps[1:]), 1.0, rtol=0.05)
+
+
+@pytest.mark.mpi
+def test_sums_go_over_all_ranks(comm: MPI.Intracomm) -> None:
+    """Three rows on any number of ranks; the numbers are small and exact."""
+    slab = Slab(comm, 4, 3)
+    p, u = slab.zeros(), slab.zeros()
+    p += 2.0
+    u += 3.0
+    elastic = ElasticEnergy(slab)
+    elastic.advance(p, 0.5, u)
+    assert elastic.balance.work == elastic.balance.stored == 0.5 * 0.5 * 6.0 * 12
+    zener = Zener(slab, BODY, "exponential")
+    energy = ZenerEnergy(slab, zener, lambda p, dt, du: du)
+    alpha, effective = zener.begin(0.0, Heights(u))
+    zener.commit(effective.copy(), Heights(u))
+    energy.advance(0.0, effective, alpha, None, 0.0)
+    assert_allclose(energy.balance.stored, 0.5 * 12 * 9 * (BODY.modulus_inf + BODY.moduli.sum()), rtol=1e-14)

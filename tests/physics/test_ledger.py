@@ -1,0 +1,106 @@
+"""Measures of maps that are known: SI values from a run's own units."""
+
+import math
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.ledger import Ledger, Measures
+from parcontact.physics.shapes import Round
+from parcontact.physics.surface import Surface, single_wave
+from parcontact.physics.units import Units
+
+pytestmark = pytest.mark.mpi
+
+LX, LY, NX, NY = 2e-3, 1e-3, 16, 8
+HEIGHT, ALPHA = 3e-6, 0.7
+UNITS = Units.near(2 * HEIGHT, LX, 1e6)
+PRESSURE = ALPHA * UNITS.pressure  # Pa that the number 1 in a map stands for
+
+
+def wave(comm: MPI.Intracomm, waves: tuple[int, int], differences: bool = False) -> Surface:
+    fft = FFT(Slab(comm, NX, NY))
+    surface = Surface(fft.slab, fft, (LX, LY), single_wave(fft, HEIGHT, waves, 0.0), differences=differences)
+    surface.rescale(UNITS.height)
+    return surface
+
+
+def angle(slab: Slab, waves: tuple[int, int]) -> np.ndarray:
+    x, y = np.arange(NX) / NX, np.arange(NY)[slab.rows, None] / NY
+    return 2 * np.pi * (waves[0] * x + waves[1] * y)
+
+
+@pytest.mark.parametrize("waves", [(3, 0), (0, 2), (3, 2), (-3, 2)])
+@pytest.mark.parametrize("cells", [(0.0, 0.0), (2.0, 0.0), (0.3, -1.7)])
+def test_pressure_ahead_of_a_wave(comm: MPI.Intracomm, waves: tuple[int, int], cells: tuple[float, float]) -> None:
+    """p = p0 + p1 cos(phase + lead) on h = H cos(phase) is drawn by `-p1 H q sin(lead)/2` per area; rounding."""
+    surface = wave(comm, waves)
+    slab, lead, p0, p1 = surface.slab, 0.6, 5.0, 2.0
+    moved = 2 * np.pi * (waves[0] * cells[0] / NX + waves[1] * cells[1] / NY)
+    shift = cells[0] * LX / NX, cells[1] * LY / NY
+    p, h, d = slab.empty(), surface.heights(shift, slab.empty()), 0.25
+    p[...] = p0 + p1 * np.cos(angle(slab, waves) - moved - lead)
+    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, h + d, h, d, shift)
+    q = 2 * np.pi * np.array([waves[0] / LX, waves[1] / LY])
+    force = -0.5 * p1 * PRESSURE * HEIGHT * math.sin(lead) * q * LX * LY
+    assert_allclose([found.force_x, found.force_y], force, rtol=1e-12, atol=1e-13 * np.abs(force).max())
+    assert_allclose(found.pressure, p0 * PRESSURE, rtol=1e-14)
+    assert_allclose(found.friction, math.hypot(*force) / (p0 * PRESSURE * LX * LY), rtol=1e-12)
+    assert_allclose(found.max_pressure, slab.reduce((), [p.max(initial=0.0)])[0] * PRESSURE, rtol=1e-14)
+    assert (found.contact_area, found.approach) == (1.0, d * UNITS.height)
+    assert_allclose(found.mean_gap, 0.0, atol=1e-14 * UNITS.height)
+
+
+def test_central_differences(comm: MPI.Intracomm) -> None:
+    """They make a slope, and so the force, sin(q dx)/(q dx) of what it is; rounding."""
+    surface, exact = wave(comm, (3, 0), differences=True), wave(comm, (3, 0))
+    slab = surface.slab
+    p, u = slab.empty(), slab.zeros()
+    p[...] = 2.0 + np.sin(angle(slab, (3, 0)))
+    forces = [Ledger(slab, kind, UNITS).measures(p, ALPHA, u, u, 0.0, (0.0, 0.0)).force_x for kind in (surface, exact)]
+    step = 2 * np.pi * 3 / NX
+    assert_allclose(forces[0] / forces[1], math.sin(step) / step, rtol=1e-12)
+
+
+def test_partial_contact(comm: MPI.Intracomm) -> None:
+    """Some points carry load; the gap counts everywhere."""
+    surface = wave(comm, (1, 0))
+    slab = surface.slab
+    p, u, h = slab.zeros(), slab.zeros(), slab.zeros()
+    p[:, :4] = 1.5
+    u += 0.5
+    h -= 0.25
+    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, u, h, -0.125, (0.0, 0.0))
+    assert found.contact_area == 0.25
+    assert_allclose(found.pressure, 0.25 * 1.5 * PRESSURE, rtol=1e-15)
+    assert_allclose(found.mean_gap, 0.875 * UNITS.height, rtol=1e-15)
+    assert_allclose(found.max_pressure, 1.5 * PRESSURE, rtol=1e-15)
+
+
+def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
+    """One loaded point on the flank of a paraboloid: p dA times its slope -x/R; rounding."""
+    slab = Slab(comm, NX, NY)
+    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (LX / 2, LY / 2))], periodic=False)
+    surface.rescale(UNITS.height)
+    p, u = slab.zeros(), slab.zeros()
+    for row in range(NY)[slab.rows]:
+        if row == NY // 2:
+            p[row - slab.rows.start, NX // 2 + 2] = 3.0
+    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, u, u, 0.0, (LX / NX, 0.0))
+    distance = LX / NX  # two cells from where the centre was, which has moved by one
+    assert_allclose(found.force_x, 3.0 * PRESSURE * (LX / NX) * (LY / NY) * (-distance / 1e-2), rtol=1e-13)
+    assert_allclose(found.friction, distance / 1e-2, rtol=1e-13)
+    assert found.force_y == 0.0
+
+
+def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:
+    surface = wave(comm, (1, 0))
+    none = surface.slab.zeros()
+    h = surface.heights((0.0, 0.0), surface.slab.empty())
+    found = Ledger(surface.slab, surface, UNITS).measures(none, ALPHA, none, h, -1.0, (0.0, 0.0))
+    assert found == Measures(approach=-UNITS.height, mean_gap=found.mean_gap)
+    assert_allclose(found.mean_gap, UNITS.height, rtol=1e-14)  # the wave has no mean

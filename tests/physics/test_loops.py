@@ -1,0 +1,114 @@
+"""Compiled loops against the same in numpy; sums and maps of some ten digits, so rounding only."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from parcontact.physics import loops
+
+NY, NX = 5, 7
+OFFSETS = [0, 1, 3, NX - 1, NX, 2 * NX + 2, -1, -NX - 3]
+MAPS = [(NY, NX), (1, 1), (0, NX)]
+
+
+def maps(count: int, shape: tuple[int, int] = (NY, NX)) -> list[np.ndarray]:
+    return list(np.random.default_rng(count).normal(size=(count, *shape)))
+
+
+def roll(field: np.ndarray, offset: int) -> np.ndarray:
+    return np.roll(field, offset, axis=1)
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+def test_roll(offset: int) -> None:
+    source, target = maps(2)
+    loops.roll(source, offset, target)
+    assert_array_equal(target, roll(source, offset))
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_begin(offset: int, count: int) -> None:
+    work, u, heights, *rest = maps(3 + count)
+    branches = np.array(rest).reshape(count, NY, NX)
+    decay, gain, weight = np.random.default_rng(1).uniform(size=(3, count))
+    advanced = decay[:, None, None] * branches + gain[:, None, None] * work
+    effective = roll(heights, offset) + np.tensordot(weight, advanced, 1) - 0.7 * u
+    loops.begin(branches, decay, gain, work, weight, 0.7, u, heights, offset)
+    assert_allclose(branches, advanced, rtol=1e-14, atol=1e-15)
+    assert_allclose(work, effective, rtol=1e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("offset", OFFSETS)
+def test_commit(offset: int) -> None:
+    displacement, work, u, heights = maps(4)
+    expected = displacement - work + roll(heights, offset)
+    increment = expected - u
+    loops.commit(displacement, work, u, heights, offset)
+    assert_allclose(u, expected, rtol=1e-14, atol=1e-14)
+    assert_allclose(work, increment, rtol=1e-14, atol=1e-14)
+
+
+def test_commit_on_its_own_map() -> None:
+    """Heights may be the displacement itself."""
+    displacement, work, u = maps(3)
+    expected = displacement - work + u
+    loops.commit(displacement, work, u, u, 0)
+    assert_allclose(u, expected, rtol=1e-14, atol=1e-14)
+    assert_allclose(work, displacement - maps(3)[1], rtol=1e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", MAPS)
+def test_measure(shape: tuple[int, int]) -> None:
+    p, u, h = maps(3, shape)
+    p = np.maximum(p, 0.0)
+    found = loops.measure(p, u, h)
+    assert_allclose(found, [p.sum(), np.count_nonzero(p), (u - h).sum(), p.max(initial=0.0)], rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("shape", MAPS)
+def test_products(shape: tuple[int, int]) -> None:
+    a, b, c = maps(3, shape)
+    assert_allclose(loops.dot(a, b), (a * b).sum(), rtol=1e-13, atol=1e-13)
+    assert_allclose(loops.work(a, 2.0, b, 3.0, c), ((a + 1.5 * b) * c).sum(), rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("shift", OFFSETS)
+def test_travel(shift: int) -> None:
+    """A pressure that grows evenly while it moves goes on so; where it would become negative it is 0."""
+    p, slope = np.maximum(maps(2), 0.0)
+    earlier, now, next_ = (roll(np.maximum(p + n * slope, 0.0), n * shift) for n in range(3))
+    expected_old = now.copy()
+    loops.travel(now, earlier, 2.0, 1.0, shift)
+    assert_allclose(now, next_, rtol=1e-14, atol=1e-14)
+    assert_array_equal(earlier, expected_old)
+    loops.travel(now, earlier, 1.0, 1e3, shift)
+    assert now.min() == 0.0
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_maps_of_either_precision(dtype: type[np.floating]) -> None:
+    p, p_old = (np.maximum(field, 0.0).astype(dtype) for field in maps(2))
+    expected = roll(np.maximum(2.0 * p - roll(p_old, 2), 0.0), 2)
+    loops.travel(p, p_old, 2.0, 1.0, 2)
+    assert p.dtype == dtype
+    assert_allclose(p, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_tangential() -> None:
+    """The sum over the half spectrum is the sum of pressure times slope over the map."""
+    p, h = maps(2, (6, 8))
+    qx, qy = 2 * np.pi * np.fft.rfftfreq(8), 2 * np.pi * np.fft.fftfreq(6)
+    qx[-1] = qy[3] = 0.0  # at the Nyquist wavenumber the slope is 0 on the grid
+    weight = np.array([1.0, 2.0, 2.0, 2.0, 1.0])
+    slopes = [np.fft.irfft2(1j * q * np.fft.rfft2(h), s=(6, 8)) for q in (qx[None, :], qy[:, None])]
+    found = loops.tangential(np.fft.rfft2(p), np.fft.rfft2(h), qx, qy, weight)
+    assert_allclose(np.array(found) / h.size, [(p * slope).sum() for slope in slopes], rtol=1e-12)
+
+
+def test_displace() -> None:
+    h = np.fft.rfft2(maps(1, (6, 8))[0])
+    along_x, along_y = np.exp(1j * np.arange(5)), np.exp(-2j * np.arange(6))
+    out = np.empty_like(h)
+    loops.displace(h, along_x, along_y, out)
+    assert_allclose(out, along_x * along_y[:, None] * h, rtol=1e-14)

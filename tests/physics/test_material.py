@@ -1,0 +1,236 @@
+"""The body without space: with the operator 1 a map is a row of independent points."""
+
+from decimal import Decimal, localcontext
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.slab import Slab
+from parcontact.physics.material import Elastic, Heights, Zener
+from parcontact.theory.viscoelastic import Integrator, Prony, creep, normal_form, relaxation, zener_to_prony
+
+POINT = Slab(MPI.COMM_SELF, 1, 1)
+MICRON = 1e-6
+# two Zener branches beside a spring of 0.5 MPa, and the time step of the printed numbers
+BRANCHES = ([2e6, 1e6], [1e6, 0.0], [3e3, 1e4])
+TWO = zener_to_prony(*BRANCHES, 0.5e6)
+DT = 0.5e-3
+INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
+
+
+def body(prony: Prony, integrator: Integrator = "exponential") -> Zener:
+    return Zener(POINT, normal_form(*prony), integrator)
+
+
+def push(body: Zener, u: float, dt: float) -> float:
+    """Prescribe the displacement of a point; returns its total pressure."""
+    heights = Heights(np.full((1, 1), u))
+    alpha, effective = body.begin(dt, heights)
+    displacement = effective.copy()
+    body.commit(displacement, heights)
+    return float(alpha * displacement[0, 0])
+
+
+def load(body: Zener, p: float, dt: float) -> float:
+    """Prescribe the total pressure of a point; returns its displacement."""
+    heights = Heights(np.zeros((1, 1)))
+    alpha, _ = body.begin(dt, heights)
+    body.commit(np.full((1, 1), p / alpha), heights)
+    return float(body.u[0, 0])
+
+
+def branch(body: Zener, k: int) -> float:
+    """The part of branch k of the pressure."""
+    body.settle()
+    return float(body.branches[k, 0, 0])
+
+
+# -- printed numbers, to their twelve digits ------------------------------------------------------------------------
+
+
+def test_coefficients_of_eq_8() -> None:
+    """alpha, beta and gamma of Eq. (8), printed to 1e-9 of their size."""
+    made = body(TWO, "backward-euler")
+    alpha, _ = made.begin(DT, Heights(np.zeros((1, 1))))
+    decay, gain = made.coefficients(DT)
+    g0, g1, eta1 = (np.array(values) for values in BRANCHES)
+    both = g0 + g1
+    kelvin = 1 + g1 / g0 + eta1 / (g0 * DT)
+    assert_allclose(alpha, 3007936.507936508, rtol=1e-15)
+    assert_allclose(alpha, 0.5e6 + np.sum((g1 + eta1 / DT) / kelvin), rtol=1e-15)
+    assert_allclose(np.sum(eta1 / DT / kelvin), 2285714.285714286, rtol=1e-15)
+    assert_allclose(decay, [2 / 3, 0.9523809523809523], rtol=1e-15)
+    assert_allclose(decay, eta1 / (g0 * DT) / kelvin, rtol=1e-15)
+    assert_allclose(gain, g0**2 / both * decay, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "pressures"),
+    [
+        ("backward-euler", [3.00793650794, 5.67422524565, 8.09979123925, 10.3525348663, 12.4783106898]),
+        ("exponential", [3.19132975075, 5.92223979616, 8.35749337777, 10.5978241831, 12.7050910089]),
+    ],
+)
+def test_steps_of_one_micron(integrator: Integrator, pressures: list[float]) -> None:
+    made = body(TWO, integrator)
+    assert_allclose([push(made, n * MICRON, DT) for n in range(1, 6)], pressures, rtol=1e-11)
+
+
+def test_part_of_one_branch() -> None:
+    """The pressure of the paper's branch is the long-term part of it and what still relaxes."""
+    made = body(TWO, "backward-euler")
+    long_term, parts = 2e6 * 1e6 / 3e6, []
+    for n in range(1, 6):
+        push(made, n * MICRON, DT)
+        parts.append(long_term * n * MICRON + branch(made, 0))
+    assert_allclose(parts, [1.55555555556, 2.81481481481, 3.87654320988, 4.80658436214, 5.6488340192], rtol=1e-11)
+
+
+def test_unit_load_from_rest() -> None:
+    made = body(TWO, "backward-euler")
+    printed = [3.32453825858e-7, 3.70214632313e-7, 4.01109597129e-7, 4.26741965876e-7, 4.48328593833e-7]
+    assert_allclose([load(made, 1.0, DT) for _ in printed], printed, rtol=1e-11)
+
+
+def test_exponential_steps_are_exact_on_a_ramp() -> None:
+    """Against the integral of G; rounding grows with the number of steps."""
+    made, dts = body(TWO), [1e-9, 3e-4, 3e-4, 2e-2, 1e-6, 5.0]
+    ends = np.cumsum(dts)
+    moduli, times = TWO.moduli, TWO.relaxation_times
+    exact = TWO.modulus_inf * ends - np.expm1(-ends[:, None] / times) @ (moduli * times)
+    assert_allclose([push(made, t, dt) for t, dt in zip(ends, dts, strict=True)], exact, rtol=1e-14)
+
+
+# -- jumps ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_jump_meets_the_instantaneous_modulus(integrator: Integrator) -> None:
+    made = body(TWO, integrator)
+    before = push(made, 1.0, 1e-3)
+    instant = TWO.modulus_inf + TWO.moduli.sum()
+    assert_allclose(push(made, 3.0, 0.0) - before, 2.0 * instant, rtol=1e-15)
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+@pytest.mark.parametrize("again", [False, True])
+def test_order_of_creep_after_jumps(integrator: Integrator, order: float, again: bool) -> None:
+    """Largest error over 4 ms of creep under a load from t = 0 on, and another one from 2 ms on; orders within 3 %."""
+
+    def error(count: int) -> float:
+        made, dt, errors = body(TWO, integrator), 4e-3 / count, []
+        load(made, 1.0, 0.0)
+        for n in range(1, count + 1):
+            added = 1.0 if again and 2 * n > count else 0.0
+            u = load(made, 1.0 + added, dt)
+            t = n * dt
+            exact = creep(t, *TWO) + (added and creep(t - 2e-3, *TWO))
+            errors.append(abs(u - exact) / creep(4e-3, *TWO))
+            if again and 2 * n == count:
+                load(made, 2.0, 0.0)
+        return float(np.max(errors))
+
+    errors = [error(count) for count in (64, 128, 256)]
+    orders = np.log2(errors[:-1]) - np.log2(errors[1:])
+    assert_allclose(orders, order, rtol=0.03)
+
+
+# -- limits -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("z", [1e-300, 1e-15, 1e-13, 1e-6, 1.0, 1e6, 1e12, 1e300])
+def test_coefficients_at_extreme_steps(integrator: Integrator, z: float) -> None:
+    """Against the formulas in 700 digits; a few units in the last of 16. Steps beyond 1e100 count as 1e100."""
+    made = body(Prony(1.0, np.array([2.0]), np.array([1.0])), integrator)
+    with localcontext(prec=700):
+        exact = min(Decimal(z), Decimal(10) ** 100)
+        decay = (-exact).exp() if integrator == "exponential" else 1 / (1 + exact)
+        gain = 2 * (1 - decay) / exact if integrator == "exponential" else 2 * decay
+    assert_allclose(np.ravel(made.coefficients(z)), [float(decay), float(gain)], rtol=1e-15)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(("z", "modulus"), [(1e-6, 3.0), (1e-15, 3.0), (1e9, 1.0), (1e300, 1.0)])
+def test_very_short_and_very_long_steps_are_elastic(integrator: Integrator, z: float, modulus: float) -> None:
+    """Glassy to about z, rubbery to about 1/z."""
+    made = body(Prony(1.0, np.array([2.0]), np.array([1.0])), integrator)
+    assert_allclose(push(made, 1.0, z), modulus, rtol=3e-6)
+
+
+def test_times_over_eleven_decades() -> None:
+    """After a jump the steps follow the relaxation function, however long they are; rounding."""
+    prony = Prony(1e6, np.full(12, 1e6), 5 * np.logspace(-9, 2, 12))
+    made = body(prony)
+    push(made, 1.0, 0.0)
+    for t, dt in ((1e-7, 1e-7), (1e-4, 1e-4 - 1e-7), (10.0, 10.0 - 1e-4)):
+        assert_allclose(push(made, 1.0, dt), relaxation(t, *prony), rtol=1e-14)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_branches_without_a_part(integrator: Integrator) -> None:
+    """G1 = 0 is a Maxwell branch, eta1 = 0 leaves two springs in series, eta1 = inf the spring G0; rounding."""
+    odd = zener_to_prony([2e6, 3e6, 4e6], [0.0, 1e6, 1e6], [2e3, 0.0, np.inf], 1e5)
+    plain = Prony(1e5 + 3e6 * 1e6 / 4e6 + 4e6, np.array([2e6]), np.array([1e-3]))
+    first, second = body(odd, integrator), body(plain, integrator)
+    assert first.branches.shape == (1, 1, 1)
+    for n, dt in enumerate([0.0, 1e-4, 1e-3, 1.0]):
+        assert_allclose(push(first, n + 1.0, dt), push(second, n + 1.0, dt), rtol=1e-15)
+
+
+# -- what it does with maps -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
+    """A map and an offset stand for the moved map; rounding of heights of size 1."""
+    slab, rng = Slab(MPI.COMM_SELF, 6, 4), np.random.default_rng(1)
+    base, prony = rng.normal(size=slab.shape), normal_form(*TWO)
+    first, second = Zener(slab, prony, integrator), Zener(slab, prony, integrator)
+    for offset, dt in ((0, 0.0), (1, 1e-3), (5, 1e-3), (7, 2e-3), (-1, 1e-4)):
+        here = Heights(np.roll(base, offset, axis=1))
+        alpha, effective = first.begin(dt, here)
+        same_alpha, same = second.begin(dt, Heights(base, offset))
+        assert alpha == same_alpha
+        assert_allclose(same, effective, rtol=0, atol=1e-15)
+        displacement = effective + rng.uniform(size=slab.shape)
+        first.commit(displacement, here)
+        second.commit(displacement, Heights(base, offset))
+        assert_allclose(second.u, first.u, rtol=0, atol=1e-14)
+
+
+def test_elastic_heights() -> None:
+    slab = Slab(MPI.COMM_SELF, 5, 2)
+    base, made = np.arange(10.0).reshape(2, 5), Elastic(slab, 3.0)
+    assert made.begin(0.0, Heights(base))[1] is base
+    modulus, moved = made.begin(1.0, Heights(base, 2))
+    assert modulus == 3.0
+    np.testing.assert_array_equal(moved, np.roll(base, 2, axis=1))
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_beginning_again_with_another_step(integrator: Integrator) -> None:
+    """Only the last `begin` before a `commit` counts, to the last digits of the branch maps."""
+    first, second = body(TWO, integrator), body(TWO, integrator)
+    for made in (first, second):
+        push(made, 1.0, 1e-3)
+    heights = Heights(np.full((1, 1), 2.0))
+    second.begin(5e-3, heights)
+    second.begin(0.0, heights)
+    assert_allclose(push(second, 2.0, 1e-3), push(first, 2.0, 1e-3), rtol=1e-15)
+
+
+def test_state_restores_the_same_digits() -> None:
+    first, second = body(TWO), body(TWO)
+    push(first, 1.0, 1e-3)
+    second.restore({name: value.copy() for name, value in first.state().items()})
+    assert push(first, 2.0, 1e-4) == push(second, 2.0, 1e-4)
+
+
+def test_memory_is_one_map_per_branch_and_two() -> None:
+    """The last displacement, and the buffer in which effective heights and increments take turns."""
+    slab = Slab(MPI.COMM_SELF, 32, 16)
+    Zener(slab, normal_form(*TWO), "exponential")
+    assert slab.tally["map bytes"] == (2 + 2) * 32 * 16 * 8
