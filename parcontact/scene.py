@@ -28,49 +28,89 @@ WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of wh
 
 
 @dataclass
-class Scene:
-    """Everything a march needs."""
+class Frame:
+    """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
+
+    `height` [m] is that of the surface from its lowest to its highest point (a cell's length if it is flat); `size` and
+    `prony` are the box and the relaxation function in the run's units (and seconds).
+    """
 
     job: Job
     slab: Slab
-    units: Units
+    fft: FFT
     surface: Surface
+    roughness: Moments | None
+    height: float
+    units: Units
+    prony: Prony
+
+    @property
+    def size(self) -> tuple[float, float]:
+        return self.job.grid.lx / self.units.length, self.job.grid.ly / self.units.length
+
+    @property
+    def dtype(self) -> type[np.floating]:
+        return np.float32 if self.job.numerics.precision == "single" else np.float64
+
+
+@dataclass
+class Scene:
+    """Everything a march needs."""
+
+    frame: Frame
     path: Path
     material: Elastic | Zener
     solver: ContactSolver
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
-    roughness: Moments | None
-    slides: bool
     lasts: bool
+
+    @property
+    def job(self) -> Job:
+        return self.frame.job
+
+    @property
+    def slab(self) -> Slab:
+        return self.frame.slab
+
+    @property
+    def units(self) -> Units:
+        return self.frame.units
+
+
+def frame(job: Job, slab: Slab) -> Frame:
+    """The surface of a job and what it is measured in; collective. Raises InputError for files that do not fit."""
+    dtype = np.float32 if job.numerics.precision == "single" else np.float64
+    fft = FFT(slab, dtype=dtype)
+    surface = _surface(job, fft)
+    roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
+    prony = relaxation_of(job)
+    height = _height(surface)
+    units = Units.near(height, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
+    surface.rescale(units.height)
+    scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
+    return Frame(job, slab, fft, surface, roughness, height or job.grid.dx, units, scaled)
 
 
 def build(job: Job, slab: Slab) -> Scene:
     """Make a job's scene on the ranks of `slab`; collective. Raises InputError for surface files that do not fit."""
-    grid, numerics = job.grid, job.numerics
-    dtype = np.float32 if numerics.precision == "single" else np.float64
-    fft = FFT(slab, dtype=dtype)
-    surface = _surface(job, fft)
-    roughness = moments(surface.waves, fft, grid.size) if surface.waves is not None else None
-    prony = relaxation_of(job)
-    height = _height(surface)
-    units = Units.near(height, grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
-    surface.rescale(units.height)
-    timeline = tuple(steps(job.history, grid))
-    path: Path = WholeCells(surface, dtype) if _by_whole_cells(job, timeline) else AnyFraction(surface, dtype)
-    material = _material(slab, prony, units, numerics.integrator, dtype)
-    size = (grid.lx / units.length, grid.ly / units.length)
-    operator = _operator(job, slab, fft, size)
-    preconditioner = _preconditioner(job, slab, fft, size)
-    tolerance, limit = numerics.tolerance, numerics.max_iterations
+    base = frame(job, slab)
+    timeline = tuple(steps(job.history, job.grid))
+    way = WholeCells if _by_whole_cells(job, timeline) else AnyFraction
+    path: Path = way(base.surface, base.dtype)
+    material = _material(base)
     solver = ContactSolver(
-        slab, operator, preconditioner, (height or grid.dx) / units.height, tolerance, limit, dtype
+        slab,
+        _operator(base),
+        _preconditioner(base),
+        base.height / base.units.height,
+        job.numerics.tolerance,
+        job.numerics.max_iterations,
+        base.dtype,
     )
     energy = _energy(job, solver, material) if job.output.energy else None
-    slides = any(step.position != (0.0, 0.0) for step in timeline)
     lasts = any(not step.jump for step in timeline)
-    ledger = Ledger(slab, surface, units)
-    return Scene(job, slab, units, surface, path, material, solver, ledger, energy, roughness, slides, lasts)
+    return Scene(base, path, material, solver, Ledger(slab, base.surface, base.units), energy, lasts)
 
 
 def relaxation_of(job: Job) -> Prony:
@@ -142,25 +182,24 @@ def _height(surface: Surface) -> float:
     return sum(surface.slab.reduce((), [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]))
 
 
-def _material(slab: Slab, prony: Prony, units: Units, integrator: str, dtype: type[np.floating]) -> Elastic | Zener:
-    scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    if scaled.moduli.size == 0:
-        return Elastic(slab, scaled.modulus_inf)
-    return Zener(slab, scaled, integrator, dtype)
+def _material(base: Frame) -> Elastic | Zener:
+    if base.prony.moduli.size == 0:
+        return Elastic(base.slab, base.prony.modulus_inf)
+    return Zener(base.slab, base.prony, base.job.numerics.integrator, base.dtype)
 
 
-def _operator(job: Job, slab: Slab, fft: FFT, size: tuple[float, float]) -> halfspace.Convolution:
-    if job.grid.boundary == "free":
-        return halfspace.free(slab, size, job.material.poisson, fft.dtype)
-    return halfspace.periodic(fft, size, job.material.poisson, job.numerics.kernel)
+def _operator(base: Frame) -> halfspace.Convolution:
+    poisson = base.job.material.poisson
+    if base.job.grid.boundary == "free":
+        return halfspace.free(base.slab, base.size, poisson, base.dtype)
+    return halfspace.periodic(base.fft, base.size, poisson, base.job.numerics.kernel)
 
 
-def _preconditioner(
-    job: Job, slab: Slab, fft: FFT, size: tuple[float, float]
-) -> halfspace.Convolution | halfspace.Narrowed:
-    if job.numerics.precision == "mixed":
-        return halfspace.Narrowed(halfspace.inverse(FFT(slab, dtype=np.float32), size, job.material.poisson))
-    return halfspace.inverse(fft, size, job.material.poisson)
+def _preconditioner(base: Frame) -> halfspace.Convolution | halfspace.Narrowed:
+    poisson = base.job.material.poisson
+    if base.job.numerics.precision == "mixed":
+        return halfspace.Narrowed(halfspace.inverse(FFT(base.slab, dtype=np.float32), base.size, poisson))
+    return halfspace.inverse(base.fft, base.size, poisson)
 
 
 def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> ElasticEnergy | ZenerEnergy:
@@ -178,7 +217,7 @@ def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> Elast
         memory.commit(p, Heights(memory.u))
         return memory.increment
 
-    return ZenerEnergy(slab, material, creep)
+    return ZenerEnergy(slab, material, creep, memory)
 
 
 def _by_whole_cells(job: Job, timeline: tuple[Step, ...]) -> bool:

@@ -1,0 +1,175 @@
+"""Steady sliding of a job's surface, solved directly: points of a friction curve, and where a march may start from."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import RunError
+from .parallel import regrid
+from .parallel.fft import FFT
+from .parallel.slab import Array, Slab
+from .physics import halfspace, wake
+from .physics.ledger import Ledger, Measures
+from .scene import Frame
+from .solve.contact import Certificate
+from .solve.steady import SteadyContact, SteadySolver
+from .theory.viscoelastic import Prony
+
+COARSEST = 32  # points: no coarser grid is used to start from
+COARSE_TOLERANCE = 1e-3  # of the certificate on all grids but the finest
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Point:
+    """A steady state: velocity [m/s], pressure [Pa], what it measures, its certificate, and what it took.
+
+    `operator_calls` are in applications on the finest grid.
+    """
+
+    velocity: Vector
+    pressure: float
+    measures: Measures
+    certificate: Certificate
+    operator_calls: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Level:
+    """One grid: who owns which rows, its transform, and the heights."""
+
+    slab: Slab
+    fft: FFT
+    heights: Array
+
+
+class SteadySliding:
+    """Steady states of one job's surface and body; making and calling it are collective.
+
+    Started from coarser grids, or from the last state where that is near. Memory: some 25 maps.
+    """
+
+    def __init__(self, base: Frame) -> None:
+        self.base = base
+        self.ledger = Ledger(base.slab, base.surface, base.units)
+        finest = Level(base.slab, base.fft, base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype)))
+        self.levels = [finest]
+        while (coarser := _coarser(self.levels[-1])) is not None:
+            self.levels.append(coarser)
+        self.p: Array | None = None
+        self.contact: SteadyContact | None = None
+        self._speeds: list[float] = []
+        self._earlier: Array | None = None
+
+    def solve(self, velocity: Vector, pressure: float) -> Point:
+        """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
+
+        Raises RunError, with the certificate reached, when none of the starts leads to one.
+        """
+        began = time.perf_counter()
+        mean = pressure / self.base.units.pressure
+        calls = 0.0
+        for start in self._starts(np.hypot(*velocity)):
+            contact, more = self._descend(velocity, mean, start)
+            calls += more
+            if contact.converged:
+                break
+        else:
+            raise RunError(
+                f"steady sliding at {np.hypot(*velocity):g} m/s under {pressure:g} Pa: {contact.failure}. Try a "
+                "velocity nearer to one that works, a finer grid, or a larger numerics.tolerance."
+            )
+        self._remember(contact, float(np.hypot(*velocity)))
+        measures = self.ledger.measures(contact.p, 1.0, contact.u, self.levels[0].heights, contact.d, (0.0, 0.0))
+        return Point(velocity, pressure, measures, contact.certificate, calls, time.perf_counter() - began)
+
+    # -- starts and levels --------------------------------------------------------------------------------------------
+
+    def _starts(self, speed: float) -> Iterator[Array | None]:
+        """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure.
+
+        Near the last velocity it is the last state, extrapolated in the logarithm of the velocity where two are known.
+        """
+        if self.p is None or not 0.5 < speed / self._speeds[-1] < 2.0:
+            yield None
+            return
+        if self._earlier is not None:
+            far, near = np.log(speed / self._speeds[-1]), np.log(self._speeds[-1] / self._speeds[-2])
+            yield np.maximum(self.p + min(max(far / near, 0.0), 1.0) * (self.p - self._earlier), 0.0)
+        else:
+            yield self.p
+        yield None
+
+    def _remember(self, contact: SteadyContact, speed: float) -> None:
+        self.contact = contact
+        self._earlier, near = self.p, bool(self._speeds) and 0.5 < speed / self._speeds[-1] < 2.0
+        if not near or speed == self._speeds[-1]:
+            self._earlier = None
+        self.p = contact.p.copy()
+        self._speeds = [*self._speeds[-1:], speed]
+
+    def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float]:
+        """Solve on all grids, the coarsest first, or on the finest one from `start`; also the operator calls it took."""
+        tally, calls = self.base.slab.tally, 0.0
+        below: tuple[Level, Array] | None = None
+        for level in self.levels[:1] if start is not None else reversed(self.levels):
+            before = tally["operator"]
+            solver = self._solver(level, velocity)
+            if start is not None:
+                solver.p[...] = start
+            elif below is not None:
+                regrid.prolong(below[0].slab, level.slab, below[1], solver.p)
+            contact = solver.solve(level.heights, mean)
+            calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
+            below = (level, contact.p)
+        return contact, calls
+
+    def _solver(self, level: Level, velocity: Vector) -> SteadySolver:
+        base, numerics = self.base, self.base.job.numerics
+        finest = level is self.levels[0]
+        operator, preconditioner = self.operators(level, velocity, base.prony)
+        return SteadySolver(
+            level.slab,
+            operator,
+            preconditioner,
+            _stiffness(level.slab, operator, base.dtype),
+            base.height / base.units.height,
+            numerics.tolerance if finest else max(numerics.tolerance, COARSE_TOLERANCE),
+            20 * numerics.max_iterations,
+            dtype=base.dtype,
+        )
+
+    def operators(
+        self, level: Level, velocity: Vector, prony: Prony
+    ) -> tuple[halfspace.Convolution, halfspace.Convolution]:
+        """Pressure -> displacement at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
+        base = self.base
+        poisson = base.job.material.poisson
+        speed = (velocity[0] / base.units.length, velocity[1] / base.units.length)
+        operator, inverse = wake.periodic(level.fft, base.size, poisson, speed, prony)
+        if base.job.grid.boundary == "free":
+            operator = wake.free(level.slab, base.size, poisson, speed, prony, base.dtype)
+        return operator, inverse
+
+
+def _coarser(level: Level) -> Level | None:
+    """The grid of twice the cell, along each direction where points are even and enough; None if there is none."""
+    slab = level.slab
+    nx, ny = (n // 2 if n % 2 == 0 and n >= 2 * COARSEST else n for n in (slab.nx, slab.ny))
+    if (nx, ny) == (slab.nx, slab.ny):
+        return None
+    coarse = slab.resized(nx, ny)
+    return Level(coarse, FFT(coarse, dtype=level.fft.dtype), regrid.restrict(slab, coarse, level.heights))
+
+
+def _stiffness(slab: Slab, operator: halfspace.Convolution, dtype: type[np.floating]) -> float:
+    """Pressure on one point over the displacement it causes there; collective."""
+    impulse, answer = slab.zeros(dtype), slab.empty(dtype)
+    owner = slab.rows.start == 0 < slab.rows.stop
+    if owner:
+        impulse[0, 0] = 1.0
+    operator.apply(impulse, answer)
+    return 1.0 / slab.sum(float(answer[0, 0]) if owner else 0.0)[0]
