@@ -26,7 +26,8 @@ Vector = tuple[float, float]
 class Point:
     """A steady state: velocity [m/s], pressure [Pa], what it measures, its certificate, and what it took.
 
-    `operator_calls` are in applications on the finest grid.
+    `operator_calls` are in applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a
+    free scene, whose wake goes on outside the box).
     """
 
     velocity: Vector
@@ -35,6 +36,7 @@ class Point:
     certificate: Certificate
     operator_calls: float
     seconds: float
+    dissipated: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,63 @@ class SteadySliding:
             )
         self._remember(contact, float(np.hypot(*velocity)))
         measures = self.ledger.measures(contact.p, 1.0, contact.u, self.levels[0].heights, contact.d, (0.0, 0.0))
-        return Point(velocity, pressure, measures, contact.certificate, calls, time.perf_counter() - began)
+        lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
+        return Point(velocity, pressure, measures, contact.certificate, calls, time.perf_counter() - began, lost)
+
+    def branch_maps(self, velocity: Vector) -> Iterator[Array]:
+        """The map h_k of each branch in the last state, the same array each time; collective."""
+        assert self.contact is not None
+        out = self.base.slab.empty(self.base.dtype)
+        if self.base.job.grid.boundary == "free":
+            speed = (velocity[0] / self.base.units.length, velocity[1] / self.base.units.length)
+            for k in range(self.base.prony.moduli.size):
+                poisson = self.base.job.material.poisson
+                yield wake.branch(self.base.slab, self.base.size, poisson, speed, self.base.prony, k).apply(
+                    self.contact.p, out
+                )
+            return
+        fft = self.base.fft
+        u = fft.forward(self.contact.u).copy()
+        for modulus, tau in zip(self.base.prony.moduli, self.base.prony.relaxation_times, strict=True):
+            own = Prony(0.0, np.array([modulus]), np.array([tau]))
+            symbol = wake.modulus(fft, self.base.job.grid.size, velocity, own)
+            yield fft.backward(symbol * u, out)
+
+    def shares(self, velocity: Vector) -> tuple[Array, Array]:
+        """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
+
+        Of the last state; only for periodic scenes, where waves are independent. Collective.
+        """
+        base = self.base
+        q = np.hypot(*halfspace.wavenumbers(base.fft, base.job.grid.size))
+        longest = max(base.job.grid.size)
+        octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(int)
+        power = self._powers(velocity, octave)
+        total = power.sum()
+        return longest / 2.0 ** np.arange(power.shape[1]), power.sum(axis=0) / (total if total > 0.0 else 1.0)
+
+    def _powers(self, velocity: Vector, group: Array | None = None) -> Array:
+        """Power [W] lost in each branch to each group of waves, `|u^|^2 |q|/(1 - nu) |w| G_k''(|w|)`; collective."""
+        assert self.contact is not None
+        base, fft, prony, grid = self.base, self.base.fft, self.base.prony, self.base.job.grid
+        q = np.hypot(*halfspace.wavenumbers(fft, base.size))
+        omega = np.abs(self._frequencies(velocity))
+        waves = fft.multiplicity * np.abs(fft.forward(self.contact.u)) ** 2 * q / (1.0 - base.job.material.poisson)
+        groups = 1 + int(np.log2(max(grid.points)))
+        group = np.zeros(fft.shape, dtype=int) if group is None else group
+        powers = []
+        for modulus, tau in zip(prony.moduli, prony.relaxation_times, strict=True):
+            loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
+            powers.append(np.bincount(group.ravel(), loss.ravel(), groups + 1))
+        unit = base.units.pressure * base.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
+        flat = np.array(powers).reshape(-1)
+        return np.array(base.slab.sum(*flat)).reshape(len(powers), -1) * unit if powers else np.zeros((0, groups + 1))
+
+    def _frequencies(self, velocity: Vector) -> Array:
+        """Angular frequency q v [rad/s] of each wave."""
+        fft = self.base.fft
+        qx, qy = halfspace.wavenumbers(fft, self.base.job.grid.size)
+        return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
@@ -112,7 +170,7 @@ class SteadySliding:
         self._speeds = [*self._speeds[-1:], speed]
 
     def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float]:
-        """Solve on all grids, the coarsest first, or on the finest one from `start`; also the operator calls it took."""
+        """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took."""
         tally, calls = self.base.slab.tally, 0.0
         below: tuple[Level, Array] | None = None
         for level in self.levels[:1] if start is not None else reversed(self.levels):

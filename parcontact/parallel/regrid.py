@@ -22,7 +22,7 @@ def restrict(fine: Slab, coarse: Slab, field: Array) -> Array:
 def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
     """The same value in all fine cells of a coarse one: no point gets a pressure that had none."""
     fy, fx = factors(fine, coarse)
-    wanted = [slice(part.start // fy, -(-part.stop // fy)) if part.stop > part.start else slice(0, 0) for part in fine.dealt]
+    wanted = [slice(part.start // fy, (part.stop + fy - 1) // fy) for part in fine.dealt]
     rows = np.repeat(np.repeat(fetch(coarse, field, wanted), fy, axis=0), fx, axis=1)
     first = fine.rows.start - fy * (fine.rows.start // fy)
     out[...] = rows[first : first + fine.shape[0]]
@@ -38,10 +38,9 @@ def fetch(slab: Slab, field: Array, wanted: list[slice]) -> Array:
     sent = [_overlap(slab.rows, theirs) for theirs in wanted]
     got = [_overlap(mine, theirs) for theirs in slab.dealt]
     width = slab.nx * field.itemsize
-    source = [np.ascontiguousarray(field).view(np.uint8), *_message(sent, slab.rows.start, width)]
-    target = [out.view(np.uint8), *_message(got, mine.start, width)]
-    comm.Alltoallv([source[0], (source[1], source[2]), "B"], [target[0], (target[1], target[2]), "B"])
-    slab.tally["bytes sent"] += sum(source[1]) - source[1][comm.rank]
+    leaving, arriving = _message(sent, slab.rows.start, width), _message(got, mine.start, width)
+    comm.Alltoallv([np.ascontiguousarray(field).view(np.uint8), leaving, "B"], [out.view(np.uint8), arriving, "B"])
+    slab.tally["bytes sent"] += sum(leaving[0]) - leaving[0][comm.rank]
     return out
 
 

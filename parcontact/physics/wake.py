@@ -1,11 +1,14 @@
 """Operators of steady sliding, seen from the rigid surface: what it meets of the body still remembers what it left.
 
-At the velocity v a body point that is now at x was at `x + v t` a time t ago. A wave `exp(i q x)` of pressure that moves
-with the surface loads the body at the angular frequency `-q v`, so that on a periodic body
+At the velocity v a body point that is now at x was at `x + v t` a time t ago. A wave `exp(i q x)` of pressure that
+moves with the surface loads the body at the angular frequency `-q v`, so that on a periodic body
 
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
-Around an isolated contact the wake is not periodic. There, with the creep function `J(t) = J_g + sum J_i (1 - exp(-t/l_i))`,
+Around an isolated contact the wake is not periodic. There, with the creep function
+
+    J(t) = J_g + sum J_i (1 - exp(-t/l_i)),
+
 the influence coefficients are Love's A(x) plus, for each term, those along the wake (all with G = 1):
 
     K(x) = J_g A(x) + sum J_i int_0^inf exp(-t/l_i)/l_i A(x + v t) dt.
@@ -30,17 +33,17 @@ DECAYED = 40.0  # creep lengths after which the memory is over, exp(-40)
 
 
 def modulus(fft: FFT, size: Vector, velocity: Vector, prony: Prony) -> Spectrum:
-    """G*(-q v) on the wavenumbers of a spectrum; at a Nyquist wavenumber, which has two signs, that of both together.
+    """G*(-q v) on the wavenumbers of a spectrum; at a Nyquist wavenumber, which has two signs, the mean of both.
 
     Lengths of `size` and `velocity` are in one unit.
     """
     qx, qy = wavenumbers(fft, size)
-    compliance = np.zeros(fft.shape, dtype=np.complex128)
     at_x, at_y = (2 * np.abs(mode) == count for mode, count in zip(fft.modes, (fft.mx, fft.my), strict=True))
+    result = np.zeros(fft.shape, dtype=np.complex128)
     for sign_x, sign_y in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
         along_x, along_y = np.where(at_x, sign_x * qx, qx), np.where(at_y, sign_y * qy, qy)
-        compliance += 0.25 / complex_modulus(-(along_x * velocity[0] + along_y * velocity[1]), *prony)
-    return np.asarray(1.0 / compliance)
+        result += 0.25 * complex_modulus(-(along_x * velocity[0] + along_y * velocity[1]), *prony)
+    return result
 
 
 def periodic(fft: FFT, size: Vector, poisson: float, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
@@ -61,9 +64,32 @@ def free(
 
     Raises InputError for a body that flows: its wake never ends.
     """
+    return _padded(slab, size, poisson, velocity, _creep(prony), dtype)
+
+
+def branch(slab: Slab, size: Vector, poisson: float, velocity: Vector, prony: Prony, k: int) -> Convolution:
+    """Pressure -> map h_k of branch k under an isolated sliding contact; collective.
+
+    In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has no other poles than the creep function: each of
+    its terms is weighted by what the branch makes, at that term's rate -1/l_i, of a displacement.
+    """
+    creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
+    ratio = -tau / creep.retardation_times
+    shares = creep.compliances * modulus * ratio / (1.0 + ratio)
+    own = CreepSpectrum(modulus * creep.glass, shares, creep.retardation_times, 0.0)
+    return _padded(slab, size, poisson, velocity, own, np.float64)
+
+
+def _creep(prony: Prony) -> CreepSpectrum:
     creep = creep_spectrum(*prony)
     if creep.fluidity > 0.0:
         raise InputError("material: a body without long-term modulus leaves an endless wake; give it modulus_inf > 0")
+    return creep
+
+
+def _padded(
+    slab: Slab, size: Vector, poisson: float, velocity: Vector, creep: CreepSpectrum, dtype: DTypeLike
+) -> Convolution:
     fft = FFT(slab, (pyfftw.next_fast_len(2 * slab.nx), pyfftw.next_fast_len(2 * slab.ny)), dtype)
 
     def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:

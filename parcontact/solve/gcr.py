@@ -1,14 +1,12 @@
 """Generalized conjugate residuals on a set of points, under a given sum.
 
 Improve x on a set c, keeping its sum over c, so that `A x - h` becomes as constant on c as it can: each step adds the
-direction `t = C R K r` (R: values on c, C: subtract the mean over c) made orthogonal, in `C R A t`, to the earlier ones, and
-the step that makes the sum of squares of `r = C R (A x - h)` smallest. A need not be symmetric. (S. C. Eisenstat,
-H. C. Elman, M. H. Schultz, SIAM J. Numer. Anal. 20 (1983) 345.)
+direction `t = C R K r` (R: values on c, C: subtract the mean over c) made orthogonal, in `C R A t`, to the earlier
+ones, and goes as far as makes the sum of squares of `r = C R (A x - h)` smallest. A need not be symmetric.
+(S. C. Eisenstat, H. C. Elman, M. H. Schultz, SIAM J. Numer. Anal. 20 (1983) 345.)
 """
 
 import math
-
-import numpy as np
 
 from ..compiled import loop
 from ..parallel.slab import Array, Slab

@@ -21,8 +21,7 @@ from . import kernels
 from .contact import Certificate, Operator
 from .gcr import Directions, gaps_on
 
-FAR = 0.03  # a guess of the certificate above which the set is so wrong that a few linear steps do
-FEW = 4
+FAR, FEW = 0.01, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 PATIENCE = 25  # changes of the set without coming nearer to a solution after which a solve gives up
 
 
