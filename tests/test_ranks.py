@@ -1,0 +1,118 @@
+"""The same contact on any number of ranks.
+
+Ranks add their sums in another order and transform in other blocks: fields solved to 1e-11 of the surface's height
+agree to 1e-9 of their largest value, on grids that divide evenly and on others, and with more ranks than rows.
+"""
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact import job, march, scene
+from parcontact.parallel.slab import Slab
+
+if TYPE_CHECKING:
+    from conftest import RunParcontact
+
+JOB = """
+grid: {points: [60, 60], size: [1.0e-3, 8.0e-4]}
+surface:
+  - {shape: rough, hurst: 0.8, long_wavelength: 4.0e-4, short_wavelength: 1.0e-4, rms_height: 1.0e-6, seed: 4}
+  - {shape: sphere, radius: 2.0e-2}
+material: {model: elastic, poisson: 0.5, shear_modulus: 1.0e6}
+history: [{pressure: 5.0e3}, {pressure: 2.0e4}]
+numerics: {tolerance: 1.0e-11}
+output: {fields: [pressure, displacement, gap]}
+"""
+ROWS = "surface={shape: wave, amplitude: 1.0e-6, waves: [3, 1], phase: 0.3}"  # of 3 rows: no rough wave would fit
+GRIDS = {
+    "even": [],
+    "free": ["grid.boundary=free"],
+    "odd": ["grid.points=[45, 37]"],
+    "odd, free": ["grid.points=[37, 45]", "grid.boundary=free"],
+    "few rows": ["grid.points=[64, 3]", ROWS],
+    "one row": ["grid.points=[64, 1]", ROWS.replace("[3, 1]", "[3, 0]")],
+}
+FIELDS = ("pressure", "displacement", "gap")
+
+
+def solved(path: Path, comm: MPI.Intracomm, *overrides: str) -> march.March:
+    """A march at the end of a job, on the ranks of `comm`."""
+    loaded = job.load(path, overrides)
+    done = march.March(scene.build(loaded, Slab(comm, *loaded.grid.points)))
+    march.run(done, [])
+    return done
+
+
+@pytest.fixture
+def path(shared_path: Path, comm: MPI.Intracomm) -> Path:
+    path = shared_path / "job.yaml"
+    if comm.rank == 0:
+        path.write_text(JOB)
+    comm.barrier()
+    return path
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("grid", GRIDS)
+def test_fields_do_not_depend_on_the_ranks(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
+    alone = solved(path, MPI.COMM_SELF, *GRIDS[grid])
+    for comm in communicators:
+        together = solved(path, comm, *GRIDS[grid])
+        rows = together.scene.slab.rows
+        for name in FIELDS:
+            expected = alone.field(name)
+            found = together.field(name)
+            assert found.shape == expected[rows].shape
+            assert np.abs(found - expected[rows]).max(initial=0.0) <= 1e-9 * np.abs(expected).max()
+        assert together.row.measures.contact_area == alone.row.measures.contact_area
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("grid", GRIDS)
+def test_measures_agree_within_the_default_tolerance(
+    path: Path, communicators: list[MPI.Intracomm], grid: str
+) -> None:
+    """Lengths relative to the height of the surface, pressures to the highest."""
+    overrides = [*GRIDS[grid], "numerics.tolerance=1.0e-4"]
+    alone = solved(path, MPI.COMM_SELF, *overrides)
+    expected = alone.row.measures
+    height = alone.scene.solver.height * alone.scene.units.height
+    for comm in communicators:
+        found = solved(path, comm, *overrides).row.measures
+        assert abs(found.pressure / expected.pressure - 1) <= 1e-13
+        assert abs(found.max_pressure / expected.max_pressure - 1) <= 1e-4
+        assert abs(found.contact_area - expected.contact_area) <= 1e-4
+        assert abs(found.approach - expected.approach) <= 1e-4 * height
+        assert abs(found.mean_gap - expected.mean_gap) <= 1e-4 * height
+        assert abs(found.friction - expected.friction) <= 1e-4
+
+
+@pytest.mark.mpi
+def test_all_ranks_see_the_same_row(path: Path, comm: MPI.Intracomm) -> None:
+    """To the last bit: what a rank decides by it, all decide."""
+    row = solved(path, comm).row
+    assert len({repr((other.measures, other.iterations, other.certificate)) for other in comm.allgather(row)}) == 1
+
+
+@pytest.mark.parametrize("grid", ["even", "odd, free", "few rows"])
+def test_files_of_five_ranks(path: Path, tmp_path: Path, run_parcontact: "RunParcontact", grid: str) -> None:
+    """As a user runs it, against this process alone."""
+    settings = [word for override in GRIDS[grid] for word in ("--set", override)]
+    process = run_parcontact([path, "--quiet", "--out", tmp_path / "out", *settings], ranks=5)
+    assert process.returncode == 0, process.stderr
+    alone = solved(path, MPI.COMM_SELF, *GRIDS[grid])
+    with h5py.File(tmp_path / "out" / "fields.h5") as file:
+        for name in FIELDS:
+            expected, found = alone.field(name), file[name][-1]
+            assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+    with (tmp_path / "out" / "measures.csv").open() as table:
+        row = list(csv.DictReader(table))[-1]
+    for column in ("pressure", "contact_area", "max_pressure"):
+        value = getattr(alone.row.measures, column)
+        assert abs(float(row[column]) - value) <= 1e-9 * value
