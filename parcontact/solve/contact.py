@@ -144,13 +144,15 @@ class ContactSolver:
         Under load control the start is scaled to the load, or uniform where it is zero everywhere. A solve that does
         not reach the tolerance says why in `failure`; its maps are then the last iterate, not a solution.
         """
-        centred = isinstance(control, MeanPressure)
-        if centred and control.value == 0.0:
+        mean = control.value if isinstance(control, MeanPressure) else None
+        if mean == 0.0:
             return self._separated(h)
-        balance = self._begin(h, control)
+        centred = mean is not None
+        self._begin(mean)
+        balance = self._weigh(h, 0.0).settled() if centred else self._weigh(h, control.value)
         best, old_product, shortened, iteration = (np.inf, 0), 0.0, 0, 0
         while True:
-            members, excess, certificate = self._certify(h, balance, control)
+            members, excess, certificate = self._certify(h, balance, mean)
             best = min(best, (certificate.worst, iteration))
             failure = self._verdict(certificate.worst, iteration, *best)
             if failure is not None:
@@ -159,44 +161,38 @@ class ContactSolver:
             self.r, self.spare = self.spare, self.r
             kernels.residual(self.working, self.u, h, balance.d + (excess / members if centred else 0.0), self.r)
             slope, old_product = self._turn(old_product, members, centred)
-            balance, halvings = self._descend(h, balance, slope, control)
+            balance, halvings = self._descend(h, balance, slope, mean)
             iteration += 1
             if halvings:
                 shortened += 1
                 old_product = 0.0
 
-    # -- the steps of one iteration -----------------------------------------------------------------------------------
+    # -- the steps of a solve; `mean` is the mean pressure asked for, None with a given approach -----------------------
 
-    def _begin(self, h: Array, control: MeanPressure | Approach) -> Balance:
+    def _begin(self, mean: float | None) -> None:
         """Make the start admissible and forget the last solve's direction."""
         self.t.fill(0.0)
         self.r.fill(0.0)
-        if isinstance(control, MeanPressure):
+        if mean is not None:
             load = self.slab.sum(kernels.total(self.p))[0]
             if load > 0.0:
-                kernels.scale(self.p, control.value * self.slab.points / load)
+                kernels.scale(self.p, mean * self.slab.points / load)
             else:
-                self.p.fill(control.value)
+                self.p.fill(mean)
         self.operator.apply(self.p, self.u)
-        if isinstance(control, Approach):
-            return self._weigh(h, control.value)
-        return self._weigh(h, 0.0).settled()
 
     def _weigh(self, h: Array, d: float) -> Balance:
         load, work, gaps = self.slab.sum(*kernels.weigh(self.p, self.u, h, d))
         return Balance(d, load, gaps, 0.5 * work)
 
-    def _certify(
-        self, h: Array, balance: Balance, control: MeanPressure | Approach
-    ) -> tuple[float, float, Certificate]:
+    def _certify(self, h: Array, balance: Balance, mean: float | None) -> tuple[float, float, Certificate]:
         """Mark the working set; returns its size, its sum of gaps, and the certificate."""
         *sums, deepest = kernels.certify(self.p, self.u, h, balance.d, self.working)
         wrong, members, excess, deepest = self.slab.reduce(sums, [deepest])
-        load = balance.load
-        complementarity = wrong / (load or 1.0) / self.height
+        complementarity = wrong / (balance.load or 1.0) / self.height
         penetration = max(deepest / self.height, 0.0)
-        error = abs(load / self.slab.points / control.value - 1.0) if isinstance(control, MeanPressure) else 0.0
-        return members, excess, Certificate(complementarity, penetration, error)
+        load = 0.0 if mean is None else abs(balance.load / self.slab.points / mean - 1.0)
+        return members, excess, Certificate(complementarity, penetration, load)
 
     def _verdict(self, worst: float, iteration: int, best: float, best_at: int) -> str | None:
         """None: go on; empty: solved; else what happened instead."""
@@ -223,24 +219,22 @@ class ContactSolver:
         kernels.turn(self.working, z, beta, mean_z + beta * mean_t, self.t)
         return r_z + beta * r_t, r_z
 
-    def _descend(
-        self, h: Array, old: Balance, slope: float, control: MeanPressure | Approach
-    ) -> tuple[Balance, int]:
+    def _descend(self, h: Array, old: Balance, slope: float, mean: float | None) -> tuple[Balance, int]:
         """Step against `self.t`; returns the new balance and how often the step was halved."""
         curvature = self.slab.sum(kernels.dot(self.t, self.operator.apply(self.t, self.w)))[0]
         step = slope / curvature if curvature > 0.0 else 0.0
         self.p, self.spare = self.spare, self.p
         for halvings in range(HALVINGS + 1):
             load, cut = self.slab.sum(*kernels.advance(self.spare, self.t, step, self.p))
-            if cut and isinstance(control, MeanPressure):
-                kernels.scale(self.p, control.value * self.slab.points / load)
+            if cut and mean is not None:
+                kernels.scale(self.p, mean * self.slab.points / load)
             self.u, self.w = self.operator.apply(self.p, self.w), self.u
             new = self._weigh(h, old.d)
             if new.f - old.f <= self.round_off * new.energy or halvings == HALVINGS:
                 break
             self.u, self.w = self.w, self.u
             step *= 0.5
-        return new.settled() if isinstance(control, MeanPressure) else new, halvings
+        return new if mean is None else new.settled(), halvings
 
     def _separated(self, h: Array) -> Contact:
         """No load: no pressure, the surface just touches the body."""
