@@ -95,7 +95,7 @@ def frame(job: Job, slab: Slab) -> Frame:
 def build(job: Job, slab: Slab) -> Scene:
     """Make a job's scene on the ranks of `slab`; collective. Raises InputError for surface files that do not fit."""
     base = frame(job, slab)
-    timeline = tuple(steps(job.history, job.grid))
+    timeline = tuple(steps(job.history, job.grid, pressure=job.initial.pressure))
     way = WholeCells if _by_whole_cells(job, timeline) else AnyFraction
     path: Path = way(base.surface, base.dtype)
     material = _material(base)
@@ -126,9 +126,15 @@ def relaxation_of(job: Job) -> Prony:
     return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], [*prony.relaxation_times, *times])
 
 
-def remarks(built: Scene) -> list[str]:
-    """What a user should know about the surface before trusting a result."""
-    return []
+def facts(built: Scene) -> list[str]:
+    """What a user should know about the surface: its spectral moments and what follows from them."""
+    found = built.frame.roughness
+    if found is None:
+        return []
+    return [
+        f"surface: rms height {found.rms_height:.4g} m, rms slope {found.rms_slope:.4g}, Nayak's parameter "
+        f"{found.nayak:.3g}; m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2"
+    ]
 
 
 # -- parts ------------------------------------------------------------------------------------------------------------
