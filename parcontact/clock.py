@@ -56,26 +56,50 @@ def fractions(stage: Stage, grid: Grid) -> list[float]:
     return [*(math.expm1(index * math.log(growth)) / whole for index in range(1, count)), 1.0]
 
 
-def steps(history: tuple[Stage, ...], grid: Grid) -> Iterator[Step]:
-    """All steps of a history, numbered from 1; step 0 is the initial state."""
+def reached(time: float, until: float) -> bool:
+    """Whether a time is the one asked for, or later."""
+    return time >= until * (1.0 - ROUND_OFF)
+
+
+def steps(
+    history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None
+) -> Iterator[Step]:
+    """All steps of a history, numbered from 1; step 0 is the initial state.
+
+    Where the history ends before `until`, its last stage goes on with its last time step, velocity and load, to the
+    first step that reaches it; a last stage that is one solve cannot go on. `pressure` [Pa] is that of the initial
+    state, None for a virgin body.
+    """
     number, time, position = 0, 0.0, (0.0, 0.0)
-    before: tuple[str, float] | None = None
+    before = None if pressure is None else ("pressure", pressure)
     for index, stage in enumerate(history):
         start, origin, last_dt = time, position, 0.0
         facts = (stage.velocity, stage.control)
         if _jumps(stage, before):
             number += 1
             yield Step(number, index, time, 0.0, position, *facts, stage.load.start, 0.0)
-        for fraction in fractions(stage, grid):
+        ends = fractions(stage, grid)
+        last = index == len(history) - 1
+        for fraction in _beyond(ends, (until - start) / stage.seconds) if last and ends else ends:
             number += 1
             end = start + fraction * stage.seconds
             dt, time = end - time, end
             slid = fraction * stage.seconds
             position = (origin[0] + stage.velocity[0] * slid, origin[1] + stage.velocity[1] * slid)
             growth = dt / last_dt if last_dt else 0.0
-            yield Step(number, index, time, dt, position, *facts, stage.load.at(fraction), growth)
+            yield Step(number, index, time, dt, position, *facts, stage.load.at(min(fraction, 1.0)), growth)
             last_dt = dt
         before = (stage.control, stage.load.end)
+
+
+def _beyond(ends: list[float], until: float) -> Iterator[float]:
+    """The ends of the steps of a stage, and on with the last step until the fraction `until` is reached."""
+    yield from ends
+    step = 1.0 - (ends[-2] if len(ends) > 1 else 0.0)
+    count = 0
+    while not reached(1.0 + count * step, until):
+        count += 1
+        yield 1.0 + count * step
 
 
 def _jumps(stage: Stage, before: tuple[str, float] | None) -> bool:

@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
@@ -119,9 +119,6 @@ class Job(Part):
     initial: Initial = Initial()
     history: tuple[Stage, ...] = Field(default=(), description="a list of stages")
     numerics: Numerics = Numerics()
-    accuracy: Annotated[float, Field(ge=0, lt=1, strict=True)] = Field(
-        default=1e-3, description="an error of friction [-], zero or more and below 1"
-    )
     output: Output = Output()
     checkpoint: Checkpoint = Checkpoint()
     steady: Steady | None = None

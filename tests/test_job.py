@@ -111,9 +111,9 @@ def test_defaults(tmp_path: Path) -> None:
     assert (stage.name, stage.seconds, stage.velocity) == ("stage 1", 0.0, (0.0, 0.0))
     assert (job.numerics.integrator, job.numerics.tolerance, job.numerics.max_iterations) == ("exponential", 1e-4, 500)
     assert (job.numerics.kernel, job.numerics.precision, job.numerics.slope) == ("spectral", "double", "spectral")
-    assert (job.numerics.accept_unconverged, job.accuracy) == (False, 1e-3)
+    assert job.numerics.accept_unconverged is False
     assert (job.output.directory, job.output.fields, job.output.every) == (Path("out/small"), (), 1)
-    assert (job.output.energy, job.output.branch_dissipation, job.output.spectrum) == (False, False, False)
+    assert (job.output.energy, job.output.branch_dissipation) == (False, False)
     assert (job.checkpoint.every, job.checkpoint.minutes, job.checkpoint.keep) == (None, 10.0, 2)
     assert job.steady is None
 
@@ -211,13 +211,13 @@ def test_overrides_of_every_kind(tmp_path: Path) -> None:
     (tmp_path / "road.npy").touch()
     job = job_of(
         tmp_path, CONTRACT, "grid.points=[512, 256]", "history.0.pressure=2e5", "material.branches.1.modulus=7",
-        "accuracy=0", "steady.velocities=[1, 2]", "title=a = b", "history.1.distance=null", "history.1.duration=1",
+        "numerics.tolerance=0.01", "steady.velocities=[1, 2]", "title=a = b", "history.1.distance=null", "history.1.duration=1",
         "surface.0.short_wavelength=2e-5",
     )  # fmt: skip
     assert job.grid.points == (512, 256)
     assert job.history[0].load.start == 2e5
     assert job.material.branches[1].modulus == 7.0
-    assert (job.accuracy, job.title) == (0.0, "a = b")
+    assert (job.numerics.tolerance, job.title) == (0.01, "a = b")
     assert job.steady is not None
     assert job.steady.velocities == (1.0, 2.0)
     assert (job.history[1].distance, job.history[1].seconds) == (None, 1.0)
@@ -237,10 +237,9 @@ ROUND_TRIPS = {
         material="{model: zener, branches: [{G0: 1e6, G1: 0, eta1: .inf}]}",
         history="[{force: {from: 0, to: 1e-2}, velocity: [1e-7, 2], distance: 1, time_step: 1e-5}, {approach: -1e-9}]",
         initial="{state: steady, pressure: 3, velocity: 0.123456789012345678}",
-        output="{energy: true, branch_dissipation: true, spectrum: true, directory: /somewhere/else}",
+        output="{energy: true, branch_dissipation: true, directory: /somewhere/else}",
         numerics="{integrator: backward-euler, precision: mixed, accept_unconverged: true}",
         checkpoint="{keep: 5}",
-        accuracy="0",
     ),
 }
 

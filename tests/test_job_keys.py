@@ -200,7 +200,6 @@ OTHERS = {
         "backward-euler?"
     ),
     "numerics: {accept_unconverged: 1}": "5:32: numerics.accept_unconverged must be true or false, got 1",
-    "accuracy: -1e-3": "5:11: accuracy must be an error of friction [-], zero or more and below 1, got -0.001",
     "output: {fields: [gap, presure]}": (
         "5:24: output.fields.1 must be pressure | displacement | gap, got 'presure'; did you mean pressure?"
     ),

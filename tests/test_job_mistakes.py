@@ -153,10 +153,10 @@ def test_nyquist_ignores_a_direction_with_one_point() -> None:
 
 def test_checks_between_sections_run_beside_other_mistakes() -> None:
     text = SMALL.replace("surface: {", "surface:\n  - {shape: ball}\n  - {").replace("waves: [1, 0]", "waves: [99, 0]")
-    assert mistakes_of(text, "numerics.kernel=spectral", "grid.boundary=free", "accuracy=2") == [
+    assert mistakes_of(text, "numerics.kernel=spectral", "grid.boundary=free", "checkpoint.keep=0") == [
         "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | flat, got 'ball'",
         "job.yaml:4:44: surface.1.waves.0 must be within -32 and 32 waves for 64 points (Nyquist), got 99",
-        "--set accuracy=2: accuracy must be an error of friction [-], zero or more and below 1, got 2",
+        "--set checkpoint.keep=0: checkpoint.keep must be a positive whole number of checkpoints, got 0",
         (
             "--set numerics.kernel=spectral: numerics.kernel must be love when grid.boundary is free: "
             "the spectral kernel is periodic"
