@@ -7,18 +7,22 @@ import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mpi4py import MPI
 
-from . import __version__, job, runner
+from . import __version__, curve, job, runner
 from .errors import InputError, RunError
 from .parallel.slab import Slab
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2
-VERBS = ("run", "check", "plot")
+DONE, FAILED, BAD_INPUT = 0, 1, 2  # and runner.AGAIN
+VERBS = ("run", "steady", "check", "info", "plot")
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # say how many were started
 STAGGER = 0.5  # seconds for which other ranks let root report an error that all of them have
+PATIENCE = 5.0  # seconds for which a rank that ends with an error waits for the others to do so too
+CODES = """\
+exit codes: 0 as asked; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
+checkpoint, run again"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,19 +36,33 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(words)
         return int(options.act(options, world))
     except (InputError, job.JobError, RunError) as error:
-        if world.rank == 0:
-            print(f"parcontact: {error}" if isinstance(error, RunError) else error, file=sys.stderr, flush=True)
-        return FAILED if isinstance(error, RunError) else BAD_INPUT
-    except Exception as error:
+        code = FAILED if isinstance(error, RunError) else BAD_INPUT
+        text = str(error) if isinstance(error, job.JobError) else f"parcontact: {error}"
+        return _end_together(world, text, code)
+    except (Exception, KeyboardInterrupt) as error:
         _end_all(world, error)
 
 
-def _end_all(world: MPI.Intracomm, error: Exception) -> NoReturn:
+def _end_together(world: MPI.Intracomm, text: str, code: int) -> int:
+    """Every rank has this error, and root says it. If one turns out to be alone with it, it says so and ends all."""
+    if world.rank == 0:
+        print(text, file=sys.stderr, flush=True)
+    arrival, deadline = world.Ibarrier(), time.monotonic() + PATIENCE
+    while not arrival.Test():
+        if time.monotonic() > deadline:
+            print(f"{text} (on rank {world.rank} of {world.size} alone)", file=sys.stderr, flush=True)
+            world.Abort(code)
+        time.sleep(1e-3)
+    return code
+
+
+def _end_all(world: MPI.Intracomm, error: BaseException) -> NoReturn:
     """One rank cannot go on: it says why and ends all of them."""
     if world.rank > 0:
         time.sleep(STAGGER)
     where = f" on rank {world.rank} of {world.size}" if world.size > 1 else ""
-    traceback.print_exception(error)
+    if not isinstance(error, KeyboardInterrupt | BrokenPipeError):
+        traceback.print_exception(error)
     print(f"parcontact: ended by {type(error).__name__}{where}: {error}", file=sys.stderr, flush=True)
     if world.size > 1:
         world.Abort(FAILED)
@@ -60,23 +78,61 @@ def _refuse_alone(world: MPI.Intracomm) -> None:
         )
 
 
+class _Parser(argparse.ArgumentParser):
+    """Speaks on root only."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        if MPI.COMM_WORLD.rank == 0:
+            super()._print_message(message, file)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="parcontact",
         description="Transient contact of a rough rigid surface on a viscoelastic half space.",
-        epilog="A first argument that is no verb is a job: mpirun -n 2 parcontact job.yaml",
+        epilog=f"A first argument that is no verb is a job: mpirun -n 2 parcontact job.yaml\n\n{CODES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"parcontact {__version__}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="verb")
 
-    run = verbs.add_parser("run", help="run a job (the default verb)")
+    run = verbs.add_parser("run", help="run a job, or go on with it (the default verb)")
     _job_arguments(run)
+    run.add_argument(
+        "--restart",
+        metavar="auto|never|PATH",
+        default="auto",
+        help="go on from the newest good checkpoint if there is one (auto, the default), start afresh and replace what "
+        "is there (never), or go on from the checkpoint PATH",
+    )
+    run.add_argument(
+        "--until",
+        metavar="T",
+        type=_seconds,
+        help="stop after the first step that reaches the time T [s] of the history; one that ends before goes on with "
+        "its last stage",
+    )
+    run.add_argument(
+        "--wall", metavar="HH:MM:SS", type=_wall, help="stop early, with a checkpoint, to end within this wall time"
+    )
     run.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     run.set_defaults(act=_run)
+
+    steady = verbs.add_parser("steady", help="solve steady sliding directly: a friction curve")
+    _job_arguments(steady)
+    for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
+        text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
+        steady.add_argument(f"--{name}", metavar="A:B:N", type=_values, default=(), help=text)
+    steady.add_argument("--quiet", action="store_true", help="print only warnings and errors")
+    steady.set_defaults(act=_steady)
 
     check = verbs.add_parser("check", help="list all mistakes of a job, or what it says with every default")
     _job_arguments(check)
     check.set_defaults(act=_check)
+
+    info = verbs.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
+    info.add_argument("file", type=Path)
+    info.set_defaults(act=_info)
 
     plot = verbs.add_parser("plot", help="draw a picture of a run")
     plot.add_argument("directory", type=Path, help="output directory of a run")
@@ -88,6 +144,29 @@ def _job_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("job", help="job file (YAML)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
     parser.add_argument("--out", metavar="DIR", help="output directory")
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a time [s] of zero or more, got {text!r}")
+    return value
+
+
+def _wall(text: str) -> float:
+    """Seconds of [[HH:]MM:]SS, or with days in front as in Slurm, D-HH:MM:SS."""
+    days, dash, rest = text.rpartition("-")
+    fields = rest.split(":")
+    try:
+        if len(fields) > 3:
+            raise ValueError
+        seconds = sum(float(field) * 60.0**power for power, field in enumerate(reversed(fields)))
+        seconds += 86400.0 * int(days) if dash else 0.0
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a wall time HH:MM:SS, got {text!r}")
+    return seconds
 
 
 def _load(options: argparse.Namespace, world: MPI.Intracomm) -> job.Job:
@@ -105,9 +184,26 @@ def _load(options: argparse.Namespace, world: MPI.Intracomm) -> job.Job:
     raise found or InputError("no job")
 
 
+def _values(text: str) -> tuple[float, ...]:
+    """Numbers equally spaced in their logarithm, `first:last:count`, or a list `a,b,c`."""
+    try:
+        return job.log_range(text) if ":" in text else tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be first:last:count or a list of numbers, got {text!r}") from None
+
+
 def _run(options: argparse.Namespace, world: MPI.Intracomm) -> int:
     loaded = _load(options, world)
-    return runner.run(loaded, Slab(world, *loaded.grid.points), runner.Options(options.quiet))
+    if not loaded.history:
+        return curve.run(loaded, Slab(world, *loaded.grid.points), curve.request(loaded), options.quiet)
+    chosen = runner.Options(options.quiet, options.restart, options.until, options.wall)
+    return runner.run(loaded, Slab(world, *loaded.grid.points), chosen)
+
+
+def _steady(options: argparse.Namespace, world: MPI.Intracomm) -> int:
+    loaded = _load(options, world)
+    wanted = curve.request(loaded, options.velocities, options.pressures)
+    return curve.run(loaded, Slab(world, *loaded.grid.points), wanted, options.quiet)
 
 
 def _check(options: argparse.Namespace, world: MPI.Intracomm) -> int:
@@ -117,6 +213,15 @@ def _check(options: argparse.Namespace, world: MPI.Intracomm) -> int:
         for warning in loaded.warnings:
             print(f"warning: {warning}")
     return DONE
+
+
+def _info(options: argparse.Namespace, world: MPI.Intracomm) -> int:
+    from .record import info
+
+    text, sound = info.describe(options.file) if world.rank == 0 else ("", True)
+    if world.rank == 0:
+        print(text)
+    return DONE if world.bcast(sound) else BAD_INPUT
 
 
 def _plot(options: argparse.Namespace, world: MPI.Intracomm) -> int:

@@ -17,7 +17,7 @@ from .record.row import Row
 from .scene import Scene
 from .solve.contact import Approach, Contact, MeanPressure
 
-CONTROLS = {"pressure": MeanPressure, "force": MeanPressure, "approach": Approach}
+Task = Callable[["March"], bool | None]
 
 
 class March:
@@ -25,9 +25,10 @@ class March:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.row = Row(**self._energies())
+        work, stored, lost, split = self._energies()
+        self.row = Row(work=work, stored=stored, dissipated=lost, branch_dissipation=split)
         self.position = (0.0, 0.0)
-        self.alpha = self.alpha_old = 0.0
+        self.alpha = self.alpha_old = self.d = 0.0
         slab, dtype = scene.slab, scene.solver.p.dtype
         self.p_old = slab.zeros(dtype) if scene.lasts else None
         self._u = scene.solver.u
@@ -38,7 +39,7 @@ class March:
         return self.scene.solver.p
 
     def advance(self, step: Step) -> Row:
-        """Solve one step and commit it; collective. Raises RunError when the solve fails and the job does not allow it."""
+        """Solve one step and commit it; collective. Raises RunError when the solve fails and the job forbids that."""
         began, tally = time.perf_counter(), self.scene.slab.tally
         calls = tally["operator"]
         heights = self.scene.path.at(step.position)
@@ -53,7 +54,7 @@ class March:
         self._account(step, contact)
         slid = math.dist(step.position, self.position)
         self.position = step.position
-        self._u, self._d = contact.u, contact.d
+        self._u, self.d = contact.u, contact.d
         self.row = Row(
             step.number,
             step.time,
@@ -62,7 +63,7 @@ class March:
             contact.iterations,
             contact.certificate,
             tally["operator"] - calls,
-            **self._energies(),
+            *self._energies(),
             seconds=time.perf_counter() - began,
         )
         return self.row
@@ -118,19 +119,15 @@ class March:
         elif isinstance(energy, ElasticEnergy):
             energy.advance(contact.p, self.alpha, contact.u)
 
-    def _energies(self) -> dict[str, float | tuple[float, ...]]:
+    def _energies(self) -> tuple[float, float, float, tuple[float, ...]]:
+        """Work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for."""
         energy, units, grid = self.scene.energy, self.scene.units, self.scene.job.grid
         if energy is None:
-            return {}
+            return math.nan, math.nan, math.nan, ()
         unit = units.pressure * units.height * grid.dx * grid.dy
         balance = energy.balance
         lost = tuple(float(value) * unit for value in balance.dissipated)
-        return {
-            "work": balance.work * unit,
-            "stored": balance.stored * unit,
-            "dissipated": math.fsum(lost),
-            "branch_dissipation": lost,
-        }
+        return balance.work * unit, balance.stored * unit, math.fsum(lost), lost
 
     def field(self, name: str) -> Array:
         """This rank's rows of `pressure` [Pa], `displacement` [m] or `gap` [m], as a new array."""
@@ -141,15 +138,27 @@ class March:
         if name == "displacement":
             return u * units.height
         base, offset = scene.path.at(self.position).parts
-        return (u - np.roll(base, offset, axis=1) - self._d) * units.height
+        return (u - np.roll(base, offset, axis=1) - self.d) * units.height
 
 
-def run(march: March, tasks: Sequence[Callable[[March], None]], timeline: Iterable[Step] | None = None) -> None:
-    """Advance through a history, after the initial state and after every step doing the tasks in order."""
+def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = None) -> bool:
+    """Advance through a timeline, after every step doing the tasks in order, until it ends or a task says True.
+
+    Without a timeline it is all of the job's, and the tasks are done for the initial state too. Returns whether a task
+    has ended the march.
+    """
     job = march.scene.job
-    for task in tasks:
-        task(march)
-    for step in steps(job.history, job.grid) if timeline is None else timeline:
+    if timeline is None:
+        if done(march, tasks):
+            return True
+        timeline = steps(job.history, job.grid, pressure=job.initial.pressure)
+    for step in timeline:
         march.advance(step)
-        for task in tasks:
-            task(march)
+        if done(march, tasks):
+            return True
+    return False
+
+
+def done(march: March, tasks: Sequence[Task]) -> bool:
+    """Do all tasks; whether one of them ends the march."""
+    return any([task(march) for task in tasks])  # noqa: C419  # not one less when one ends it

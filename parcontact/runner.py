@@ -1,98 +1,199 @@
-"""A run from a job to its output directory."""
+"""A run from a job to its output directory: it begins or goes on, saves what it remembers, and ends well."""
 
-import shutil
-from collections.abc import Callable
+import time
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import islice
 
-import numpy as np
-
-from . import march, scene
-from .clock import steps
-from .errors import InputError
+from . import march, restart, scene, state, steadystart, watch
+from .clock import Step, reached, steps
+from .errors import InputError, RunError
 from .job import Job, Rough
 from .march import March
 from .parallel.slab import Slab
-from .record import provenance
-from .record.console import Console, Silence
-from .record.fields import FieldsFile
-from .record.measures import MeasuresFile
+from .physics.energy import ZenerEnergy
+from .record import checkpoint, plans
+from .record.checkpoint import Entry, Facts
+from .record.directory import Directory
+from .record.provenance import Link, Provenance, extended
+from .record.recorder import Recorder
+from .restart import Origin
 from .scene import Scene
+from .watch import Signals, Watch
 
-Task = Callable[[March], None]
+DONE, AGAIN = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line adds to a job."""
+    """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program."""
 
     quiet: bool = False
+    restart: str = "auto"
+    until: float | None = None
+    wall: float | None = None
 
 
 def run(job: Job, slab: Slab, options: Options) -> int:
     """Run a job; collective. Returns the exit code. Nothing is written before the whole job has proved sound."""
-    built = scene.build(job, slab)
-    directory = job.output.directory
-    _prepare(job, slab)
-    total = sum(1 for _ in steps(job.history, job.grid))
-    console = Console(directory / "run.log", options.quiet, total) if slab.root else Silence()
-    try:
-        for text in (*job.warnings, *scene.remarks(built)):
-            console.warn(text)
-        console.say(f"{job.title or job.path.stem}: {job.grid.nx} x {job.grid.ny} points on {_ranks(slab)}")
+    directory = Directory(job.output.directory, slab)
+    with Signals().noted() as signals, directory.claimed():
+        origin, warnings = restart.choose(job, slab, directory, options.restart)
+        timeline = tuple(steps(job.history, job.grid, options.until or 0.0, job.initial.pressure))
+        _refuse_no_end(timeline, options.until)
+        if origin and (reason := _nothing_to_do(origin, timeline, options.until)):
+            if slab.root and not options.quiet:
+                print(f"{directory.path}: {reason}", flush=True)
+            return DONE
+        plans.recall(job, slab, origin.plans if origin else None)
+        built = scene.build(job, slab)
         marching = March(built)
-        tasks = [lambda m: console.step(m.row), *_measures(built), *_fields(built, total)]
-        march.run(marching, tasks)
-        console.say(f"done: results in {directory}")
-        console.log("counts on root: " + ", ".join(f"{name} {count}" for name, count in sorted(slab.tally.items())))
-    finally:
-        console.close()
-    return 0
-
-
-def _ranks(slab: Slab) -> str:
-    return "1 rank" if slab.comm.size == 1 else f"{slab.comm.size} ranks"
-
-
-def _prepare(job: Job, slab: Slab) -> None:
-    """Make the output directory with the job in it; collective. Raises InputError where it cannot be written."""
-    directory, problem = job.output.directory, ""
-    if slab.root:
+        if origin:
+            state.restore(marching, origin.contents, slab)
+        elif job.initial.state == "steady":
+            steadystart.begin(marching)
+        plans.keep(job, slab)
+        provenance = _provenance(job, slab, origin)
+        recorder = _begin(built, directory, provenance, origin, len(timeline), options.quiet)
         try:
-            directory.mkdir(parents=True, exist_ok=True)
-            copy = directory / "job.yaml"
-            if not (copy.exists() and copy.samefile(job.path)):
-                shutil.copyfile(job.path, copy)
-            (directory / "job.resolved.yaml").write_text(job.resolved())
-        except OSError as error:
-            problem = f"the output directory {directory} cannot be written: {error.strerror}"
-    if problem := slab.agree(problem):
-        raise InputError(problem)
+            for text in (*job.warnings, *warnings, *recorder.warnings):
+                recorder.console.warn(text)
+            limit = watch.limit(options.wall) if slab.root else None
+            watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
+            return _Journey(marching, timeline, directory, recorder, watching, provenance, options.until).go(origin)
+        finally:
+            recorder.close()
 
 
-def _measures(built: Scene) -> list[Task]:
-    if not built.slab.root:
-        return []
-    branches = len(built.energy.balance.dissipated) if built.energy and built.job.output.branch_dissipation else 0
-    path: Path = built.job.output.directory / "measures.csv"
-    path.unlink(missing_ok=True)
-    file = MeasuresFile(path, branches)
-    return [lambda marching: file.write(marching.row)]
+def _refuse_no_end(timeline: tuple[Step, ...], until: float | None) -> None:
+    end = timeline[-1].time if timeline else 0.0
+    if until is not None and not reached(end, until):
+        raise InputError(
+            f"--until {until:g} is beyond the end of the history, t = {end:g} s, and its last stage is one solve: "
+            "there is no time step to go on with"
+        )
 
 
-def _fields(built: Scene, total: int) -> list[Task]:
+def _nothing_to_do(origin: Origin, timeline: tuple[Step, ...], until: float | None) -> str:
+    contents = origin.contents
+    if contents.step >= len(timeline):
+        return f"finished before, at t = {contents.time:g} s (--restart never runs it afresh, --until goes on)"
+    if until is not None and reached(contents.time, until):
+        return f"is at t = {contents.time:g} s, not before --until {until:g}"
+    return ""
+
+
+def _provenance(job: Job, slab: Slab, origin: Origin | None) -> Provenance:
+    link = Link(job.resolved(), slab.comm.size, origin.contents.step if origin else 0)
+    seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough))
+    return Provenance(extended(origin.contents.chain if origin else (), link), seeds)
+
+
+def _begin(
+    built: Scene, directory: Directory, provenance: Provenance, origin: Origin | None, total: int, quiet: bool
+) -> Recorder:
+    """Make the output directory ready, and its files; collective."""
     job = built.job
-    if not job.output.fields:
-        return []
-    saved = {n: i for i, n in enumerate(n for n in range(1, total + 1) if n % job.output.every == 0 or n == total)}
-    path = job.output.directory / "fields.h5"
-    file = FieldsFile(path, built.slab, job.grid.size, job.output.fields, len(saved))
-    seeds = [shape.seed for shape in job.surface if isinstance(shape, Rough)]
-    file.make(lambda h5: provenance.write(h5, job.resolved(), [], built.slab.comm.size, seeds))
+    directory.make(job.path, job.resolved())
+    if origin and origin.own:
+        directory.go_back(origin.contents.step)
+    else:
+        directory.clear()
+    split = job.output.branch_dissipation and isinstance(built.energy, ZenerEnergy)
+    dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
+    after = origin.contents.step if origin else None
+    return Recorder(job, built.slab, directory, provenance, total, after, dissipated, quiet)
 
-    def save(marching: March) -> None:
+
+class _Journey:
+    """A march through its timeline, and all that is done on the way."""
+
+    def __init__(
+        self,
+        marching: March,
+        timeline: tuple[Step, ...],
+        directory: Directory,
+        recorder: Recorder,
+        watching: Watch,
+        provenance: Provenance,
+        until: float | None,
+    ) -> None:
+        self.march, self.timeline, self.directory, self.recorder = marching, timeline, directory, recorder
+        self.watch, self.provenance, self.until = watching, provenance, until
+        self.slab, self.job = marching.scene.slab, marching.scene.job
+        self.console = recorder.console
+        self.first, self.saved, self.failed = marching.row.step, -1, False
+        self.plain = restart.plain_job(self.job) if self.slab.root else {}
+        self.watch.state_bytes = sum(entry.nbytes for entry in state.entries(marching).values()) * self.slab.comm.size
+        self.stop = ""
+        self.began, self.saving = time.monotonic(), 0.0
+
+    def go(self, origin: Origin | None) -> int:
+        grid, ranks = self.job.grid, "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
+        title = self.job.title or self.job.path.stem
+        self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
+        for fact in scene.facts(self.march.scene):
+            self.console.say(fact)
+        if origin:
+            self.console.say(f"goes on after step {self.first} from {origin.contents.path}")
+        ended = march.done(self.march, [self.decide] if origin else [self.record, self.decide])
+        if not ended:
+            march.run(self.march, [self.record, self.decide], islice(self.timeline, self.first, None))
+        if self.saved != self.march.row.step:
+            self.save(last=True)
+        return self._farewell()
+
+    def record(self, marching: March) -> None:
+        self.recorder.write(marching.row, marching.field)
+
+    def decide(self, marching: March) -> bool:
+        """Save if it is time to; True ends the march."""
         row = marching.row
-        if row.step in saved:
-            file.save(saved[row.step], row.time, {name: marching.field(name) for name in job.output.fields})
+        verdict = self.watch.judge(row.step, row.step > self.first, self.recorder.problem)
+        if verdict.problem:
+            raise RunError(verdict.problem + self._newest())
+        self.stop = verdict.stop if row.step < len(self.timeline) else ""
+        ends = bool(self.stop) or (self.until is not None and reached(row.time, self.until))
+        if verdict.save and not ends and row.step < len(self.timeline):
+            self.save()
+        return ends
 
-    return [save]
+    def save(self, last: bool = False) -> None:
+        """Write a checkpoint; one failure is only warned of, two in a row, or one at the end, are a RunError."""
+        began, row = time.monotonic(), self.march.row
+        path = self.directory.checkpoint(row.step)
+        facts = Facts(row.step, row.time, self.plain, self.provenance)
+        entries = {**state.entries(self.march), "plans/all": Entry(plans.gathered(self.slab))}
+        try:
+            self.recorder.sync()
+            checkpoint.write(path, self.slab, facts, entries)
+        except RunError as error:
+            if last or self.failed:
+                raise RunError(f"{error}{self._newest()}") from error
+            self.failed = True
+            self.console.warn(f"no checkpoint after step {row.step}: {error}; the run ends if the next fails too")
+            return
+        self.saved, self.failed = row.step, False
+        if self.slab.root:
+            self.directory.prune(self.job.checkpoint.keep)
+        seconds = time.monotonic() - began
+        self.saving += seconds
+        self.watch.saved(seconds)
+        self.console.log(f"checkpoint after step {row.step} in {seconds:.3g} s")
+
+    def _newest(self) -> str:
+        saved = self.slab.agree(self.directory.saved() if self.slab.root else [])
+        return f"; the newest checkpoint is {saved[0][1]}" if saved else "; there is no checkpoint"
+
+    def _farewell(self) -> int:
+        row, console = self.march.row, self.console
+        spent = time.monotonic() - self.began
+        console.log(f"checkpoints took {self.saving:.3g} s of {spent:.4g} s")
+        counts = ", ".join(f"{name} {count}" for name, count in sorted(self.slab.tally.items()))
+        console.log(f"counts on root: {counts}")
+        if self.stop:
+            console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")
+            return AGAIN
+        finished = row.step >= len(self.timeline)
+        how = "done" if finished else f"stopped at t = {row.time:g} s as asked for, run again to go on"
+        console.say(f"{how}: results in {self.directory.path}")
+        return DONE

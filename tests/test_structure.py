@@ -18,8 +18,10 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"solve", "clock"},
     {"record"},
     {"scene"},
+    {"steadystate"},
     {"march"},
-    {"runner"},
+    {"state", "restart", "watch", "steadystart"},
+    {"runner", "curve"},
     {"study"},
     {"__main__"},
 ]

@@ -59,7 +59,9 @@ class Console:
             self._headed = True
             print(HEAD)
             if sys.stderr.isatty() and self._total > 1:
-                self._bar = tqdm(total=self._total, initial=row.step, unit="step", leave=False, mininterval=EVERY_SECONDS)
+                self._bar = tqdm(
+                    total=self._total, initial=row.step, unit="step", leave=False, mininterval=EVERY_SECONDS
+                )
         self._write(text)
         if self._bar is not None:
             self._bar.update(row.step - self._bar.n)

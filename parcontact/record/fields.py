@@ -4,73 +4,172 @@ The file is laid out for all instants of the run before the first: saving one wr
 time last, so that a run that dies leaves a readable file. Instants not reached yet have the time NaN.
 """
 
-from collections.abc import Callable, Mapping
+import time as clock
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parallel.slab import Array, Slab
 from . import hdf5
+from .provenance import Provenance
 
 UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m"}
+KIND = "parcontact fields"
+XDMF_SECONDS = 10.0  # at least between two versions of fields.xdmf, which grows with every instant
 
 
 class FieldsFile:
-    """Saved maps of shape (t, y, x), with coordinates; every method is collective."""
+    """Saved maps of shape (t, y, x), with coordinates; every method is collective.
 
-    def __init__(self, path: Path, slab: Slab, size: tuple[float, float], names: tuple[str, ...], count: int) -> None:
-        self.path, self.slab, self.size, self.names, self.count = path, slab, size, names, count
+    Parameters: where; this rank's rows; the box `size` (lx, ly) [m]; which maps; after which `steps` they are saved.
+    """
 
-    def make(self, describe: Callable[[h5py.File], None]) -> None:
-        """Lay the file out; `describe(file)` adds the provenance."""
+    def __init__(
+        self, path: Path, slab: Slab, size: tuple[float, float], names: Sequence[str], steps: Sequence[int]
+    ) -> None:
+        self.path, self.slab, self.size, self.names = path, slab, size, tuple(names)
+        self.steps = {step: index for index, step in enumerate(steps)}
+        self._drawn = 0.0
 
-        def build(file: h5py.File) -> None:
-            slab = self.slab
-            describe(file)
-            axes = {"t": np.full(self.count, np.nan)}
-            for axis, length, points in zip("xy", self.size, (slab.nx, slab.ny), strict=True):
-                axes[axis] = np.arange(points) * (length / points)
-            for axis, values in axes.items():
-                file[axis] = values
-                file[axis].make_scale(axis)
-                file[axis].attrs["units"] = "s" if axis == "t" else "m"
-            for name in self.names:
-                dataset = hdf5.fixed(file, name, (self.count, slab.ny, slab.nx), np.dtype(np.float64))
-                dataset.attrs["units"] = UNITS[name]
-                for dimension, axis in enumerate("tyx"):
-                    dataset.dims[dimension].attach_scale(file[axis])
+    def make(self, provenance: Provenance) -> None:
+        """Lay the file out anew."""
+        hdf5.lay_out(self.path, self.slab, lambda file: self._build(file, provenance))
+        self._draw()
 
-        hdf5.lay_out(self.path, self.slab, build)
-        self._write_xdmf()
+    def resume(self, step: int, provenance: Provenance) -> str:
+        """Go on after a step: what was saved up to it stays, whatever else was asked for then.
 
-    def save(self, index: int, time: float, maps: Mapping[str, Array]) -> None:
+        Returns what is lost, or ''.
+        """
+        found, problem = self.slab.agree(_layout(self.path) if self.slab.root else (None, ""))
+        kept = [] if found is None else found.reached(step)
+        self.steps = {n: i for i, n in enumerate(sorted({*kept, *(n for n in self.steps if n > step)}))}
+        if found is None:
+            self.make(provenance)
+        elif found.steps == tuple(self.steps) and set(found.names) == set(self.names):
+            hdf5.change(self.path, self.slab, provenance.renew)
+            self._stamp(slice(len(kept), None), np.nan)
+            self._draw()
+        else:
+            self._move_over(found, kept, provenance)
+        return problem
+
+    def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
         """Put the maps of one instant into their place."""
+        index = self.steps[step]
         rows = {name: np.ascontiguousarray(maps[name], dtype=np.float64) for name in self.names}
         hdf5.write(self.path, self.slab, [hdf5.Part(name, (index,), rows[name]) for name in self.names])
         self._stamp(index, time)
+        if self.slab.agree(clock.monotonic() - self._drawn > XDMF_SECONDS):
+            self._draw()
 
-    def forget(self, index: int) -> None:
-        """Take the instants from `index` on as not reached."""
-        self._stamp(slice(index, None), np.nan)
+    def sync(self) -> None:
+        """Wait until all that was saved is on the disk, and bring fields.xdmf up to date."""
+        hdf5.sync(self.path, self.slab)
+        self._draw()
 
-    def _stamp(self, index: int | slice, time: float) -> None:
+    # -- layout -------------------------------------------------------------------------------------------------------
+
+    def _build(self, file: h5py.File, provenance: Provenance) -> None:
+        slab, count = self.slab, len(self.steps)
+        file.attrs["kind"] = KIND
+        provenance.write(file)
+        axes = {"t": np.full(count, np.nan)}
+        for axis, length, points in zip("xy", self.size, (slab.nx, slab.ny), strict=True):
+            axes[axis] = np.arange(points) * (length / points)
+        for axis, values in axes.items():
+            dataset = hdf5.fixed(file, axis, values.shape, np.float64)
+            dataset[...] = values
+            dataset.make_scale(axis)
+            dataset.attrs["units"] = "s" if axis == "t" else "m"
+        step = hdf5.fixed(file, "step", (count,), np.int64)
+        step[...] = list(self.steps)
+        step.dims[0].attach_scale(file["t"])
+        for name in self.names:
+            dataset = hdf5.fixed(file, name, (count, slab.ny, slab.nx), np.float64)
+            dataset.attrs["units"] = UNITS[name]
+            for dimension, axis in enumerate("tyx"):
+                dataset.dims[dimension].attach_scale(file[axis])
+
+    def _move_over(self, found: "Layout", kept: Sequence[int], provenance: Provenance) -> None:
+        """Lay a new file out and copy what stays; a map that was not saved then is NaN."""
+        old, new = self.path, self.path.with_name(self.path.name + ".part")
+        hdf5.lay_out(new, self.slab, lambda file: self._build(file, provenance))
+        self.path = new
+        rows = np.empty(self.slab.shape)
+        for step in kept:
+            for name in self.names:
+                rows.fill(np.nan)
+                if name in found.names:
+                    hdf5.read(old, self.slab, [hdf5.Part(name, (found.steps.index(step),), rows)])
+                hdf5.write(new, self.slab, [hdf5.Part(name, (self.steps[step],), rows)])
+        self._stamp([self.steps[step] for step in kept], [found.times[found.steps.index(step)] for step in kept])
+        hdf5.sync(new, self.slab)
+        self.path = old
+        hdf5.on_root(self.slab, lambda: new.replace(old), f"cannot write {old}")
+        self._draw()
+
+    def _stamp(self, index: int | slice | list[int], time: float | list[float]) -> None:
         def stamp() -> None:
-            with h5py.File(self.path, "r+") as file:
-                file["t"][index] = time
+            with h5py.File(self.path, "r") as file:
+                times = file["t"][...]
+            times[index] = time
+            hdf5.put(self.path, {"t": times})
 
         hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
-        self._write_xdmf()
 
-    def _write_xdmf(self) -> None:
-        def write() -> None:
+    def _draw(self) -> None:
+        def draw() -> None:
             with h5py.File(self.path, "r") as file:
                 times = file["t"][...]
             text = xdmf(self.path.name, times, (self.slab.ny, self.slab.nx), self.size, self.names)
             with hdf5.replaced(self.path.with_suffix(".xdmf")) as part:
                 part.write_text(text)
 
-        hdf5.on_root(self.slab, write, f"cannot write {self.path.with_suffix('.xdmf')}")
+        hdf5.on_root(self.slab, draw, f"cannot write {self.path.with_suffix('.xdmf')}")
+        self._drawn = clock.monotonic()
+
+
+def cut_back(path: Path, slab: Slab, step: int) -> None:
+    """Take the instants after a step as not reached, in a file to which nothing more is added; collective."""
+
+    def forget() -> None:
+        if path.exists():
+            with h5py.File(path, "r") as file:
+                times = np.where(file["step"][...] > step, np.nan, file["t"][...])
+            hdf5.put(path, {"t": times})
+
+    hdf5.on_root(slab, forget, f"cannot write {path}")
+
+
+class Layout:
+    """What a file of fields holds."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self.names = tuple(name for name in UNITS if name in file)
+        self.steps: tuple[int, ...] = tuple(file["step"][...].tolist())
+        self.times: NDArray[np.float64] = file["t"][...]
+        for name in self.names:
+            if file[name].shape != (len(self.steps), len(file["y"]), len(file["x"])):
+                raise ValueError(f"{name} has shape {file[name].shape}")
+
+    def reached(self, step: int) -> list[int]:
+        """The instants that were saved, up to a step."""
+        pairs = zip(self.steps, self.times, strict=True)
+        return [number for number, time in pairs if number <= step and not np.isnan(time)]
+
+
+def _layout(path: Path) -> tuple[Layout | None, str]:
+    try:
+        with h5py.File(path, "r") as file:
+            return Layout(file), ""
+    except FileNotFoundError:
+        return None, f"{path} is missing: the fields saved so far are lost"
+    except hdf5.FAILURES as error:
+        return None, f"{path} cannot be read ({hdf5.reason(error)}): the fields saved so far are lost"
 
 
 def xdmf(
@@ -90,7 +189,7 @@ def xdmf(
             for name in names
         )
         grids.append(
-            f'<Grid><Time Value="{time!r}"/><Topology TopologyType="2DCoRectMesh" Dimensions="{ny} {nx}"/>'
+            f'<Grid><Time Value="{float(time)!r}"/><Topology TopologyType="2DCoRectMesh" Dimensions="{ny} {nx}"/>'
             f'<Geometry GeometryType="ORIGIN_DXDY"><DataItem Dimensions="2" Format="XML">0 0</DataItem>'
             f'<DataItem Dimensions="2" Format="XML">{ly / ny!r} {lx / nx!r}</DataItem></Geometry>{attributes}</Grid>'
         )

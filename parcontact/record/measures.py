@@ -1,16 +1,23 @@
 """measures.csv: one row per step and one for the initial state, written by root."""
 
 import csv
+import os
 from pathlib import Path
 from typing import Any
 
+from . import hdf5
 from .row import Row
 
+SOLVED = ("iterations", "residual", "penetration", "operator_calls")
 COLUMNS = (
-    "step,time,distance,pressure,force_x,force_y,friction,contact_area,approach,mean_gap,max_pressure,"
-    "iterations,residual,penetration,operator_calls,work,stored,dissipated,seconds"
-).split(",")
-FLUSH_SECONDS = 1.0
+    *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap"),
+    *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds"),
+)
+
+
+def columns(branches: int) -> list[str]:
+    """Names of the columns when the dissipation of so many branches is asked for."""
+    return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches))]
 
 
 def values(row: Row) -> list[Any]:
@@ -30,36 +37,55 @@ def _text(value: float) -> str:
 
 
 class MeasuresFile:
-    """The growing file; a line is complete when the next one begins."""
+    """The growing file; a line that does not end in a newline is none."""
 
     def __init__(self, path: Path, branches: int) -> None:
         """Continue the file or begin it."""
         new = not path.exists() or path.stat().st_size == 0
+        self._branches = branches
         self._file = path.open("a", newline="")
         self._writer = csv.writer(self._file, lineterminator="\n")
         if new:
-            self._writer.writerow([*COLUMNS, *(f"dissipated_{k}" for k in range(branches))])
+            self._writer.writerow(columns(branches))
+            self._file.flush()
 
     def write(self, row: Row) -> None:
-        self._writer.writerow(values(row))
+        self._writer.writerow(values(row)[: len(COLUMNS) + self._branches])
         self._file.flush()
+
+    def sync(self) -> None:
+        """Wait until all rows are on the disk."""
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         self._file.close()
 
 
-def cut_back(path: Path, step: int) -> None:
-    """Remove the rows after `step`, and one that is incomplete."""
-    lines = path.read_text().splitlines(keepends=True)
-    kept = [line for line in lines[1:] if line.endswith("\n") and int(line.split(",", 1)[0]) <= step]
-    replacement = path.with_suffix(".csv.part")
-    replacement.write_text("".join([*lines[:1], *kept]))
-    replacement.replace(path)
+def cut_back(path: Path, step: int, branches: int) -> str:
+    """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
+
+    Returns what is missing, or ''.
+    """
+    if not path.exists():
+        return f"{path} is missing: the rows up to step {step} are lost"
+    with path.open(newline="") as file:
+        complete = (line for line in file if line.endswith("\n"))
+        table = csv.DictReader(complete, restval="")
+        kept = [row for row in table if int(row["step"]) <= step]
+    with hdf5.replaced(path) as part, part.open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns(branches), restval="", extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(kept)
+        file.flush()
+        os.fsync(file.fileno())
+    if len(kept) != step + 1:
+        return f"{path} has {len(kept)} of the {step + 1} rows up to step {step}: the others are lost"
+    return ""
 
 
 def read(path: Path) -> dict[str, list[float]]:
     """Columns of a measures file by name; NaN for what was not asked for."""
     with path.open(newline="") as file:
         table = list(csv.reader(file))
-    columns = zip(*table[1:], strict=True) if len(table) > 1 else [[] for _ in table[0]]
-    return {name: [float(text or "nan") for text in column] for name, column in zip(table[0], columns, strict=True)}
+    series = zip(*table[1:], strict=True) if len(table) > 1 else [[] for _ in table[0]]
+    return {name: [float(text or "nan") for text in column] for name, column in zip(table[0], series, strict=True)}

@@ -1,13 +1,19 @@
-"""Where a file comes from: what an HDF5 file says about the run that made it."""
+"""Where a file comes from: what an HDF5 file says about the runs that made it."""
 
 import json
 import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime
 from importlib import metadata
 
 import h5py
+import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
 
+PROGRAM = f"parcontact {__version__}"
 LIBRARIES = ("numpy", "pyfftw", "mpi4py", "h5py", "numba")
 REFERENCES = (
     "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space (method, state variables)",
@@ -15,15 +21,68 @@ REFERENCES = (
     "A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377 (pressure constant on a cell)",
     "M. Frigo, S. G. Johnson, Proc. IEEE 93 (2005) 216 (FFTW)",
 )
+CHAIN_BYTES = 60_000  # of the text of a chain: an attribute of fixed size can be renewed in place
 
 
-def write(file: h5py.File, job: str, chain: list[dict[str, object]], ranks: int, seeds: list[int]) -> None:
-    """Attributes of the file: the resolved job as YAML, the chain of earlier runs, ranks, seeds, versions, references."""
-    file.attrs["program"] = f"parcontact {__version__}"
-    file.attrs["job"] = job
-    file.attrs["chain"] = json.dumps(chain)
-    file.attrs["ranks"] = ranks
-    file.attrs["seeds"] = seeds
-    versions = {name: metadata.version(name) for name in LIBRARIES}
-    file.attrs["libraries"] = json.dumps({"python": platform.python_version(), "hdf5": h5py.version.hdf5_version, **versions})
-    file.attrs["references"] = "\n".join(REFERENCES)
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+@dataclass(frozen=True)
+class Link:
+    """One run of a chain, or several in a row that were alike: its resolved job, and the step from which it went on."""
+
+    job: str
+    ranks: int
+    from_step: int = 0
+    runs: int = 1
+    program: str = PROGRAM
+    started: str = field(default_factory=_now)
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a file is to say of its origin: the chain of runs up to the present one, and the seeds of its roughness."""
+
+    chain: tuple[Link, ...]
+    seeds: tuple[int, ...] = ()
+
+    def write(self, file: h5py.File) -> None:
+        """Attributes of the file: program, resolved job (YAML), chain (JSON), ranks, seeds, libraries, references."""
+        now = self.chain[-1]
+        file.attrs["program"] = now.program
+        file.attrs["job"] = now.job
+        file.attrs.create("chain", _fixed(self.chain))
+        file.attrs["ranks"] = now.ranks
+        file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64)
+        versions = {name: metadata.version(name) for name in LIBRARIES}
+        versions = {"python": platform.python_version(), "hdf5": h5py.version.hdf5_version, **versions}
+        file.attrs["libraries"] = json.dumps(versions)
+        file.attrs["references"] = "\n".join(REFERENCES)
+
+    def renew(self, file: h5py.File) -> None:
+        """Put the longer chain into a file that has one; nothing else in it changes its place."""
+        file.attrs.modify("chain", _fixed(self.chain))
+
+
+def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
+    """The chain with one more run; a run like the last is only counted."""
+    if chain and (chain[-1].job, chain[-1].ranks, chain[-1].program) == (link.job, link.ranks, link.program):
+        return (*chain[:-1], replace(chain[-1], runs=chain[-1].runs + 1))
+    return (*chain, link)
+
+
+def read_chain(file: h5py.File) -> tuple[Link, ...]:
+    """The chain of runs that made the file."""
+    return tuple(Link(**link) for link in json.loads(bytes(file.attrs["chain"])))
+
+
+def _fixed(chain: tuple[Link, ...]) -> NDArray[np.bytes_]:
+    """As JSON in an array of fixed size; without the oldest links where they do not fit."""
+    text = b"[]"
+    for start in range(len(chain)):
+        whole = json.dumps([asdict(link) for link in chain[start:]]).encode()
+        if len(whole) <= CHAIN_BYTES:
+            text = whole
+            break
+    return np.array(text, dtype=f"S{CHAIN_BYTES}")

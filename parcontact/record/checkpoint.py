@@ -1,0 +1,238 @@
+"""Checkpoints: all that a run remembers at one instant, in an HDF5 file that proves itself whole.
+
+Maps are global datasets `part/name` of shape (ny, nx), so that any number of ranks reads its rows; numbers are small
+datasets. Both are in the units of the run, which are powers of two: the attribute `unit` is the SI value of 1.
+
+Every row of every map has its CRC-32 in the group `checksums`. All bytes that are not in a map have theirs in the seal,
+which is text in front of what HDF5 reads (its user block) and is written last: HDF5 itself never sees a damaged file,
+which it may not survive. The file has another name until all of it is on the disk.
+"""
+
+import json
+import os
+import zlib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, RunError
+from ..parallel.slab import Array, Slab
+from . import hdf5
+from .provenance import Link, Provenance, read_chain
+
+FORMAT = 1
+TITLE = "parcontact checkpoint, format "
+SEAL = 4096  # bytes set aside for it
+SUMS = "checksums"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Something remembered: this rank's rows of a map (two dimensions), or numbers; `unit` is the SI value of 1."""
+
+    value: NDArray[Any] | float
+    unit: float = 1.0
+    symbol: str = "1"
+
+    @property
+    def is_map(self) -> bool:
+        return np.ndim(self.value) == 2
+
+    @property
+    def nbytes(self) -> int:
+        return np.asarray(self.value).nbytes
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a sound checkpoint says: `numbers` and their `units` by name, of maps the type and the checksums of rows."""
+
+    path: Path
+    step: int
+    time: float
+    job: dict[str, Any]
+    chain: tuple[Link, ...]
+    shape: tuple[int, int]
+    units: dict[str, float]
+    numbers: dict[str, NDArray[Any]]
+    maps: dict[str, np.dtype[Any]]
+    sums: dict[str, NDArray[np.uint32]]
+
+    @property
+    def ranks(self) -> int:
+        return self.chain[-1].ranks
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a checkpoint says of itself: where the run is, its job as plain data, and where the file comes from."""
+
+    step: int
+    time: float
+    job: Mapping[str, Any]
+    provenance: Provenance
+
+    def write(self, file: h5py.File) -> None:
+        file.attrs["step"], file.attrs["time"] = self.step, self.time
+        file.attrs["plain job"] = json.dumps(self.job)
+        self.provenance.write(file)
+
+
+def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in_turn: bool = False) -> None:
+    """Write a checkpoint; collective. On an error nothing of it is left, and what had the name before still has it."""
+    maps = _maps(entries)
+    part = path.with_name(path.name + ".part")
+
+    def build(file: h5py.File) -> None:
+        facts.write(file)
+        for name, rows in maps.items():
+            hdf5.fixed(file, name, (slab.ny, slab.nx), rows.dtype)
+        for name, entry in entries.items():
+            if name in maps:
+                hdf5.fixed(file, f"{SUMS}/{name}", (slab.ny,), np.uint32)
+            else:
+                file[name] = entry.value
+            file[name].attrs["unit"], file[name].attrs["symbol"] = entry.unit, entry.symbol
+
+    def finish() -> None:
+        hdf5.put(part, {f"{SUMS}/{name}": np.concatenate([sums[name] for sums in everyone]) for name in maps})
+        _seal(part)
+
+    try:
+        hdf5.lay_out(part, slab, build, SEAL)
+        hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()], in_turn)
+        everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
+        hdf5.on_root(slab, finish, f"cannot write {part}")
+        hdf5.sync(part, slab)
+        hdf5.on_root(slab, lambda: _publish(part, path), f"cannot make {path}")
+    except RunError:
+        if slab.root:
+            with suppress(OSError):
+                part.unlink()
+        raise
+
+
+def _maps(entries: Mapping[str, Entry]) -> dict[str, Array]:
+    return {name: np.asarray(entry.value) for name, entry in entries.items() if entry.is_map}
+
+
+def _publish(part: Path, path: Path) -> None:
+    part.replace(path)
+    hdf5.sync_one(path.parent)
+
+
+def row_sums(rows: Array) -> NDArray[np.uint32]:
+    """CRC-32 of each row of a map."""
+    return np.array([zlib.crc32(row) for row in rows], dtype=np.uint32)
+
+
+def inspect(path: Path) -> Contents:
+    """Read all but the maps, which are not checked here; raises InputError, in one sentence, for what is not sound."""
+    try:
+        if problem := _broken(path):
+            raise InputError(f"{path} {problem}")
+        with h5py.File(path, "r") as file:
+            return _contents(path, file)
+    except hdf5.FAILURES as error:
+        raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
+
+
+def is_one(path: Path) -> bool:
+    """Whether a file says that it is a checkpoint; raises OSError."""
+    with path.open("rb") as file:
+        return file.read(len(TITLE)) == TITLE.encode()
+
+
+def _seal(path: Path) -> None:
+    with h5py.File(path, "r") as hdf:
+        regions = hdf5.regions(hdf)
+    with path.open("r+b") as file:
+        size = file.seek(0, os.SEEK_END)
+        facts = {"bytes": size, "maps": regions, "checksum": _outside(file, size, regions)}
+        file.seek(0)
+        file.write(f"{TITLE}{FORMAT}\n{json.dumps(facts)}\n".encode())
+
+
+def _broken(path: Path) -> str:
+    """What the seal says is wrong with the file, or ''."""
+    with path.open("rb") as file:
+        title, facts, *_ = [*file.read(SEAL).split(b"\n"), b""]
+        if not title.startswith(TITLE.encode()):
+            return "is incomplete or damaged: it has no seal"
+        if (version := int(title[len(TITLE) :])) > FORMAT:
+            return f"is of format {version}, written by a newer parcontact: this one reads up to {FORMAT}"
+        try:
+            wanted, regions, checksum = itemgetter("bytes", "maps", "checksum")(json.loads(facts))
+        except (ValueError, KeyError, TypeError):
+            return "is damaged: its seal cannot be read"
+        if (size := file.seek(0, os.SEEK_END)) != wanted:
+            return f"is damaged: it has {size} bytes instead of {wanted}"
+        if _outside(file, size, regions) != checksum:
+            return "is damaged: what is not in its maps does not match its checksum"
+    return ""
+
+
+def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> int:
+    """CRC-32 of all bytes that are neither in the seal nor in a map."""
+    total = 0
+    for start, stop in hdf5.outside(size, regions, SEAL):
+        total = zlib.crc32(os.pread(file.fileno(), stop - start, start), total)
+    return total
+
+
+def _contents(path: Path, file: h5py.File) -> Contents:
+    maps = {item.name[1:]: item.dtype for item in _datasets(file, 2)}
+    numbers = {item.name[1:]: item[()] for item in [*_datasets(file, 0), *_datasets(file, 1)]}
+    shape = next((file[name].shape for name in maps), (0, 0))
+    return Contents(
+        path,
+        int(file.attrs["step"]),
+        float(file.attrs["time"]),
+        json.loads(file.attrs["plain job"]),
+        read_chain(file),
+        shape,
+        {name: float(file[name].attrs["unit"]) for name in [*maps, *numbers]},
+        numbers,
+        maps,
+        {name: file[f"{SUMS}/{name}"][...] for name in maps},
+    )
+
+
+def verify(contents: Contents, slab: Slab) -> str:
+    """Check this file's maps against their checksums, every rank its rows; collective. Returns what is wrong, or ''."""
+    rows = np.empty(0)
+    try:
+        for name, dtype in contents.maps.items():
+            if rows.dtype != dtype or rows.shape != slab.shape:
+                rows = np.empty(slab.shape, dtype)
+            hdf5.read(contents.path, slab, [hdf5.Part(name, (), rows)])
+            bad = np.flatnonzero(row_sums(rows) != contents.sums[name][slab.rows])
+            if count := int(slab.sum(float(bad.size))[0]):
+                return f"{contents.path} is damaged: {count} of {slab.ny} rows of {name} do not match their checksums"
+    except RunError as error:
+        return str(error)
+    return ""
+
+
+def read(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
+    """Read the maps of a checkpoint into those of `entries`, in their units; collective. Numbers are in `contents`."""
+    maps = _maps(entries)
+    hdf5.read(contents.path, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()])
+    for name, rows in maps.items():
+        if contents.units[name] != entries[name].unit:
+            rows *= contents.units[name] / entries[name].unit
+
+
+def _datasets(file: h5py.File, dimensions: int) -> list[h5py.Dataset]:
+    """All datasets of so many dimensions but the checksums, by name."""
+    names: list[str] = []
+    file.visit(names.append)
+    items = (file[name] for name in sorted(names) if not name.startswith(SUMS))
+    return [item for item in items if isinstance(item, h5py.Dataset) and item.ndim == dimensions]

@@ -1,0 +1,78 @@
+"""What a file of a run holds, and whether it is sound."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..parallel.slab import Array, Slab
+from . import checkpoint, fields, hdf5
+from .provenance import Link, read_chain
+
+SHOWN = 20  # numbers of one name at most
+
+
+def describe(path: Path) -> tuple[str, bool]:
+    """Text about a checkpoint or a file of fields, and whether it is sound; one rank reads all of it."""
+    try:
+        if checkpoint.is_one(path):
+            return _checkpoint(path)
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("kind") == fields.KIND:
+                return _fields(path, file)
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist") from None
+    except hdf5.FAILURES as error:
+        return f"{path} cannot be read: {hdf5.reason(error)}", False
+    raise InputError(f"{path} is neither a checkpoint nor a file of fields")
+
+
+def _checkpoint(path: Path) -> tuple[str, bool]:
+    try:
+        contents = checkpoint.inspect(path)
+    except InputError as error:
+        return str(error), False
+    ny, nx = contents.shape
+    problem = checkpoint.verify(contents, Slab(MPI.COMM_SELF, nx, ny))
+    lines = [f"{path}: checkpoint after step {contents.step}, t = {contents.time:g} s, {nx} x {ny} points"]
+    lines += _runs(contents.chain)
+    lines += [f"  map    {name} ({dtype.name})" for name, dtype in contents.maps.items()]
+    lines += [f"  number {name} = {_short(value * contents.units[name])}" for name, value in contents.numbers.items()]
+    lines.append(problem or "sound: every row matches its checksum")
+    return "\n".join(lines), not problem
+
+
+def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
+    layout = fields.Layout(file)
+    saved = [index for index, time in enumerate(layout.times) if not np.isnan(time)]
+    lines = [f"{path}: {', '.join(layout.names)} on {len(file['x'])} x {len(file['y'])} points"]
+    lines += _runs(read_chain(file))
+    lines.append(f"  {len(saved)} of {len(layout.steps)} instants saved")
+    if saved:
+        first, last = saved[0], saved[-1]
+        lines[-1] += f", t = {layout.times[first]:g} s (step {layout.steps[first]})"
+        lines[-1] += f" to {layout.times[last]:g} s (step {layout.steps[last]})"
+    bad = [f"{name} after step {layout.steps[i]}" for name in layout.names for i in saved if not _finite(file[name][i])]
+    lines.append(f"damaged: not finite are {', '.join(bad)}" if bad else "sound: all saved maps are finite")
+    return "\n".join(lines), not bad
+
+
+def _runs(chain: tuple[Link, ...]) -> list[str]:
+    return [
+        f"  {'run' if link.runs == 1 else f'{link.runs} runs'} from step {link.from_step} on {link.ranks} rank"
+        f"{'s' if link.ranks > 1 else ''}, {link.program}, {link.started}"
+        for link in chain
+    ]
+
+
+def _short(value: NDArray[Any]) -> str:
+    return json.dumps(value.tolist()) if np.size(value) <= SHOWN else f"{np.size(value)} values"
+
+
+def _finite(values: Array) -> bool:
+    return bool(np.isfinite(values).all())

@@ -1,0 +1,86 @@
+"""Transform plans, kept: FFTW chooses the fastest by trying, and another choice gives other last digits.
+
+So that a run repeated on the same machine gives the same digits, the first choice for a kind of run is kept in the
+user's cache directory; so that a run continued anywhere does, checkpoints carry it too.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import zlib
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pyfftw
+from numpy.typing import NDArray
+
+from ..job import Job
+from ..parallel.fft import export_wisdom, import_wisdom
+from ..parallel.slab import Slab
+
+CPUINFO = Path("/proc/cpuinfo")
+
+
+def gathered(slab: Slab) -> NDArray[np.uint8]:
+    """The plans of all ranks, for a checkpoint; collective."""
+    everyone = [wisdom.decode("latin-1") for wisdom in slab.from_all(export_wisdom())]
+    different = list(dict.fromkeys(everyone))
+    text = json.dumps({"plans": different, "of": [different.index(wisdom) for wisdom in everyone]})
+    return np.frombuffer(zlib.compress(text.encode()), dtype=np.uint8)
+
+
+def recall(job: Job, slab: Slab, saved: NDArray[np.uint8] | None) -> None:
+    """Make the plans of a checkpoint, if it is of as many ranks, else those of the first such run here; collective."""
+    data = None if saved is None else saved.tobytes()
+    if not _adopt(data, slab):
+        _adopt(slab.agree(_read(_place(job, slab)) if slab.root else None), slab)
+
+
+def keep(job: Job, slab: Slab) -> None:
+    """Keep the plans of this run for later ones, unless there are some; collective."""
+    data = gathered(slab).tobytes()
+    if slab.root:
+        with suppress(OSError):  # a convenience: a run without a home does as well
+            place = _place(job, slab)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            part = place.with_name(f"{place.name}.{os.getpid()}")
+            part.write_bytes(data)
+            try:
+                os.link(part, place)  # the first one stays
+            except FileExistsError:
+                pass
+            finally:
+                part.unlink()
+
+
+def _adopt(data: bytes | None, slab: Slab) -> bool:
+    if data is None:
+        return False
+    try:
+        kept = json.loads(zlib.decompress(data))
+        ranks, plans = kept["of"], kept["plans"]
+        return len(ranks) == slab.comm.size and import_wisdom(plans[ranks[slab.comm.rank]].encode("latin-1"))
+    except (zlib.error, ValueError, KeyError, IndexError, TypeError):
+        return False
+
+
+def _read(place: Path) -> bytes | None:
+    try:
+        return place.read_bytes()
+    except OSError:
+        return None
+
+
+def _place(job: Job, slab: Slab) -> Path:
+    """A file for all runs on this kind of machine whose transforms are the same."""
+    cpu = ""
+    with suppress(OSError):
+        cpu = next((line for line in CPUINFO.read_text().splitlines() if line.startswith("model name")), "")
+    steady = [job.initial.state, job.steady is not None]
+    facts = [platform.machine(), cpu, pyfftw.fftw_version]
+    facts += [slab.comm.size, job.grid.points, job.grid.boundary, job.numerics.kernel, job.numerics.precision, steady]
+    name = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return home / "parcontact" / f"plans-{name}"

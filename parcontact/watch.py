@@ -1,0 +1,140 @@
+"""Why a run stops early, and when it saves: signals, a stop file, limits of wall time.
+
+Every rank may be sent a signal; all else is known to root. One small message per step decides for all.
+"""
+
+import os
+import signal
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+
+from .job import Checkpoint
+from .parallel.slab import Slab
+
+SIGNALS = (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
+LOOK_SECONDS = 1.0  # between two looks for the stop file
+RESERVE_SECONDS = 3.0  # of wall time for what is not measured: ending MPI, closing files
+FIRST_WRITE = 50e6  # bytes per second: how fast the first checkpoint is expected to be written
+RECENT = 50  # steps whose longest is expected of the next one
+
+GO, WALL, FILE, SIGNAL = range(4)  # the largest one that any rank sees decides
+REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was found", SIGNAL: "a signal asked for it"}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What all ranks do after a step: `stop` says why the run ends early, `problem` what makes it fail; or ''."""
+
+    stop: str = ""
+    save: bool = False
+    problem: str = ""
+
+
+class Signals:
+    """Notes that a signal has come; a second Ctrl-C ends the process at once."""
+
+    def __init__(self) -> None:
+        self.come = False
+
+    def note(self, number: int, frame: FrameType | None) -> None:
+        if self.come and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        self.come = True
+
+    @contextmanager
+    def noted(self) -> Iterator["Signals"]:
+        before = {number: signal.signal(number, self.note) for number in SIGNALS}
+        try:
+            yield self
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+@dataclass
+class Watch:
+    """Asked after every step. `limit` is the time (of `time.time`) at which the run must have ended, if any."""
+
+    slab: Slab
+    rules: Checkpoint
+    stop_file: Path
+    signals: Signals
+    limit: float | None = None
+    state_bytes: int = 0
+    _saved: float = field(default_factory=time.monotonic)
+    _looked: float = 0.0
+    _last: float = 0.0
+    _write: float = -1.0
+    _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
+
+    def judge(self, step: int, began: bool, problem: str = "") -> Verdict:
+        """After a step; collective. `began`: a step was made in this run; `problem`: what root could not do."""
+        now = time.monotonic()
+        if began:
+            self._steps.append(now - self._last)
+        self._last = now
+        codes = [SIGNAL * self.signals.come, 0, 0]
+        if self.slab.root:
+            codes = [max(codes[0], self._stop(now, began)), self._due(step, now, began), bool(problem)]
+        stop, save, failed = self.slab.reduce((), codes)
+        if failed:
+            return Verdict(problem=self.slab.agree(problem))
+        if stop == FILE and self.slab.root:
+            self.stop_file.unlink(missing_ok=True)
+        return Verdict(REASONS.get(int(stop), ""), bool(save))
+
+    def saved(self, seconds: float) -> None:
+        """Tell that a checkpoint was written, and how long that took."""
+        self._write = seconds
+        self._saved = self._last = time.monotonic()
+
+    def _stop(self, now: float, began: bool) -> int:
+        if began and self.limit is not None and time.time() + self.reserve > self.limit:
+            return WALL
+        if now - self._looked > LOOK_SECONDS:
+            self._looked = now
+            return FILE if self.stop_file.exists() else GO
+        return GO
+
+    def _due(self, step: int, now: float, began: bool) -> bool:
+        if not began:
+            return False
+        if self.rules.every is not None:
+            return step % self.rules.every == 0
+        return self.rules.minutes is not None and now - self._saved >= 60.0 * self.rules.minutes
+
+    @property
+    def reserve(self) -> float:
+        """Wall time [s] to keep for one more step and a checkpoint, both twice as long as seen so far."""
+        write = self._write if self._write >= 0.0 else self.state_bytes / FIRST_WRITE
+        return RESERVE_SECONDS + 2.0 * (max(self._steps, default=0.0) + write)
+
+
+def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
+    """When a run must have ended, in the time of `time.time`: after `wall` seconds, or with its batch job.
+
+    Slurm tells the end of a job, SLURM_JOB_END_TIME; PBS (Torque) how long it may last, PBS_WALLTIME.
+    """
+    born = _born()
+    limits = [] if wall is None else [born + wall]
+    for name, start in (("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", born)):
+        try:
+            limits.append(start + float(environment[name]))
+        except (KeyError, ValueError):
+            continue
+    return min(limits, default=None)
+
+
+def _born() -> float:
+    """When this process began, in the time of `time.time`."""
+    try:
+        ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
+        age = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+        return time.time() - max(age, 0.0)
+    except (OSError, ValueError, IndexError):
+        return time.time()
