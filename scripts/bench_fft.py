@@ -6,6 +6,7 @@ which others who use the machine disturb least; the median of the ratios of each
 """
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
@@ -28,6 +29,7 @@ def arguments() -> argparse.Namespace:
 
 
 def start(ranks: int) -> int:
+    print(f"others keep {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores busy (mean of the last minute)", flush=True)
     mpirun = Path(sys.executable).with_name("mpirun")
     return subprocess.run([mpirun, "-n", str(ranks), sys.executable, *sys.argv, "--inside"]).returncode
 

@@ -4,28 +4,33 @@ An elastic half space of shear modulus 1 under the pressure p moves by the Bouss
 
     u(x) = (1 - nu)/(2 pi) int p(x') / |x - x'| d2x',       in Fourier space   u^(q) = (1 - nu)/|q| p^(q).
 
-With a modulus G divide by G. Lengths may be in any unit: the result is in that unit times the pressure over the modulus.
-`spectral` takes this symbol as it is; `love` takes the pressure as constant on each cell (A. E. H. Love, Phil. Trans. R.
-Soc. A 228 (1929) 377; paper, Eq. 2) and the displacement at cell centres. The mean displacement of a periodic half
-space is arbitrary and set to 0.
+With a modulus G divide by G. Lengths may be in any unit: the result is in that unit times the pressure over the
+modulus. `spectral` takes this symbol as it is; `love` takes the pressure as constant on each cell (A. E. H. Love, Phil.
+Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2) and the displacement at cell centres. The mean displacement of a periodic
+half space is arbitrary and set to 0.
 """
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numba
 import numpy as np
 import pyfftw
 from numpy.typing import DTypeLike, NDArray
+from scipy.special import erf
 
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
+
+NEAR = 4.0  # cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
+GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.legendre.leggauss(6))
 
 
 class Convolution:
     """A linear operator given by its symbol on the wavenumbers of a transform, shape `fft.shape`."""
 
-    def __init__(self, fft: FFT, symbol: Array) -> None:
+    def __init__(self, fft: FFT, symbol: NDArray[np.inexact]) -> None:
         self.fft = fft
         scale = 1.0 / (fft.mx * fft.my)
         self.symbol = np.multiply(symbol, scale).astype(fft.dtype if np.isrealobj(symbol) else fft.complex)
@@ -38,18 +43,14 @@ class Convolution:
 
 
 class Narrowed:
-    """An operator applied in single precision to double precision maps: half the time and messages, 7 digits."""
+    """An operator of single precision for maps of double precision: half the time and messages, 7 digits."""
 
     def __init__(self, operator: Convolution) -> None:
         self.operator = operator
-        slab = operator.fft.slab
-        self._field, self._out = slab.empty(np.float32), slab.empty(np.float32)
 
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""
-        self._field[...] = field
-        out[...] = self.operator.apply(self._field, self._out)
-        return out
+        return self.operator.apply(field, out)
 
 
 def wavenumbers(fft: FFT, size: tuple[float, float]) -> tuple[Array, Array]:
@@ -70,7 +71,7 @@ def periodic(fft: FFT, size: tuple[float, float], poisson: float = 0.5, kernel: 
 
 
 def inverse(fft: FFT, size: tuple[float, float], poisson: float = 0.5) -> Convolution:
-    """Displacement -> pressure, `|q|/(1 - nu)`: exact for the spectral periodic half space, a preconditioner for others.
+    """Displacement -> pressure, `|q|/(1 - nu)`: exact for the spectral periodic half space, else a preconditioner.
 
     At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
     acts on mean values only.
@@ -87,7 +88,7 @@ def free(slab: Slab, size: tuple[float, float], poisson: float = 0.5, dtype: DTy
     """
     lengths = pyfftw.next_fast_len(2 * slab.nx), pyfftw.next_fast_len(2 * slab.ny)
     fft = FFT(slab, lengths, dtype)
-    return Convolution(fft, tabulate(fft, size, lambda *cell: love(*cell, poisson)).real)
+    return Convolution(fft, tabulate(fft, size, partial(love, poisson=poisson)).real)
 
 
 def tabulate(fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array]) -> NDArray[np.complexfloating]:
@@ -99,7 +100,7 @@ def tabulate(fft: FFT, size: tuple[float, float], coefficient: Callable[..., Arr
     padded = slab.resized(fft.mx, fft.my)
     x, y = (step * _distances(count) for step, count in ((dx, fft.mx), (dy, fft.my)))
     table = np.ascontiguousarray(coefficient(x[None, :], y[padded.rows, None], dx, dy))
-    return FFT(padded).forward(table).copy()
+    return FFT(padded).forward(table)
 
 
 def _distances(count: int) -> NDArray[np.int64]:
@@ -108,53 +109,79 @@ def _distances(count: int) -> NDArray[np.int64]:
 
 
 def love(x: Array, y: Array, dx: float, dy: float, poisson: float = 0.5) -> Array:
-    """Displacement [length] at distance (x, y) from the centre of a `dx x dy` cell under unit pressure, shear modulus 1.
+    """Displacement [length] at distance (x, y) from the centre of a `dx x dy` cell under unit pressure, for G = 1.
 
-    Love (1929): `(1 - nu)/(2 pi)` times the integral of 1/r over the cell, from the primitive
-    `x asinh(y/|x|) + y asinh(x/|y|)` at its four corners.
+    Love (1929): `(1 - nu)/(2 pi)` times the integral of 1/r over the cell; relative error below 2e-14 at any distance.
     """
-    result = np.zeros(np.broadcast_shapes(x.shape, y.shape))
-    for sign_x in (1, -1):
-        for sign_y in (1, -1):
-            a, b = x + sign_x * dx / 2, y + sign_y * dy / 2
-            result += sign_x * sign_y * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
-    return result * (1.0 - poisson) / (2 * np.pi)
+    return np.asarray(over_cell(x, y, dx, dy)) * (1.0 - poisson) / (2 * np.pi)
+
+
+@numba.vectorize(cache=True)
+def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the types itself
+    """Integral of 1/r over a `dx x dy` cell at distance (x, y).
+
+    Near by, the differences of the primitive `x asinh(y/|x|) + y asinh(x/|y|)` at the four corners. They cancel far
+    away: there each line of the cell across the farther direction is integrated in closed form, and then over lines.
+    """
+    x, y = abs(x), abs(y)
+    if x * dy < y * dx:
+        x, y, dx, dy = y, x, dy, dx
+    total = 0.0
+    if x < NEAR * dx:
+        for i in (-1, 1):
+            a = x + 0.5 * i * dx
+            for j in (-1, 1):
+                b = y + 0.5 * j * dy
+                if a != 0.0:
+                    total += i * j * a * math.asinh(b / abs(a))
+                if b != 0.0:
+                    total += i * j * b * math.asinh(a / abs(b))
+        return total
+    low, high = y - 0.5 * dy, y + 0.5 * dy
+    for node, weight in zip(GAUSS_NODES, GAUSS_WEIGHTS):  # noqa: B905  # numba has no strict zip
+        a = x + node * dx
+        if low > 0.0:
+            line = 2.0 * math.atanh(dy / (math.sqrt(a**2 + low**2) + math.sqrt(a**2 + high**2)))
+        else:
+            line = math.asinh(high / a) - math.asinh(low / a)
+        total += weight * line
+    return total * dx
 
 
 def _cell_factor(fft: FFT, size: tuple[float, float]) -> Array:
-    """Compliance of cell-constant pressure over that of a sampled wave, for each wavenumber.
+    """Compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
 
     A wave of pressures constant on cells contains all aliases of its wavenumber, each with the cell's form factor:
-    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid.
+    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
+
+        1/|q| = 2/sqrt(pi) int_0^inf exp(-q^2 t^2) dt
+
+    the sums over Qx and Qy separate, and the integral is one product of matrices. Double exponential quadrature (H.
+    Takahasi and M. Mori, Publ. RIMS 9 (1974) 721) starts far inside a cell and ends far outside the box.
     """
-    qx, qy = (q.ravel() for q in wavenumbers(fft, size))
-    return np.asarray(_alias_sum(qx, qy, size[0] / fft.mx, size[1] / fft.my, _taper(10)))
+    qx, qy = wavenumbers(fft, size)
+    dx, dy = size[0] / fft.mx, size[1] / fft.my
+    shortest, longest = min(dx, dy) / 16, max(size)
+    u = np.arange(-3.7, math.log(2.0 * longest / shortest), 0.1)
+    t = shortest * np.exp(u - np.exp(-u))
+    weight = 0.2 / math.sqrt(math.pi) * t * (1.0 + np.exp(-u))
+    along_x, along_y = _blurred_cell(qx.ravel() * dx / 2, t / dx), _blurred_cell(qy.ravel() * dy / 2, t / dy)
+    q = np.hypot(qx, qy)
+    return np.where(q > 0.0, q * ((weight[:, None] * along_y).T @ along_x), 1.0)
 
 
-def _taper(reach: int) -> Array:
-    """Weights of the terms 0, 1, ... of an alternating series: binomial tails make its truncation error tiny."""
-    steps = np.array([math.comb(reach, k) for k in range(reach + 1)]) / 2.0**reach
-    return np.concatenate([np.ones(reach), 1.0 - np.cumsum(steps)[:-1]])
+def _blurred_cell(b: Array, width: Array) -> Array:
+    """`sum_n sinc(b_n) exp(-(2 b_n width)^2)`, b_n = b + pi n: the sampled wave of a cell blurred by `width` [cells].
 
-
-@numba.njit(cache=True)
-def _alias_sum(qx: Array, qy: Array, dx: float, dy: float, weights: Array) -> Array:
-    factor = np.ones((qy.size, qx.size))
-    reach = weights.size - 1
-    for j in range(qy.size):
-        reach_y = reach if qy[j] != 0.0 else 0  # every other alias of a constant has form factor 0
-        for i in range(qx.size):
-            reach_x = reach if qx[i] != 0.0 else 0
-            total = 0.0
-            for n in range(-reach_y, reach_y + 1):
-                by = 0.5 * qy[j] * dy + np.pi * n
-                fy = weights[abs(n)] * (np.sin(by) / by if by != 0.0 else 1.0)
-                for m in range(-reach_x, reach_x + 1):
-                    bx = 0.5 * qx[i] * dx + np.pi * m
-                    fx = weights[abs(m)] * (np.sin(bx) / bx if bx != 0.0 else 1.0)
-                    if bx != 0.0 or by != 0.0:
-                        total += fx * fy / np.hypot(2 * bx / dx, 2 * by / dy)
-            q = np.hypot(qx[i], qy[j])
-            if q > 0.0:
-                factor[j, i] = q * total
-    return factor
+    Shape (width, b). The sum over aliases converges fast for wide blurs; for narrow ones that over cells, with
+    the share of the blurred cell in each (Poisson's summation).
+    """
+    result = np.zeros((width.size, b.size))
+    wide = width > 0.25
+    for n in range(-5, 6):
+        alias = b + np.pi * n
+        result[wide] += np.sinc(alias / np.pi) * np.exp(-((2 * width[wide, None] * alias) ** 2))
+    for cell in range(-4, 5):
+        edges = [erf((cell + side) / (2 * width[~wide, None])) for side in (-0.5, 0.5)]
+        result[~wide] += (edges[1] - edges[0]) / 2 * np.cos(2 * cell * b)
+    return result

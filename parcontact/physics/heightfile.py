@@ -1,50 +1,80 @@
 """Heights from a file: each rank reads its own rows."""
 
+import os
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
+Values = NDArray[Any]  # as they stand in the file
+
 
 def read(path: Path, dataset: str, slab: Slab) -> Array:
-    """This rank's rows of the map in a .npy, .h5 or .txt file of shape (ny, nx); collective.
+    """This rank's rows of the map of shape (ny, nx) in a .npy, .h5 or text file; collective.
 
-    Raises InputError on every rank when the shape is another one or a value is not finite.
+    Raises InputError on every rank when a rank cannot read its rows, the shape is another one, or a value is no finite
+    real number.
     """
-    rows, problem = _rows(path, dataset, slab)
-    bad = 0.0 if problem else float(np.count_nonzero(~np.isfinite(rows)))
+    rows, problem = _attempt(path, dataset, slab)
     problem = next((text for text in slab.from_all(problem) if text), "")
-    if not problem and (count := slab.sum(bad)[0]):
-        problem = f"{path}: {int(count)} of its {slab.points} heights are not finite numbers"
+    if not problem:
+        wrong = int(slab.sum(float(np.count_nonzero(~np.isfinite(rows))))[0])
+        problem = f"{path}: {wrong} of its {slab.points} heights are not finite numbers" if wrong else ""
     if problem:
         raise InputError(problem)
-    return rows
+    return rows.astype(np.float64)
 
 
-def _rows(path: Path, dataset: str, slab: Slab) -> tuple[Array, str]:
-    wanted = (slab.ny, slab.nx)
+def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
+    """This rank's rows, and what is wrong with them."""
     try:
-        if path.suffix == ".npy":
-            whole = np.load(path, mmap_mode="r")
-            shape, part = whole.shape, whole[slab.rows] if whole.shape == wanted else None
-        elif path.suffix == ".h5":
-            with h5py.File(path) as file:
-                if dataset not in file:
-                    return np.empty(0), f"{path} has no dataset {dataset!r}; it has {', '.join(file) or 'none'}"
-                shape = file[dataset].shape
-                part = file[dataset][slab.rows] if shape == wanted else None
-        else:
-            with path.open() as lines:
-                data = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-            shape = (len(data), len(data[0].split()) if data else 0)
-            mine = data[slab.rows]
-            part = np.loadtxt(mine, ndmin=2) if mine and shape == wanted else np.empty((0, slab.nx))
-            part = part if shape == wanted else None
+        rows = _rows(path, dataset, slab)
+    except InputError as error:
+        return np.empty(0), str(error)
     except (OSError, ValueError) as error:
-        return np.empty(0), f"{path} cannot be read: {error}"
-    if part is None:
-        return np.empty(0), f"{path} has shape {shape}, but the grid has (ny, nx) = {wanted}"
-    return np.asarray(part, dtype=np.float64), ""
+        number = getattr(error, "errno", None)
+        reason = os.strerror(number) if number else str(error).partition("\n")[0]
+        return np.empty(0), f"{path} cannot be read: {reason}"
+    if not np.can_cast(rows.dtype, np.float64, "same_kind"):
+        return np.empty(0), f"{path} holds values of type {rows.dtype}, which are no heights"
+    return rows, ""
+
+
+def _rows(path: Path, dataset: str, slab: Slab) -> Values:
+    if path.suffix == ".npy":
+        whole = np.lib.format.open_memmap(path, mode="r")
+        _check(path, whole.shape, slab)
+        return whole[slab.rows]
+    if path.suffix == ".h5":
+        with h5py.File(path) as file:
+            found = file.get(dataset)
+            if not isinstance(found, h5py.Dataset):
+                raise InputError(f"{path} has no dataset {dataset!r}; it has {', '.join(file) or 'none'}")
+            _check(path, found.shape, slab)
+            return np.asarray(found[slab.rows])
+    return _text(path, slab)
+
+
+def _text(path: Path, slab: Slab) -> Values:
+    """A line is a row, its numbers separated by blanks; what follows a # does not count."""
+    mine, count = np.empty(slab.shape), 0
+    with path.open() as lines:
+        for number, line in enumerate(lines, 1):
+            words = line.partition("#")[0].split()
+            if words and len(words) != slab.nx:
+                raise InputError(f"{path}:{number} has {len(words)} numbers, but the grid has nx = {slab.nx}")
+            if words and slab.rows.start <= count < slab.rows.stop:
+                mine[count - slab.rows.start] = words
+            count += bool(words)
+    _check(path, (count, slab.nx), slab)
+    return mine
+
+
+def _check(path: Path, shape: tuple[int, ...], slab: Slab) -> None:
+    if shape != (slab.ny, slab.nx):
+        raise InputError(f"{path} has shape {shape}, but the grid has (ny, nx) = {slab.ny, slab.nx}")

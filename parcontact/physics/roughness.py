@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
 from .halfspace import wavenumbers
@@ -41,17 +42,28 @@ class Roughness:
         return np.where(inside, np.maximum(k / k_rolloff, 1.0) ** (-2.0 * (1.0 + self.hurst)), 0.0)
 
     def spectrum(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
-        """This rank's part of the transform of the heights [m] on a box of `size` [m]; collective."""
-        qx, qy = wavenumbers(fft, size)
-        k = np.hypot(qx, qy)
+        """This rank's part of the transform of the heights [m] on a box of `size` [m]; collective.
+
+        Raises InputError when no wave of the box lies within the limits.
+        """
+        k = np.hypot(*wavenumbers(fft, size))
         waves = np.sqrt(self.density(k)) * self._random(fft, size)
-        points = fft.mx * fft.my
+        power = fft.multiplicity * np.abs(waves) ** 2
+        square_height, square_slope = fft.slab.sum(float(power.sum()), float((power * k**2).sum()))
+        if square_height == 0.0:
+            limits = f"{self.short_wavelength:g} m and {self.long_wavelength:g} m"
+            raise InputError(f"a rough surface has no wave between {limits} that fits the box and the grid")
+        return np.asarray(waves * (self._amplitude(square_height, square_slope, size) * fft.mx * fft.my))
+
+    def _amplitude(self, square_height: float, square_slope: float, size: tuple[float, float]) -> float:
+        """What a surface of C = area 1 m^4, whose mean squares are given, is multiplied with."""
+        if self.rms_slope is not None:
+            return float(self.rms_slope / np.sqrt(square_slope))
+        if self.rms_height is not None:
+            return float(self.rms_height / np.sqrt(square_height))
         if self.psd_constant is not None:
-            return np.asarray(waves * points * np.sqrt(self.psd_constant / (size[0] * size[1])))
-        power = self.rms_slope is not None
-        target = self.rms_slope if self.rms_slope is not None else self.rms_height
-        mean_square = fft.slab.sum(float(np.sum(fft.multiplicity * np.abs(waves) ** 2 * (k**2 if power else 1.0))))[0]
-        return np.asarray(waves * (points * target / np.sqrt(mean_square) if mean_square > 0.0 else 0.0))
+            return float(np.sqrt(self.psd_constant / (size[0] * size[1])))
+        raise ValueError("one of rms_slope, rms_height and psd_constant is needed")
 
     def _random(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
         """Complex random amplitudes of mean square 1 (modulus 1 if they are fixed) for the waves within the limits."""

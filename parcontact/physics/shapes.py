@@ -25,9 +25,10 @@ def _paraboloid(r2: Array, radius: float) -> tuple[Array, Array]:
 
 def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
     """Beyond the radius the body of the shape has ended: the height stays at its equator."""
-    rest = np.sqrt(np.maximum(radius**2 - r2, 0.0))
+    inside = np.minimum(r2, radius**2)
+    rest = np.sqrt(radius**2 - inside)
     inverse = np.divide(-1.0, rest, out=np.zeros_like(rest), where=rest > 0.0)
-    return -r2 / (radius + rest), inverse
+    return -inside / (radius + rest), inverse
 
 
 @dataclass(frozen=True)

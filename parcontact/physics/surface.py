@@ -5,16 +5,20 @@ What is periodic and given by its waves (roughness, single waves, files) is kept
 which is taken as a standing wave. Shapes in closed form are evaluated anew. Every move starts from the original.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
 from . import loops
 from .halfspace import wavenumbers
 from .shapes import Shape
+
+Indices = NDArray[np.intp]
 
 
 @dataclass
@@ -29,7 +33,7 @@ class Surface:
     fft: FFT
     size: tuple[float, float]
     waves: Spectrum | None = None
-    shapes: Sequence[Shape] = field(default_factory=tuple)
+    shapes: Sequence[Shape] = ()
     periodic: bool = True
     differences: bool = False
     scale: float = 1.0
@@ -40,9 +44,9 @@ class Surface:
 
     def rescale(self, unit: float) -> None:
         """Give heights in this unit [m] from now on."""
-        self.scale = 1.0 / unit
         if self.waves is not None:
-            self.waves *= self.scale
+            self.waves *= 1.0 / unit / self.scale
+        self.scale = 1.0 / unit
 
     def heights(self, shift: tuple[float, float], out: Array) -> Array:
         """Heights of the surface moved by `shift` [m], this rank's rows; collective."""
@@ -56,34 +60,37 @@ class Surface:
         return out
 
     def forces(self, pressure: Array, shift: tuple[float, float]) -> list[float]:
-        """Sums over all points of pressure times slope along x and y (paper, Eq. 10, over the area of a cell); collective.
+        """Sums over all points of pressure times slope along x and y; collective.
 
-        In the units of the pressure and, for the slope, of heights over m.
+        That is the paper's Eq. 10 over the area of a cell; slopes are in the unit of heights over m.
         """
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
             transform = self.fft.forward(pressure)
-            loops.displace(transform, *(phase.conj() for phase in self._phases(shift)), transform)
+            phase_x, phase_y = self._phases(shift)
+            loops.displace(transform, phase_x.conj(), phase_y.conj(), transform)
             slopes, weight = self._slope_symbols(), self.fft.multiplicity.ravel()
             sums = loops.tangential(transform, self.waves, *slopes, weight)
             along_x, along_y = (value / (self.fft.mx * self.fft.my) for value in sums)
-        rows, columns = np.nonzero(pressure > 0.0) if self.shapes else ((), ())
-        for shape in self.shapes:
-            slope_x, slope_y = self._slopes(shape, shift, rows, columns)
-            touching = pressure[rows, columns].astype(np.float64)
-            along_x += self.scale * float(touching @ slope_x)
-            along_y += self.scale * float(touching @ slope_y)
+        if self.shapes:
+            points = np.nonzero(pressure)
+            loads = pressure[points].astype(np.float64)
+            for shape in self.shapes:
+                slope_x, slope_y = self._slopes(shape, shift, *points)
+                along_x += self.scale * float(loads @ slope_x)
+                along_y += self.scale * float(loads @ slope_y)
         return self.slab.sum(along_x, along_y)
 
-    # -- waves ----------------------------------------------------------------------------------------------------------
+    # -- waves --------------------------------------------------------------------------------------------------------
 
     def _phases(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
         """Factors along x and y that move a transform by `shift`; at the Nyquist wavenumber their real part."""
         factors = []
-        for q, mode, count, s in zip(
-            wavenumbers(self.fft, self.size), self.fft.modes, (self.fft.mx, self.fft.my), shift, strict=True
+        counts = self.fft.mx, self.fft.my
+        for q, mode, count, length, s in zip(
+            wavenumbers(self.fft, self.size), self.fft.modes, counts, self.size, shift, strict=True
         ):
-            phase = np.exp(-1j * q.ravel() * s)
+            phase = np.exp(-1j * q.ravel() * math.fmod(s, length))
             nyquist = 2 * np.abs(mode.ravel()) == count
             phase[nyquist] = phase[nyquist].real
             factors.append(phase)
@@ -100,7 +107,7 @@ class Surface:
             symbols.append(symbol)
         return symbols[0], symbols[1]
 
-    # -- shapes ---------------------------------------------------------------------------------------------------------
+    # -- shapes -------------------------------------------------------------------------------------------------------
 
     def _distances(self, shape: Shape, shift: tuple[float, float]) -> tuple[Array, Array]:
         """Distances from the moved centre of a shape, (1, nx) and (ny_loc, 1); the nearest image if periodic."""
@@ -111,17 +118,19 @@ class Surface:
             x, y = (d - length * np.round(d / length) for d, length in zip((x, y), self.size, strict=True))
         return x[None, :], y[:, None]
 
-    def _slopes(
-        self, shape: Shape, shift: tuple[float, float], rows: Array, columns: Array
-    ) -> tuple[Array, Array]:
-        x, y = self._distances(shape, shift)
-        x, y = x[0, columns], y[rows, 0]
+    def _slopes(self, shape: Shape, shift: tuple[float, float], rows: Indices, columns: Indices) -> tuple[Array, Array]:
+        """Slopes of a shape at some of this rank's points."""
+
+        def near(step_x: float, step_y: float) -> tuple[Array, Array]:
+            x, y = self._distances(shape, (shift[0] - step_x, shift[1] - step_y))
+            return x[0, columns], y[rows, 0]
+
         if not self.differences:
-            return shape.slope(x, y)
+            return shape.slope(*near(0.0, 0.0))
         dx, dy = self.cell
         return (
-            (shape.height(x + dx, y) - shape.height(x - dx, y)) / (2 * dx),
-            (shape.height(x, y + dy) - shape.height(x, y - dy)) / (2 * dy),
+            (shape.height(*near(dx, 0.0)) - shape.height(*near(-dx, 0.0))) / (2 * dx),
+            (shape.height(*near(0.0, dy)) - shape.height(*near(0.0, -dy))) / (2 * dy),
         )
 
 

@@ -142,17 +142,18 @@ def test_modes(comm: MPI.Intracomm, nx: int, ny: int) -> None:
     assert np.array_equal(along_y[:, 0], expected)
 
 
-def test_only_rows_of_the_map_are_sent(communicators: list[MPI.Intracomm]) -> None:
-    """Not those of the padding: 16 bytes for each wave of each row of the map that another rank owns."""
+@pytest.mark.parametrize(("dtype", "number"), [(np.float64, 16), (np.float32, 8)])
+def test_only_rows_of_the_map_are_sent(communicators: list[MPI.Intracomm], dtype: DTypeLike, number: int) -> None:
+    """Not those of the padding: one complex number for each wave of each row of the map that another rank owns."""
     for comm in communicators:
         slab = Slab(comm, 20, 14)
-        fft = FFT(slab, (40, 64))
+        fft = FFT(slab, (40, 64), dtype)
         fft.forward(slab.zeros())
         others = 21 - fft.shape[1]
-        assert slab.tally["bytes sent"] == 16 * slab.shape[0] * others
+        assert slab.tally["bytes sent"] == number * slab.shape[0] * others
         fft.backward(fft.spectrum, slab.empty())
-        assert slab.tally["bytes sent"] == 32 * slab.shape[0] * others
-        assert slab.tally["fft"] == slab.tally["fft 40x64 float64"] == 2
+        assert slab.tally["bytes sent"] == 2 * number * slab.shape[0] * others
+        assert slab.tally["fft"] == slab.tally[f"fft 40x64 {fft.dtype}"] == 2
 
 
 class Counting(pyfftw.FFTW):

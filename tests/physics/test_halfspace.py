@@ -1,0 +1,212 @@
+"""Operators of the half space against closed forms, tables, quadrature and direct sums.
+
+Sums and transforms in double precision are good to 1e-13 of the largest value, unless another tolerance is given.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.halfspace import Convolution, Narrowed, free, inverse, love, periodic
+
+from .maps import coordinates, gathered, product, random_map
+
+pytestmark = pytest.mark.mpi
+
+OPERATORS: dict[str, Callable[[Slab, tuple[float, float], float], Convolution]] = {
+    "spectral": lambda slab, size, poisson: periodic(FFT(slab), size, poisson),
+    "love": lambda slab, size, poisson: periodic(FFT(slab), size, poisson, "love"),
+    "free": free,
+    "inverse": lambda slab, size, poisson: inverse(FFT(slab), size, poisson),
+}
+
+
+def applied(operator: Convolution, whole: Array) -> Array:
+    """The operator on a whole map, the same on every rank."""
+    slab = operator.fft.slab
+    return gathered(operator.apply(np.ascontiguousarray(whole[slab.rows]), slab.empty()), slab)
+
+
+def matrix(operator: Convolution) -> Array:
+    """All of it, a column for each point."""
+    slab = operator.fft.slab
+    units = np.eye(slab.points).reshape(slab.points, slab.ny, slab.nx)
+    return np.array([applied(operator, unit).ravel() for unit in units]).T
+
+
+# -- periodic ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("poisson", [0.5, 0.3, 0.0])
+@pytest.mark.parametrize(("wx", "wy"), [(1, 0), (0, 1), (3, 2), (2, -5), (0, 6), (8, 0)])
+def test_cosine(comm: MPI.Intracomm, wx: int, wy: int, poisson: float) -> None:
+    """u = (1 - nu)/(G |q|) p; for nu = 1/2 this is p/(2 G |q|)."""
+    slab, size = Slab(comm, 18, 14), (2e-3, 5e-4)
+    x, y = coordinates(slab, size)
+    qx, qy = 2 * np.pi * wx / size[0], 2 * np.pi * wy / size[1]
+    pressure = 1e5 * np.cos(qx * x + qy * y + 0.3)
+    u = periodic(FFT(slab), size, poisson).apply(pressure, slab.empty())
+    expected = (1 - poisson) / np.hypot(qx, qy) * pressure
+    assert_allclose(u, expected, rtol=0, atol=1e-13 * 1e5 * (1 - poisson) / np.hypot(qx, qy))
+
+
+@pytest.mark.parametrize("kernel", ["spectral", "love"])
+def test_mean_pressure_moves_nothing(comm: MPI.Intracomm, kernel: str) -> None:
+    slab = Slab(comm, 9, 12)
+    operator = periodic(FFT(slab), (1.0, 2.0), 0.5, kernel)
+    whole = random_map(9, 12)
+    u = applied(operator, whole)
+    assert_allclose(u.mean(), 0.0, atol=1e-15)
+    assert_allclose(applied(operator, whole + 100.0), u, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("cells", "axis", "diagonal"),
+    [
+        (64, 0.999612, 0.999236),
+        (32, 0.998504, 0.997102),
+        (16, 0.994469, 0.989692),
+        (8, 0.981596, 0.969138),
+        (4, 0.958598, 0.956255),
+        (2, 1.16624, 1.28998),
+    ],
+)
+def test_love_against_spectral(comm: MPI.Intracomm, cells: int, axis: float, diagonal: float) -> None:
+    """Compliance of a wave of so many cells along x and y, and along both; table to 6 digits."""
+    slab, size = Slab(comm, 128, 64), (2.0, 1.0)
+    x, y = (2 * np.pi * 64 / cells * values for values in coordinates(slab, size))
+    for wave, expected in ((x + 0 * y, axis), (0 * x + y, axis), (x + y, diagonal)):
+        pressure = np.cos(wave)
+        soft = OPERATORS["love"](slab, size, 0.5).apply(pressure, slab.empty())
+        stiff = OPERATORS["spectral"](slab, size, 0.5).apply(pressure, slab.empty())
+        assert_allclose(product(soft, pressure, slab) / product(stiff, pressure, slab), expected, rtol=5e-6)
+
+
+@pytest.mark.parametrize("aspect", [1.0, 7.0, 1e4])
+def test_love_of_a_wave_along_x(comm: MPI.Intracomm, aspect: float) -> None:
+    """There only aliases along x count, `q sum_n sinc(q_n dx/2)/|q_n|`, however long the cells are along y."""
+    slab, size = Slab(comm, 64, 3), (1.0, aspect * 3 / 64)
+    fft = FFT(slab)
+    factor = periodic(fft, size, 0.5, "love").symbol * fft.modes[0] * 4 * np.pi * slab.points
+    b = np.pi * fft.modes[0][0] / 64
+    n = np.arange(-20000, 20001)[:, None]
+    terms = np.sinc(b / np.pi + n) * b / np.abs(b + np.pi * n + (b == 0.0))
+    partial = (terms[1:-1].sum(axis=0) + terms.sum(axis=0)) / 2  # alternating: the mean of two sums
+    assert_allclose(factor[0, b > 0], partial[b > 0], rtol=1e-11)
+
+
+def test_inverse(communicators: list[MPI.Intracomm]) -> None:
+    """Of the spectral operator but for the mean, which it keeps positive."""
+    whole = random_map(15, 12)
+    for comm in communicators:
+        slab, size = Slab(comm, 15, 12), (1.0, 3.0)
+        back = applied(inverse(FFT(slab), size, 0.3), applied(periodic(FFT(slab), size, 0.3), whole))
+        assert_allclose(back, whole - whole.mean(), atol=1e-13)
+        assert_allclose(applied(inverse(FFT(slab), size, 0.3), np.ones((12, 15))), 2 * np.pi / 3 / 0.7, rtol=1e-13)
+
+
+# -- free -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("poisson", [0.5, 0.3])
+@pytest.mark.parametrize(("nx", "ny"), [(7, 5), (6, 8), (9, 1), (1, 4)])
+def test_direct_sum(communicators: list[MPI.Intracomm], nx: int, ny: int, poisson: float) -> None:
+    size, whole = (2.0, 3.0), random_map(nx, ny)
+    dx, dy = size[0] / nx, size[1] / ny
+    j, i = np.mgrid[:ny, :nx]
+    expected = np.zeros((ny, nx))
+    for row, column in np.ndindex(ny, nx):
+        expected += whole[row, column] * love(dx * (i - column), dy * (j - row), dx, dy, poisson)
+    for comm in communicators:
+        u = applied(free(Slab(comm, nx, ny), size, poisson), whole)
+        assert_allclose(u, expected, atol=1e-13 * np.abs(expected).max())
+
+
+def test_one_loaded_cell(comm: MPI.Intracomm) -> None:
+    """p h asinh(1)/(pi G) under its centre, for nu = 1/2."""
+    slab = Slab(comm, 9, 9)
+    whole = np.zeros((9, 9))
+    whole[4, 4] = 3.0
+    u = applied(free(slab, (0.9, 0.9)), whole)
+    assert_allclose(u[4, 4], 3.0 * 0.1 * np.arcsinh(1.0) / np.pi, rtol=1e-13)
+    assert_allclose(u[4, 4], 0.2805499 * 3.0 * 0.1, rtol=1e-7)
+    assert u.max() == u[4, 4]
+
+
+def test_far_field(comm: MPI.Intracomm) -> None:
+    """A point force's (1 - nu)/(2 pi) W/r, outside the box's middle to second order in the size of the cell."""
+    slab = Slab(comm, 65, 33)
+    whole = np.zeros((33, 65))
+    whole[0, 0] = 1.0
+    u = applied(free(slab, (6.5, 3.3), 0.25), whole)
+    assert_allclose(u[32, 64], 0.75 / (2 * np.pi) * 0.01 / np.hypot(6.4, 3.2), rtol=1e-4)
+    y, x = 0.1 * np.indices(u.shape)
+    assert_allclose(u, love(x, y, 0.1, 0.1, 0.25), rtol=1e-11)
+
+
+# -- all operators ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+@pytest.mark.parametrize(("nx", "ny"), [(9, 8), (8, 9), (12, 1)])
+def test_symmetric_and_positive(communicators: list[MPI.Intracomm], name: str, nx: int, ny: int) -> None:
+    """<a, A b> = <b, A a>; no negative eigenvalue, and 0 only for the mean pressure on a periodic half space."""
+    for comm in (comm for comm in communicators if comm.size < 3):
+        whole = matrix(OPERATORS[name](Slab(comm, nx, ny), (1.0, 2.0), 0.4))
+        largest = np.abs(whole).max()
+        assert_allclose(whole, whole.T, atol=1e-14 * largest)
+        values = np.linalg.eigvalsh(whole)
+        free_of_mean = values[1:] if name in ("spectral", "love") else values
+        assert values[0] > -1e-14 * largest
+        assert free_of_mean[0] > 1e-3 * largest
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_units_and_poisson(comm: MPI.Intracomm, name: str) -> None:
+    """Lengths in another unit change u by that unit; compliance goes with 1 - nu."""
+    slab, whole = Slab(comm, 12, 10), random_map(12, 10)
+    reference = applied(OPERATORS[name](slab, (1.0, 2.0), 0.5), whole)
+    power = -1 if name == "inverse" else 1
+    small = applied(OPERATORS[name](slab, (1e-9, 2e-9), 0.2), whole)
+    assert_allclose(small / (1e-9 * 1.6) ** power, reference, atol=1e-13 * np.abs(reference).max())
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+@pytest.mark.parametrize(("nx", "ny"), [(16, 12), (11, 7), (5, 2)])
+def test_any_number_of_ranks(communicators: list[MPI.Intracomm], name: str, nx: int, ny: int) -> None:
+    whole = random_map(nx, ny)
+    alone = applied(OPERATORS[name](Slab(MPI.COMM_SELF, nx, ny), (1.0, 2.0), 0.5), whole)
+    for comm in communicators:
+        operator = OPERATORS[name](Slab(comm, nx, ny), (1.0, 2.0), 0.5)
+        assert_allclose(applied(operator, whole), alone, atol=1e-14 * np.abs(alone).max())
+        assert operator.fft.slab.tally["operator"] == 1
+
+
+def test_single_precision(comm: MPI.Intracomm) -> None:
+    """Six digits, also for maps of double precision; half the bytes."""
+    slab, size, whole = Slab(comm, 24, 20), (1.0, 1.0), random_map(24, 20)
+    reference = applied(periodic(FFT(slab), size), whole)
+    single = periodic(FFT(slab, dtype=np.float32), size)
+    tolerance = 1e-6 * np.abs(reference).max()
+    assert single.symbol.dtype == np.float32
+    assert_allclose(applied(single, whole.astype(np.float32)), reference, atol=tolerance)
+    assert_allclose(applied(single, whole), reference, atol=tolerance)
+    mine = whole[slab.rows].copy()
+    assert_allclose(Narrowed(single).apply(mine, slab.empty()), reference[slab.rows], atol=tolerance)
+    reference = applied(free(slab, size), whole)
+    assert_allclose(applied(free(slab, size, dtype=np.float32), whole), reference, atol=1e-6 * np.abs(reference).max())
+
+
+def test_wave_on_a_free_half_space_looks_periodic(comm: MPI.Intracomm) -> None:
+    """In the middle of many short waves the free and the periodic Love operator agree but for the ends: to 1e-3."""
+    slab, size = Slab(comm, 256, 256), (1.0, 1.0)
+    x, y = coordinates(slab, size)
+    pressure = np.cos(2 * np.pi * 32 * x) * np.cos(2 * np.pi * 32 * y)
+    unbounded = gathered(free(slab, size).apply(pressure, slab.empty()), slab)[112:144, 112:144]
+    wrapped = gathered(OPERATORS["love"](slab, size, 0.5).apply(pressure, slab.empty()), slab)[112:144, 112:144]
+    assert_allclose(unbounded - unbounded.mean(), wrapped, atol=1e-3 * wrapped.max())

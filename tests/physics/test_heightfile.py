@@ -1,0 +1,195 @@
+"""Heights from files: each rank its rows, and every mistake in one sentence on every rank."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_array_equal
+from numpy.typing import NDArray
+
+from parcontact.errors import InputError
+from parcontact.parallel.slab import Slab
+from parcontact.physics import heightfile
+
+from .maps import random_map
+
+pytestmark = pytest.mark.mpi
+
+NX, NY = 7, 5
+KINDS = ["npy", "h5", "txt"]
+
+
+def write(path: Path, values: NDArray[Any]) -> None:
+    if path.suffix == ".npy":
+        np.save(path, values)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file["heights"] = values
+            file.create_group("other")
+    else:
+        np.savetxt(path, values, fmt="%.17g", header="made by a test")
+
+
+def made(comm: MPI.Intracomm, path: Path, make: Callable[[Path], object]) -> Path:
+    """A file that root has made, seen by all."""
+    if comm.rank == 0:
+        make(path)
+    comm.Barrier()
+    return path
+
+
+def complaint(comm: MPI.Intracomm, path: Path, dataset: str = "heights") -> str:
+    """What reading says, the same on every rank, in one line that names the file."""
+    with pytest.raises(InputError) as caught:
+        heightfile.read(path, dataset, Slab(comm, NX, NY))
+    said = str(caught.value)
+    assert comm.allgather(said) == [said] * comm.size
+    assert str(path) in said
+    assert "\n" not in said
+    return said
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("nx", "ny"), [(NX, NY), (4, 1), (1, 3)])
+def test_rows(
+    comm: MPI.Intracomm, communicators: list[MPI.Intracomm], shared_path: Path, kind: str, nx: int, ny: int
+) -> None:
+    """Every digit, on any number of ranks, also where some have no row."""
+    whole = random_map(nx, ny)
+    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, whole))
+    for group in communicators:
+        slab = Slab(group, nx, ny)
+        rows = heightfile.read(path, "heights", slab)
+        assert rows.dtype == np.float64
+        assert_array_equal(rows, whole[slab.rows])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.int16, np.uint8, ">f8"])
+@pytest.mark.parametrize("kind", ["npy", "h5"])
+def test_other_numbers(comm: MPI.Intracomm, shared_path: Path, kind: str, dtype: str) -> None:
+    whole = np.arange(NX * NY).reshape(NY, NX).astype(dtype)
+    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, whole))
+    slab = Slab(comm, NX, NY)
+    assert_array_equal(heightfile.read(path, "heights", slab), whole[slab.rows].astype(float))
+
+
+def test_columns_first(comm: MPI.Intracomm, shared_path: Path) -> None:
+    whole = random_map(NX, NY)
+    path = made(comm, shared_path / "map.npy", lambda path: np.save(path, np.asfortranarray(whole)))
+    slab = Slab(comm, NX, NY)
+    assert_array_equal(heightfile.read(path, "", slab), whole[slab.rows])
+
+
+def test_dataset_in_a_group(comm: MPI.Intracomm, shared_path: Path) -> None:
+    whole = random_map(NX, NY)
+
+    def make(path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            file["measured/left"] = whole
+
+    path = made(comm, shared_path / "map.h5", make)
+    slab = Slab(comm, NX, NY)
+    assert_array_equal(heightfile.read(path, "measured/left", slab), whole[slab.rows])
+
+
+def test_comments_and_empty_lines(comm: MPI.Intracomm, shared_path: Path) -> None:
+    text = "# road\n\n" + "1 2 3 4 5 6 7 # first\n   \n" * NY + "#end"
+    path = made(comm, shared_path / "map.txt", lambda path: path.write_text(text))
+    slab = Slab(comm, NX, NY)
+    assert_array_equal(heightfile.read(path, "", slab), np.tile(np.arange(1.0, 8.0), (slab.shape[0], 1)))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shape", [(NX, NY), (NY - 1, NX), (NY, NX + 1), (2 * NY, NX)])
+def test_other_shape(comm: MPI.Intracomm, shared_path: Path, kind: str, shape: tuple[int, int]) -> None:
+    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, np.ones(shape)))
+    said = complaint(comm, path)
+    if kind == "txt" and shape[1] != NX:
+        assert f":2 has {shape[1]} numbers, but the grid has nx = {NX}" in said
+    else:
+        assert f"has shape {shape}, but the grid has (ny, nx) = ({NY}, {NX})" in said
+
+
+@pytest.mark.parametrize("kind", ["npy", "h5"])
+@pytest.mark.parametrize("shape", [(), (NX * NY,), (NY, NX, 1)])
+def test_no_map(comm: MPI.Intracomm, shared_path: Path, kind: str, shape: tuple[int, ...]) -> None:
+    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, np.ones(shape)))
+    assert f"has shape {shape}" in complaint(comm, path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_not_finite(comm: MPI.Intracomm, shared_path: Path, kind: str, value: float) -> None:
+    """Wherever it stands: in the rows of one rank only."""
+    whole = random_map(NX, NY)
+    whole[-1, 2:4] = value
+    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, whole))
+    assert f"2 of its {NX * NY} heights are not finite numbers" in complaint(comm, path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_missing(comm: MPI.Intracomm, shared_path: Path, kind: str) -> None:
+    assert "cannot be read: " in complaint(comm, shared_path / f"none.{kind}")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_directory(comm: MPI.Intracomm, shared_path: Path, kind: str) -> None:
+    assert "cannot be read: " in complaint(comm, made(comm, shared_path / f"map.{kind}", Path.mkdir))
+
+
+@pytest.mark.parametrize("kind", ["npy", "h5"])
+@pytest.mark.parametrize("content", [b"", b"no such format\n", b"\x93NUMPY\x01\x00"])
+def test_unreadable(comm: MPI.Intracomm, shared_path: Path, kind: str, content: bytes) -> None:
+    path = made(comm, shared_path / f"map.{kind}", lambda path: path.write_bytes(content))
+    assert "cannot be read: " in complaint(comm, path)
+
+
+def test_cut_short(comm: MPI.Intracomm, shared_path: Path) -> None:
+    def make(path: Path) -> None:
+        write(path, random_map(NX, NY))
+        path.write_bytes(path.read_bytes()[:-100])
+
+    for kind in ("npy", "h5"):
+        assert "cannot be read: " in complaint(comm, made(comm, shared_path / f"map.{kind}", make))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "has shape (0, 7)"),
+        (b"# only a comment\n", "has shape (0, 7)"),
+        (b"1 2 3\n", ":1 has 3 numbers"),
+        (b"1,2,3,4,5,6,7\n" * NY, ":1 has 1 numbers"),
+        (b"1 2 3 4 5 6 7\n" * (NY - 1) + b"1 2 3 4 5 6 high\n", "cannot be read: could not convert string to float"),
+        (b"1 2 3 4 5 6 7\n" * (NY - 1) + b"1 2 3 4 5 6\n", f":{NY} has 6 numbers"),
+        (b"\xff\xfe\x00 2 3 4 5 6 7\n" * NY, "cannot be read: "),
+    ],
+)
+def test_text_that_is_no_map(comm: MPI.Intracomm, shared_path: Path, content: bytes, said: str) -> None:
+    path = made(comm, shared_path / "map.txt", lambda path: path.write_bytes(content))
+    assert said in complaint(comm, path)
+
+
+def test_dataset(comm: MPI.Intracomm, shared_path: Path) -> None:
+    path = made(comm, shared_path / "map.h5", lambda path: write(path, random_map(NX, NY)))
+    assert "has no dataset 'road'; it has heights, other" in complaint(comm, path, "road")
+    assert "has no dataset 'other'" in complaint(comm, path, "other")
+
+
+@pytest.mark.parametrize("values", [np.full((NY, NX), 1j), np.full((NY, NX), b"high")])
+@pytest.mark.parametrize("kind", ["npy", "h5"])
+def test_no_real_numbers(comm: MPI.Intracomm, shared_path: Path, kind: str, values: NDArray[Any]) -> None:
+    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, values))
+    assert "which are no heights" in complaint(comm, path)
+
+
+def test_only_these_rows_are_held(comm: MPI.Intracomm, shared_path: Path) -> None:
+    path = made(comm, shared_path / "map.npy", lambda path: write(path, random_map(NX, NY)))
+    slab = Slab(comm, NX, NY)
+    rows = heightfile.read(path, "", slab)
+    assert rows.shape == slab.shape
+    assert rows.base is None  # not a view into the whole file

@@ -1,0 +1,90 @@
+"""Where the surface is: by whole cells with an index offset, by any fraction with new heights."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose, assert_array_equal
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.material import Heights
+from parcontact.physics.shapes import Round
+from parcontact.physics.sliding import AnyFraction, WholeCells
+from parcontact.physics.surface import Surface
+
+from .maps import gathered, random_map
+
+pytestmark = pytest.mark.mpi
+
+SIZE = (2e-3, 5e-4)
+NX, NY = 17, 11
+
+
+def surface_on(comm: MPI.Intracomm) -> Surface:
+    """All waves that the grid holds, and a sphere."""
+    slab = Slab(comm, NX, NY)
+    fft = FFT(slab)
+    return Surface(
+        slab, fft, SIZE, fft.forward(1e-6 * random_map(NX, NY)[slab.rows]).copy(), [Round(1e-3, (5e-4, 2e-4))]
+    )
+
+
+def whole(heights: Heights, slab: Slab) -> Array:
+    return gathered(np.roll(heights.base, heights.offset, axis=1), slab)
+
+
+def test_whole_cells(communicators: list[MPI.Intracomm]) -> None:
+    """Any number of them, either way, from one map; equal to the heights made anew."""
+    for comm in communicators:
+        surface = surface_on(comm)
+        path, exact = WholeCells(surface), AnyFraction(surface)
+        start = path.at((0.0, 0.0))
+        for cells in (0, 1, 5, 16, 17, 40, -3, 17001):
+            position = (cells * SIZE[0] / NX, 0.0)
+            moved = path.at(position)
+            assert moved.base is start.base
+            assert moved.offset == cells % NX
+            assert_allclose(whole(moved, surface.slab), np.roll(whole(start, surface.slab), cells, axis=1), rtol=0)
+            assert_allclose(whole(moved, surface.slab), whole(exact.at(position), surface.slab), rtol=0, atol=1e-15)
+
+
+def test_any_fraction(communicators: list[MPI.Intracomm]) -> None:
+    """Always from the original, never from what has been moved: the way to a position does not matter."""
+    for comm in communicators:
+        surface = surface_on(comm)
+        path = AnyFraction(surface)
+        for position in [(0.0, 0.0), (1.7e-5, 0.0), (-3e-4, 2.2e-5), (0.11, -0.2), (1.7e-5, 0.0)]:
+            direct = surface.heights(position, surface.slab.empty())
+            moved = path.at(position)
+            assert moved.offset == 0
+            assert_array_equal(moved.base, direct)
+
+
+def test_standing_still_makes_no_new_heights(comm: MPI.Intracomm) -> None:
+    surface = surface_on(comm)
+    tally = surface.slab.tally
+    path = AnyFraction(surface)
+    first = path.at((1e-5, 2e-5))
+    before = tally.copy()
+    assert path.at((1e-5, 2e-5)).base is first.base
+    assert tally.since(before) == {}
+    path.at((1.1e-5, 2e-5))
+    assert tally["shift"] == 2
+
+
+def test_whole_cells_cost_nothing(comm: MPI.Intracomm) -> None:
+    surface = surface_on(comm)
+    tally = surface.slab.tally
+    before = tally.copy()
+    path = WholeCells(surface)
+    assert tally.since(before)["fft"] == 1
+    before = tally.copy()
+    for cells in range(5):
+        path.at((cells * SIZE[0] / NX, 0.0))
+    assert tally.since(before) == {}
+
+
+def test_single_precision(comm: MPI.Intracomm) -> None:
+    surface = surface_on(comm)
+    for path in (WholeCells(surface, np.float32), AnyFraction(surface, np.float32)):
+        assert path.at((0.0, 0.0)).base.dtype == np.float32

@@ -1,0 +1,307 @@
+"""Heights of waves and shapes, moved by any distance, and the tangential force on them, against their formulas."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.shapes import Round, Shape
+from parcontact.physics.surface import Surface, single_wave
+
+from .maps import coordinates, gathered, product, random_map
+
+pytestmark = pytest.mark.mpi
+
+SIZE = (2e-3, 5e-4)
+A = 5e-7
+Wave = tuple[float, tuple[int, int], float]  # amplitude, waves along x and y, phase
+WAVES: list[Wave] = [(A, (3, 0), 0.0), (0.5 * A, (-2, 4), 0.7), (0.3 * A, (1, -5), -2.0), (0.1 * A, (0, 2), 1.0)]
+
+
+def surface_of(slab: Slab, waves: list[Wave], differences: bool = False) -> Surface:
+    fft = FFT(slab)
+    transform = np.sum([single_wave(fft, *wave) for wave in waves], axis=0)
+    return Surface(slab, fft, SIZE, transform, differences=differences)
+
+
+def heights_of(slab: Slab, waves: list[Wave], shift: tuple[float, float] = (0.0, 0.0)) -> Array:
+    x, y = coordinates(slab, SIZE)
+    phases = (2 * np.pi * (n[0] * (x - shift[0]) / SIZE[0] + n[1] * (y - shift[1]) / SIZE[1]) + s for _, n, s in waves)
+    return np.sum([wave[0] * np.cos(phase) for wave, phase in zip(waves, phases, strict=True)], axis=0)
+
+
+def slopes_of(slab: Slab, waves: list[Wave], shift: tuple[float, float] = (0.0, 0.0)) -> list[Array]:
+    """Exact slopes along x and y: those of a wave are the wave a quarter of a period ahead, times the wavenumber."""
+    return [
+        heights_of(slab, [(a * 2 * np.pi * n[axis] / SIZE[axis], n, phase + np.pi / 2) for a, n, phase in waves], shift)
+        for axis in (0, 1)
+    ]
+
+
+# -- waves ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(16, 12), (15, 11), (16, 1)])
+@pytest.mark.parametrize("waves", [(0, 0), (1, 0), (0, 1), (3, 2), (-3, 2), (3, -2), (-4, -5), (0, -3), (-5, 0)])
+def test_single_wave(communicators: list[MPI.Intracomm], nx: int, ny: int, waves: tuple[int, int]) -> None:
+    """Any sign of its indices; on a grid of one row, waves along y are constant."""
+    for comm in communicators:
+        slab = Slab(comm, nx, ny)
+        wave = (A, (waves[0], waves[1] if ny > 1 else 0), 0.4)
+        heights = surface_of(slab, [wave]).heights((0.0, 0.0), slab.empty())
+        assert_allclose(heights, heights_of(slab, [wave]), rtol=0, atol=1e-13 * A)
+
+
+@pytest.mark.parametrize("waves", [(8, 0), (-8, 0), (0, 6), (0, -6), (8, 6), (8, 2), (-8, 2), (8, -2), (3, 6), (-3, 6)])
+@pytest.mark.parametrize("phase", [0.0, 0.9])
+def test_shortest_waves(comm: MPI.Intracomm, waves: tuple[int, int], phase: float) -> None:
+    """Two cells per wavelength (Nyquist), alone or together with a longer one across."""
+    slab = Slab(comm, 16, 12)
+    heights = surface_of(slab, [(A, waves, phase)]).heights((0.0, 0.0), slab.empty())
+    assert_allclose(heights, heights_of(slab, [(A, waves, phase)]), rtol=0, atol=1e-13 * A)
+
+
+def test_sum_of_waves(communicators: list[MPI.Intracomm]) -> None:
+    for comm in communicators:
+        slab = Slab(comm, 20, 13)
+        heights = surface_of(slab, WAVES).heights((0.0, 0.0), slab.empty())
+        assert_allclose(heights, heights_of(slab, WAVES), rtol=0, atol=1e-13 * A)
+
+
+@pytest.mark.parametrize("shift", [(0.3, 0.0), (0.0, 0.25), (-0.7, 2.4), (1e3 + 0.5, -1e3 - 1 / 3)])
+def test_shift_by_a_fraction(communicators: list[MPI.Intracomm], shift: tuple[float, float]) -> None:
+    """Exact for waves longer than two cells; here to the rounding of a distance of a thousand cells."""
+    for comm in communicators:
+        slab = Slab(comm, 20, 13)
+        moved = shift[0] * SIZE[0] / 20, shift[1] * SIZE[1] / 13
+        heights = surface_of(slab, WAVES).heights(moved, slab.empty())
+        assert_allclose(heights, heights_of(slab, WAVES, moved), rtol=0, atol=1e-12 * A)
+
+
+def test_quarters_make_a_whole(comm: MPI.Intracomm) -> None:
+    """A surface with all waves but the shortest, moved by four quarters of a cell, is the old one a cell further on."""
+    slab = Slab(comm, 17, 15)
+    fft = FFT(slab)
+    surface = Surface(slab, fft, SIZE, fft.forward(random_map(17, 15)[slab.rows]).copy())
+    dx, dy = surface.cell
+    positions = [(quarter * dx / 4, quarter * dy / 4) for quarter in range(5)]
+    maps = [gathered(surface.heights(position, slab.empty()), slab) for position in positions]
+    assert_allclose(maps[4], np.roll(maps[0], (1, 1), axis=(0, 1)), atol=1e-13)
+    assert np.abs(maps[1] - maps[0]).max() > 0.1
+    assert_allclose([np.mean(heights**2) for heights in maps], np.mean(maps[0] ** 2), rtol=1e-13)
+
+
+def test_checkerboard(comm: MPI.Intracomm) -> None:
+    """At Nyquist along both axes: a cell changes its sign, two bring it back, half a cell leaves nothing."""
+    slab = Slab(comm, 16, 12)
+    surface = surface_of(slab, [(A, (8, 6), 0.0)])
+    dx, dy = surface.cell
+    j, i = np.indices((12, 16))[:, slab.rows]
+    board = A * (-1.0) ** (i + j)
+    for shift, factor in [((0, 0), 1), ((dx, 0), -1), ((0, dy), -1), ((dx, dy), 1), ((2 * dx, 0), 1), ((dx / 2, 0), 0)]:
+        assert_allclose(surface.heights(shift, slab.empty()), factor * board, rtol=0, atol=1e-13 * A)
+
+
+def test_units_of_height(comm: MPI.Intracomm) -> None:
+    """Given once or again, waves and shapes alike."""
+    slab = Slab(comm, 16, 12)
+    surface = surface_of(slab, WAVES)
+    surface.shapes = [Round(1e-3, (1e-3, 2e-4))]
+    metres, pressure = surface.heights((0.0, 0.0), slab.zeros()).copy(), random_map(16, 12)[slab.rows] ** 2
+    forces = np.array(surface.forces(pressure, (0.0, 0.0)))
+    for unit in (1e-6, 2.0**-20):
+        surface.rescale(unit)
+        assert_allclose(surface.heights((0.0, 0.0), slab.zeros()) * unit, metres, rtol=1e-12, atol=1e-20)
+        assert_allclose(np.array(surface.forces(pressure, (0.0, 0.0))) * unit, forces, rtol=1e-12)
+
+
+# -- shapes -----------------------------------------------------------------------------------------------------------
+
+R = 1.1e-3
+CENTRE = (9e-4, 2.1e-4)
+SHAPES: dict[str, tuple[Shape, Callable[[Array, Array], Array]]] = {
+    "paraboloid": (Round(R, CENTRE), lambda x, y: -(x**2 + y**2) / (2 * R)),
+    "sphere": (Round(R, CENTRE, exact=True), lambda x, y: np.sqrt(R**2 - x**2 - y**2) - R),
+    "parabola along y": (Round(R, CENTRE, (1.0, 0.0)), lambda x, y: -(x**2) / (2 * R) + 0 * y),
+    "cylinder along y": (Round(R, CENTRE, (1.0, 0.0), exact=True), lambda x, y: np.sqrt(R**2 - x**2) - R + 0 * y),
+    "parabola along x": (Round(R, CENTRE, (0.0, 1.0)), lambda x, y: -(y**2) / (2 * R) + 0 * x),
+    "cylinder along x": (Round(R, CENTRE, (0.0, 1.0), exact=True), lambda x, y: np.sqrt(R**2 - y**2) - R + 0 * x),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (1.3e-4, -7e-5)])
+def test_heights_of_shapes(communicators: list[MPI.Intracomm], name: str, shift: tuple[float, float]) -> None:
+    """Anywhere on an unbounded plane; the difference of roots in the formula costs digits, not ours."""
+    shape, formula = SHAPES[name]
+    for comm in communicators:
+        slab = Slab(comm, 18, 13)
+        x, y = coordinates(slab, SIZE)
+        surface = Surface(slab, FFT(slab), SIZE, shapes=[shape], periodic=False)
+        heights = surface.heights(shift, slab.empty())
+        expected = formula(x - CENTRE[0] - shift[0], y - CENTRE[1] - shift[1])
+        assert_allclose(heights, expected, rtol=0, atol=1e-15 * R)
+
+
+def test_shapes_repeat_on_a_periodic_box(comm: MPI.Intracomm) -> None:
+    """The nearest image counts: moved by a box nothing changes, by cells the map rolls."""
+    slab = Slab(comm, 20, 10)
+    surface = Surface(slab, FFT(slab), SIZE, shapes=[Round(R, CENTRE)])
+    start = gathered(surface.heights((0.0, 0.0), slab.empty()), slab)
+    for columns, rows in [(20, 0), (0, -10), (3, 0), (-8, 4), (47, 33)]:
+        shift = columns * SIZE[0] / 20, rows * SIZE[1] / 10
+        moved = gathered(surface.heights(shift, slab.empty()), slab)
+        assert_allclose(moved, np.roll(start, (rows, columns), axis=(0, 1)), rtol=0, atol=1e-12 * R)
+    assert start.min() >= -((SIZE[0] / 2) ** 2 + (SIZE[1] / 2) ** 2) / (2 * R)
+
+
+def test_a_small_sphere_ends_at_its_equator() -> None:
+    sphere = Round(1.0, (0.0, 0.0), exact=True)
+    x = np.array([0.0, 0.6, 1.0, 1.5, 40.0])
+    assert_allclose(sphere.height(x, 0 * x), [0.0, -0.2, -1.0, -1.0, -1.0], atol=1e-15)
+    assert_allclose(sphere.slope(x, 0 * x)[0], [0.0, -0.75, 0.0, 0.0, 0.0], atol=1e-15)
+
+
+def test_a_shallow_sphere_keeps_its_digits() -> None:
+    """Where R - sqrt(R^2 - r^2) would lose them all."""
+    assert_allclose(Round(1.0, (0.0, 0.0), exact=True).height(np.array(1e-9), np.array(0.0)), -5e-19, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_slopes_of_shapes(name: str) -> None:
+    """Against central differences over a millionth of the radius; their error is some 1e-10."""
+    shape, _ = SHAPES[name]
+    y, x = 0.6 * R * (np.indices((7, 7)) / 6 - 0.45)
+    step = 1e-6 * R
+    along_x = (shape.height(x + step, y) - shape.height(x - step, y)) / (2 * step)
+    along_y = (shape.height(x, y + step) - shape.height(x, y - step)) / (2 * step)
+    assert_allclose(shape.slope(x, y), [along_x, along_y], atol=1e-9)
+
+
+def test_waves_and_shapes_add_up(comm: MPI.Intracomm) -> None:
+    slab = Slab(comm, 20, 13)
+    fft = FFT(slab)
+    shapes = [Round(R, CENTRE), Round(2 * R, (0.0, 0.0), (0.0, 1.0))]
+    both = Surface(slab, fft, SIZE, single_wave(fft, *WAVES[1]), shapes)
+    shift = (1e-4, 3e-5)
+    parts = [Surface(slab, fft, SIZE, single_wave(fft, *WAVES[1]))]
+    parts += [Surface(slab, fft, SIZE, shapes=[shape]) for shape in shapes]
+    total = np.sum([part.heights(shift, slab.empty()) for part in parts], axis=0)
+    assert_allclose(both.heights(shift, slab.empty()), total, rtol=0, atol=1e-15 * R)
+    pressure = np.abs(random_map(20, 13))[slab.rows]
+    forces = np.sum([part.forces(pressure, shift) for part in parts], axis=0)
+    assert_allclose(both.forces(pressure, shift), forces, rtol=1e-12)
+
+
+def test_flat(comm: MPI.Intracomm) -> None:
+    slab = Slab(comm, 8, 8)
+    surface = Surface(slab, FFT(slab), SIZE)
+    assert not surface.heights((1e-4, 0.0), slab.empty()).any()
+    assert surface.forces(np.ones(slab.shape), (0.0, 0.0)) == [0.0, 0.0]
+    assert slab.tally["fft"] == 0
+
+
+# -- tangential force -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("waves", [(4, 0), (0, 3), (3, 2), (2, -5), (-4, 1)])
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (3.1e-5, -1.7e-5)])
+def test_force_on_a_wave(
+    communicators: list[MPI.Intracomm], waves: tuple[int, int], shift: tuple[float, float]
+) -> None:
+    """p = P cos(q (x - s) + lag) on h = A cos(q (x - s)): the mean of p grad h is P A q sin(lag)/2, oblique too."""
+    lag, P = 0.4, 1e5
+    for comm in communicators:
+        slab = Slab(comm, 18, 14)
+        pressure = heights_of(slab, [(P, waves, lag)], shift) + 3 * P
+        forces = surface_of(slab, [(A, waves, 0.0)]).forces(pressure, shift)
+        q = np.array([2 * np.pi * n / length for n, length in zip(waves, SIZE, strict=True)])
+        expected = slab.points * P * A * q * np.sin(lag) / 2
+        assert_allclose(forces, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (3.1e-5, -1.7e-5)])
+def test_force_is_the_sum_over_points(communicators: list[MPI.Intracomm], shift: tuple[float, float]) -> None:
+    """Of any pressure times the exact slope of a sum of waves."""
+    for comm in communicators:
+        slab = Slab(comm, 20, 13)
+        pressure = np.abs(random_map(20, 13))[slab.rows]
+        expected = [product(pressure, slope, slab) for slope in slopes_of(slab, WAVES, shift)]
+        assert_allclose(surface_of(slab, WAVES).forces(pressure, shift), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("waves", [(4, 0), (0, 3), (3, 2), (2, -5)])
+def test_finite_differences(comm: MPI.Intracomm, waves: tuple[int, int]) -> None:
+    """They shrink the slope of a wave by sin(q dx)/(q dx)."""
+    slab = Slab(comm, 18, 14)
+    pressure = heights_of(slab, [(1.0, waves, 0.4)])
+    exact = surface_of(slab, [(A, waves, 0.0)]).forces(pressure, (0.0, 0.0))
+    rough = surface_of(slab, [(A, waves, 0.0)], differences=True).forces(pressure, (0.0, 0.0))
+    steps = [2 * np.pi * n / count for n, count in zip(waves, (18, 14), strict=True)]
+    assert_allclose(rough, np.array(exact) * np.sinc(np.array(steps) / np.pi), rtol=1e-11, atol=1e-9 * A)
+
+
+@pytest.mark.parametrize("shapes", [False, True])
+def test_finite_differences_are_those_of_the_map(comm: MPI.Intracomm, shapes: bool) -> None:
+    """Across the edge of a periodic box too."""
+    slab = Slab(comm, 20, 13)
+    surface = surface_of(slab, WAVES, differences=True)
+    surface.shapes = [Round(R, CENTRE), Round(R, (0.0, 0.0), (1.0, 0.0), exact=True)] if shapes else []
+    shift = (1.23e-4, 4e-5)
+    whole = gathered(surface.heights(shift, slab.empty()), slab)
+    pressure = np.abs(random_map(20, 13))
+    expected = [
+        np.sum(pressure * (np.roll(whole, -1, axis) - np.roll(whole, 1, axis)) / (2 * step))
+        for axis, step in zip((1, 0), surface.cell, strict=True)
+    ]
+    assert_allclose(surface.forces(pressure[slab.rows], shift), expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("differences", [False, True])
+def test_no_force_on_a_checkerboard(comm: MPI.Intracomm, differences: bool) -> None:
+    """The slope of the shortest wave is 0 at all points."""
+    slab = Slab(comm, 16, 12)
+    for waves in [(8, 6), (8, 0), (0, 6)]:
+        surface = surface_of(slab, [(A, waves, 0.0)], differences=differences)
+        pressure = np.abs(random_map(16, 12))[slab.rows]
+        for shift in [(0.0, 0.0), (surface.cell[0], 0.0), (0.3 * surface.cell[0], 0.1 * surface.cell[1])]:
+            assert_allclose(surface.forces(pressure, shift), [0.0, 0.0], atol=1e-12 * A / surface.cell[1])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("periodic", [False, True])
+def test_force_on_shapes(communicators: list[MPI.Intracomm], name: str, periodic: bool) -> None:
+    """Pressure times slope, summed over the points in contact."""
+    shape, _ = SHAPES[name]
+    shift = (1.3e-4, -7e-5)
+    for comm in communicators:
+        slab = Slab(comm, 18, 13)
+        x, y = coordinates(slab, SIZE)
+        x, y = x - CENTRE[0] - shift[0], y - CENTRE[1] - shift[1]
+        if periodic:
+            x, y = x - SIZE[0] * np.round(x / SIZE[0]), y - SIZE[1] * np.round(y / SIZE[1])
+        pressure = np.maximum(random_map(18, 13), 0.0)[slab.rows]
+        expected = [product(pressure, slope, slab) for slope in shape.slope(x, y)]
+        surface = Surface(slab, FFT(slab), SIZE, shapes=[shape], periodic=periodic)
+        assert_allclose(surface.forces(pressure, shift), expected, rtol=1e-11, atol=1e-12)
+
+
+def test_single_precision(comm: MPI.Intracomm) -> None:
+    """Heights to 1e-6 of the amplitude, forces to 1e-5."""
+    slab = Slab(comm, 20, 13)
+    fft = FFT(slab, dtype=np.float32)
+    waves = np.sum([single_wave(fft, *wave) for wave in WAVES], axis=0).astype(np.complex64)
+    surface = Surface(slab, fft, SIZE, waves, [Round(R, CENTRE)])
+    exact = surface_of(slab, WAVES)
+    exact.shapes = surface.shapes
+    shift = (1.23e-4, 4e-5)
+    heights = surface.heights(shift, slab.empty(np.float32))
+    reference = exact.heights(shift, slab.empty())
+    assert heights.dtype == np.float32
+    assert_allclose(heights, reference, rtol=0, atol=1e-6 * np.ptp(gathered(reference, slab)))
+    pressure = np.abs(random_map(20, 13))[slab.rows].astype(np.float32)
+    assert_allclose(surface.forces(pressure, shift), exact.forces(pressure, shift), rtol=1e-5)
