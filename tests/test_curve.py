@@ -1,0 +1,140 @@
+"""Friction curves from the command line, and marches that start from steady sliding."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact import job as jobs
+from parcontact import march, scene, steadystart
+from parcontact.curve import request
+from parcontact.errors import InputError
+from parcontact.parallel.slab import Slab
+from parcontact.record.measures import read
+from parcontact.theory import full_contact
+
+WAVE = """\
+grid: {points: [64, 4], size: [2.5e-4, 1.5625e-5]}
+surface: {shape: wave, amplitude: 5.0e-7, waves: [1, 0]}
+material: {model: zener, modulus_inf: 2.75e5, branches: [{modulus: 2.475e6, relaxation_time: 1.0e-3}]}
+initial: {state: steady, velocity: 0.04, pressure: 2.0e5}
+history: [{pressure: 2.0e5, velocity: 0.04, distance: 6.25e-5, cells_per_step: 1}]
+numerics: {tolerance: 1.0e-10}
+"""
+ROUGH = """\
+grid: {points: 128, size: 1.0e-3}
+surface: {shape: rough, hurst: 0.9, long_wavelength: 5.0e-4, short_wavelength: 2.5e-4, rms_slope: 0.02, seed: 3}
+material:
+  model: zener
+  modulus_inf: 1.0e+6
+  branches: [{modulus: 7.0e+6, relaxation_time: 5.0e-4}, {modulus: 2.4e+6, relaxation_time: 3.0e-3}]
+initial: {state: steady, velocity: 0.2, pressure: 1.0e5}
+history: [{pressure: 1.0e5, velocity: 0.2, distance: 1.25e-4, cells_per_step: 1}]
+numerics: {tolerance: 1.0e-7}
+"""
+FREE = """\
+grid: {points: 96, size: 3.3e-3, boundary: free}
+surface: {shape: sphere, radius: 1.0e-2}
+material: {model: zener, modulus_inf: 2.75e5, branches: [{modulus: 2.475e6, relaxation_time: 1.0e-3}]}
+initial: {state: steady, velocity: 0.047, pressure: 13774.0}
+history: [{pressure: 13774.0, velocity: 0.047, distance: 1.375e-4, cells_per_step: 1}]
+numerics: {tolerance: 1.0e-7}
+"""
+LAW = (2.75e5, np.array([2.475e6]), np.array([1.0e-3]))
+
+
+def friction_of_wave(pressure: float, speed: float) -> float:
+    """The closed form for WAVE in full contact."""
+    waves = (np.array([5.0e-7]), np.array([2 * np.pi / 2.5e-4]), np.array([0.0]))
+    return float(full_contact.friction_coefficient(pressure, *waves, speed, 0.0, *LAW))
+
+
+@pytest.fixture
+def frictions(shared_path: Path, comm: MPI.Intracomm) -> Callable[..., list[float]]:
+    """Friction at all instants of a job."""
+
+    def run(text: str, *overrides: str) -> list[float]:
+        path = shared_path / "job.yaml"
+        path.write_text(text)
+        job = jobs.load(path, overrides)
+        marching = march.March(scene.build(job, Slab(comm, *job.grid.points)))
+        if job.initial.state == "steady":
+            steadystart.begin(marching)
+        found: list[float] = []
+        march.run(marching, [lambda m: found.append(m.row.measures.friction)])
+        return found
+
+    return run
+
+
+@pytest.mark.mpi
+def test_steady_wave_stays_with_error_of_second_order(frictions: Callable[..., list[float]]) -> None:
+    """Full contact: the start is the closed form to 1e-9, and a march leaves it by the integrator's error, as dt^2."""
+    exact = friction_of_wave(2.0e5, 0.04)
+    errors = []
+    for cells in (2, 1, 0.5):
+        found = frictions(WAVE, f"history.0.cells_per_step={cells}")
+        assert found[0] == pytest.approx(exact, rel=1e-9)
+        errors.append(abs(found[-1] / found[0] - 1.0))
+    assert 3.6 < errors[0] / errors[1] < 4.4  # 4 for order 2
+    assert 3.6 < errors[1] / errors[2] < 4.4
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("text", "bound"), [(ROUGH, 4e-3), (FREE, 1e-2)], ids=["rough", "free sphere"])
+def test_steady_contact_stays(frictions: Callable[..., list[float]], text: str, bound: float) -> None:
+    """A march from the steady state of a partial contact stays there, nearer with shorter steps. The bounds are some
+    three times what one cell per step gives at 32 cells per shortest wave, and at 13 cells per contact radius."""
+    errors = []
+    for cells in (1, 0.25):
+        found = frictions(text, f"history.0.cells_per_step={cells}")
+        errors.append(abs(found[-1] / found[0] - 1.0))
+    assert errors[0] < bound
+    assert errors[1] < errors[0] / 2
+
+
+def test_long_march_from_rest_becomes_steady(frictions: Callable[..., list[float]]) -> None:
+    """Within 1 %: the loss modulus of the shortest wave is 0.4 % off at 32 cells per wave and one cell per step."""
+    steady = frictions(ROUGH, "history.0.distance=7.8125e-6")[0]
+    marched = frictions(ROUGH, "initial={state: virgin}", "history.0.distance=2.5e-3", "numerics.tolerance=1e-5")
+    assert marched[-1] == pytest.approx(steady, rel=1e-2)
+
+
+def test_curve_from_the_command_line(run_parcontact: Callable, tmp_path: Path) -> None:
+    (tmp_path / "wave.yaml").write_text(WAVE)
+    done = run_parcontact(["steady", "wave.yaml", "--velocities", "0.004:0.4:3", "--pressures", "2e5,4e5"], ranks=2)
+    assert done.returncode == 0, done.stderr
+    columns = read(tmp_path / "out/wave/steady.csv")
+    for speed, pressure, friction, force, power in zip(
+        *(columns[name] for name in ("velocity", "pressure", "friction", "force_x", "dissipated_0")), strict=True
+    ):
+        assert friction == pytest.approx(friction_of_wave(pressure, speed), rel=1e-9)
+        assert power == pytest.approx(-force * speed, rel=1e-9)
+    assert len(columns["velocity"]) == 6
+    assert (tmp_path / "out/wave/steady.png").stat().st_size > 0
+
+
+def test_shares_of_wavelengths_add_up(run_parcontact: Callable, tmp_path: Path) -> None:
+    text = ROUGH.split("initial")[0] + "steady: {velocities: [0.2], pressures: [1.0e5], waves: true}\n"
+    (tmp_path / "rough.yaml").write_text(text)
+    done = run_parcontact(["rough.yaml", "--quiet"], ranks=0)
+    assert (done.returncode, done.stdout) == (0, "")
+    shares = read(tmp_path / "out/rough/steady_waves.csv")["share"]
+    assert sum(shares) == pytest.approx(1.0, rel=1e-12)
+    assert max(shares[1:3]) > 0.3  # the waves of the surface, 0.5 to 0.25 mm, in a box of 1 mm
+
+
+def test_curve_without_velocities_or_pressure(tmp_path: Path) -> None:
+    path = tmp_path / "wave.yaml"
+    path.write_text(WAVE)
+    with pytest.raises(InputError, match="no velocities"):
+        request(jobs.load(path))
+    with pytest.raises(InputError, match="no pressure"):
+        request(jobs.load(path, ["history.0.pressure=null", "history.0.approach=-1e-6"]), [0.1])
+
+
+def test_energies_need_a_body_at_rest(frictions: Callable[..., list[float]]) -> None:
+    with pytest.raises(InputError, match="energies count from a body at rest"):
+        frictions(WAVE, "output.energy=true")
