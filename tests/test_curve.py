@@ -56,7 +56,7 @@ def frictions(shared_path: Path, comm: MPI.Intracomm) -> Callable[..., list[floa
     """Friction at all instants of a job."""
 
     def run(text: str, *overrides: str) -> list[float]:
-        path = shared_path / "job.yaml"
+        path = shared_path / f"job-{comm.rank}.yaml"
         path.write_text(text)
         job = jobs.load(path, overrides)
         marching = march.March(scene.build(job, Slab(comm, *job.grid.points)))
