@@ -263,7 +263,7 @@ def test_jobs_differ(tmp_path: Path) -> None:
 def test_a_job_is_frozen(tmp_path: Path) -> None:
     job = job_of(tmp_path, SMALL)
     with pytest.raises(ValueError, match="frozen"):
-        job.title = "other"  # type: ignore[misc]
+        job.title = "other"
 
 
 def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:

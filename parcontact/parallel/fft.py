@@ -15,6 +15,7 @@ import pyfftw
 from mpi4py import MPI
 from numpy.typing import DTypeLike, NDArray
 
+from ..compiled import loop
 from .slab import Array, Slab, allocate, deal
 
 Spectrum = NDArray[np.complexfloating]
@@ -87,7 +88,7 @@ class FFT:
     def convolve(self, field: Array, symbol: NDArray[np.inexact], out: Array) -> Array:
         """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective."""
         spectrum = self.forward(field)
-        np.multiply(spectrum, symbol, out=spectrum)
+        _multiply(spectrum, symbol)
         return self._to_map(out, 1.0)
 
     def _to_map(self, out: Array, scale: float) -> Array:
@@ -222,3 +223,11 @@ class Transpose:
         """The reverse of `post`."""
         for parcel, columns in zip(self._parcels, self._dealt, strict=True):
             waves[:, columns] = parcel[rows]
+
+
+@loop
+def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]) -> None:
+    """`spectrum <- symbol spectrum`: faster than numpy, which makes a real symbol complex first."""
+    for j in range(spectrum.shape[0]):
+        for i in range(spectrum.shape[1]):
+            spectrum[j, i] *= symbol[j, i]

@@ -6,7 +6,7 @@ from .slab import Array, Slab
 
 
 def roll(slab: Slab, field: Array, count: int, out: Array) -> Array:
-    """`out(j) = field(j - count)` along y, cyclic; `field` and `out` are this rank's rows, not the same array; collective."""
+    """`out(j) = field(j - count)` along y, cyclic, for this rank's rows; not in place; collective."""
     ny, comm, mine = slab.ny, slab.comm, slab.rows
     count %= ny
     if comm.size == 1:

@@ -77,7 +77,7 @@ def gap(
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     edge = np.sqrt(np.clip(load, np.finfo(float).tiny, 1))
     y = np.maximum(np.abs(np.sin(np.pi * x / wavelength)), edge)
-    return np.asarray(2 * amplitude * (y * np.sqrt(y**2 - edge**2) - edge**2 * np.arccosh(y / edge)))
+    return np.asarray(2 * amplitude * (y * np.sqrt((y - edge) * (y + edge)) - edge**2 * np.arccosh(y / edge)))
 
 
 def mean_gap(
