@@ -32,8 +32,8 @@ class AnyFraction:
 
     def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
         self._surface = surface
-        self._map = surface.slab.empty(dtype)
-        self._where: tuple[float, float] | None = None
+        self._where = (0.0, 0.0)
+        self._map = surface.heights(self._where, surface.slab.empty(dtype))
 
     def at(self, displacement: tuple[float, float]) -> Heights:
         if displacement != self._where:

@@ -47,7 +47,7 @@ def branch(body: Zener, k: int) -> float:
     return float(body.branches[k, 0, 0])
 
 
-# -- printed numbers, to their twelve digits ------------------------------------------------------------------------
+# -- printed numbers, to their twelve digits ---------------------------------------------------------------------------
 
 
 def test_coefficients_of_eq_8() -> None:
@@ -103,7 +103,7 @@ def test_exponential_steps_are_exact_on_a_ramp() -> None:
     assert_allclose([push(made, t, dt) for t, dt in zip(ends, dts, strict=True)], exact, rtol=1e-14)
 
 
-# -- jumps ------------------------------------------------------------------------------------------------------------
+# -- jumps -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -137,7 +137,7 @@ def test_order_of_creep_after_jumps(integrator: Integrator, order: float, again:
     assert_allclose(orders, order, rtol=0.03)
 
 
-# -- limits -----------------------------------------------------------------------------------------------------------
+# -- limits ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -180,7 +180,7 @@ def test_branches_without_a_part(integrator: Integrator) -> None:
         assert_allclose(push(first, n + 1.0, dt), push(second, n + 1.0, dt), rtol=1e-15)
 
 
-# -- what it does with maps -------------------------------------------------------------------------------------------
+# -- what it does with maps --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)

@@ -1,0 +1,40 @@
+"""Jobs as dictionaries, marched in this process."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact import scene
+from parcontact.job import Job
+from parcontact.march import March, run
+from parcontact.parallel.slab import Slab
+from parcontact.record.row import Row
+
+# the paper's Hertz material as one Maxwell branch beside the long-term spring: modulus 2.75 MPa at once, a tenth of it
+# in the end, relaxation time 1 ms, creep time 10 ms
+BRANCHES = [{"modulus": 2.475e6, "relaxation_time": 1e-3}]
+SLS = {"model": "zener", "modulus_inf": 0.275e6, "branches": BRANCHES}
+PRONY = (0.275e6, [2.475e6], [1e-3])  # the same for the closed forms
+
+
+def begun(data: dict[str, Any], comm: MPI.Intracomm = MPI.COMM_SELF) -> March:
+    """A march at the start of a job."""
+    job = Job.model_validate(data)
+    return March(scene.build(job, Slab(comm, *job.grid.points)))
+
+
+def marched(
+    data: dict[str, Any], tasks: Sequence[Callable[[March], None]] = (), comm: MPI.Intracomm = MPI.COMM_SELF
+) -> tuple[March, list[Row]]:
+    """A march at the end of a job, and the row of every instant, the initial one first."""
+    march, rows = begun(data, comm), list[Row]()
+    run(march, [lambda state: rows.append(state.row), *tasks])
+    return march, rows
+
+
+def column(rows: Sequence[Row], name: str) -> NDArray[np.float64]:
+    """One number of every row, by the name of its measure or of its own."""
+    return np.array([getattr(row, name) if hasattr(row, name) else getattr(row.measures, name) for row in rows])

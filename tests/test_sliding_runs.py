@@ -1,0 +1,458 @@
+"""A surface that slides on a viscoelastic body: friction, histories of velocity, directions, order, cost, ranks."""
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import PRONY, SLS, column, marched
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from parcontact.march import March
+from parcontact.parallel.fft import BLOCK_BYTES
+from parcontact.record.row import Row
+from parcontact.theory import full_contact
+from parcontact.theory.viscoelastic import Integrator, relaxation
+
+Json = dict[str, Any]
+INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
+
+# one wave along x in full contact: 64 cells per wavelength of 0.25 mm, amplitude 0.5 um, 0.2 MPa
+WAVELENGTH, HEIGHT, MEAN = 0.25e-3, 0.5e-6, 0.2e6
+K, CELL = 2 * np.pi / WAVELENGTH, WAVELENGTH / 64
+FAST = 1e3 / K  # m/s, at which it passes in 1 ms per radian
+# velocity and the friction of steady sliding at one cell per step, of exponential and of backward Euler steps
+STEADY = [
+    (0.001, 4.902519e-05, 4.888371e-05),
+    (0.004, 0.0001943267, 0.000192302),
+    (0.01, 0.0004615856, 0.0004507858),
+    (FAST, 0.0009763055, 0.0009302677),
+    (0.1, 0.0006707329, 0.0006487824),
+    (0.4, 0.0001923269, 0.0001904834),
+    (1.0, 7.756915e-05, 7.726771e-05),
+]
+
+
+def wave(
+    history: list[Json], waves: tuple[int, int] = (1, 0), points: tuple[int, int] = (64, 1), **numerics: Any
+) -> Json:
+    return {
+        "grid": {"points": list(points), "size": [WAVELENGTH, WAVELENGTH]},
+        "surface": {"shape": "wave", "amplitude": HEIGHT, "waves": list(waves)},
+        "material": SLS,
+        "history": [{"pressure": MEAN, **stage} for stage in history],
+        "numerics": {"tolerance": 1e-13, **numerics},
+    }
+
+
+def traction(rows: list[Row]) -> NDArray[np.float64]:
+    """Tangential force over normal force, along x."""
+    return column(rows, "force_x") / (column(rows, "pressure") * WAVELENGTH**2)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(("velocity", "exponential", "euler"), STEADY)
+def test_steady_friction(integrator: Integrator, velocity: float, exponential: float, euler: float) -> None:
+    """After 25 relaxation times the friction that these steps must give: printed to 7 digits, computed to 1e-9."""
+    cells = max(60, np.ceil(25e-3 * velocity / CELL))
+    data = wave([{"velocity": velocity, "distance": cells * CELL, "cells_per_step": 1}], integrator=integrator)
+    data["grid"]["size"][1] = 1e-4 * WAVELENGTH  # a very long and narrow box is all right
+    _, rows = marched(data)
+    found = rows[-1].measures.friction
+    assert found == pytest.approx(exponential if integrator == "exponential" else euler, rel=3e-7)
+    waves = (MEAN, HEIGHT, np.array([K]), np.array([0.0]), velocity, 0.0)
+    exact = full_contact.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator)
+    assert found == pytest.approx(float(exact), rel=1e-9)
+    assert rows[-1].measures.force_x < 0.0
+    assert rows[-1].operator_calls <= 4
+
+
+def transient(before: float, after: float, steps: int, integrator: Integrator) -> float:
+    """Largest error, over the largest exact value, in 5 ms after 20 ms at one velocity and then at another."""
+    stages = [{"duration": 20e-3, "time_step": 20e-3 / (4 * steps if before else 1), "velocity": before}]
+    stages += [{"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": after}]
+    _, rows = marched(wave(stages, points=(8, 1), integrator=integrator))
+    late = [row for row in rows if row.time > 20.0001e-3]
+    t = column(late, "time") - 20e-3
+    modulus = full_contact.velocity_step_modulus(t, K * before, np.array([K * after]), *PRONY)
+    exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
+    return float(np.abs(traction(late) - exact).max() / np.abs(exact).max())
+
+
+# transients of F/P in 1e-4 at 0, 0.1, 0.2, 0.5, 1, 1.5, 2, 3 and 5 ms after a change of velocity
+TIMES = np.array([0.0, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0]) * 1e-3
+CHANGES = [
+    (0.004, FAST, [-1.9449, -3.59, -5.0487, -8.3897, -11.18, -11.779, -11.39, -10.224, -9.6941]),
+    (0.0, FAST, [0.0, -1.8566, -3.5199, -7.4113, -10.853, -11.791, -11.524, -10.321, -9.6891]),
+    (FAST, 0.0, [-9.7709, -8.8411, -7.9997, -5.9264, -3.5945, -2.1802, -1.3223, -0.48646, -0.065836]),
+    (FAST, -FAST, [-9.7709, -7.8229, -5.9097, -0.63082, 5.8867, 9.4625, 10.871, 10.734, 9.7336]),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "printed"), CHANGES)
+def test_changes_of_velocity(before: float, after: float, printed: list[float]) -> None:
+    """Start, stop, reversal: forces within 1.2e-4 of the peak at 250 steps in 5 ms; nothing jumps at the change."""
+    stages = [{"duration": 20e-3, "time_step": 20e-3 / 1000, "velocity": before}]
+    stages += [{"duration": 5e-3, "time_step": 5e-3 / 250, "velocity": after}]
+    _, rows = marched(wave(stages, points=(8, 1)))
+    found = np.interp(20e-3 + TIMES, column(rows[2:], "time"), traction(rows[2:]))
+    assert_allclose(found, 1e-4 * np.array(printed), rtol=0, atol=1.2e-4 * 1e-4 * np.abs(printed).max())
+
+
+def test_start_after_a_rest() -> None:
+    """Load, 1 ms of rest, sliding: within 1e-6 of the peak at 2000 steps in 5 ms, with order 2."""
+    errors = []
+    for steps in (500, 1000, 2000):
+        sliding = {"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": FAST}
+        stages = [{"duration": 1e-3, "time_step": 1e-3}, sliding]
+        _, rows = marched(wave(stages, points=(8, 1)))
+        late = rows[2:]
+        t = column(late, "time") - 1e-3
+        modulus = full_contact.load_rest_slide_modulus(t, 1e-3, np.array([K * FAST]), *PRONY)
+        exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
+        errors.append(float(np.abs(traction(late) - exact).max() / np.abs(exact).max()))
+    assert errors[-1] < 1e-6
+    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 2.0, rtol=0.01)
+    printed = [0, -1.20719, -2.35062, -5.32082, -8.62804, -10.6389, -9.73556]
+    at = np.array([0, 0.1, 0.2, 0.5, 1, 2, 5]) * 1e-3
+    assert_allclose(np.interp(at, t, traction(late)), 1e-4 * np.array(printed), rtol=0, atol=5e-6 * 1e-4 * 11)
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+def test_order_of_a_velocity_step(integrator: Integrator, order: float) -> None:
+    errors = [transient(0.004, FAST, steps, integrator) for steps in (100, 200, 400)]
+    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), order, rtol=0.05)
+
+
+@pytest.mark.parametrize("waves", [(1, 1), (2, 1), (1, -2)])
+def test_oblique_waves(waves: tuple[int, int]) -> None:
+    """Sliding along x: mu = |q| kx h0^2 G''(kx v)/P0 of these steps; and a force across. To 1e-9."""
+    velocity = 0.4 * FAST
+    cell = WAVELENGTH / 32
+    stage = {"velocity": velocity, "distance": 50 * cell, "cells_per_step": 1}
+    _, rows = marched(wave([{"duration": 20e-3, "time_step": 20e-3}, stage], waves, (32, 32)))
+    kx, ky = K * waves[0], K * waves[1]
+    data = rows[-1].measures
+    dt = cell / velocity
+    moment = (MEAN, HEIGHT, np.array([kx]), np.array([ky]), velocity, 0.0, dt, *PRONY)
+    mu = float(full_contact.discrete_friction_coefficient(*moment))
+    settled = np.exp(-50 * dt / 1e-3)
+    load = MEAN * WAVELENGTH**2
+    assert_allclose([-data.force_x / load, -data.force_y / load], [mu, mu * ky / kx], rtol=1e-9 + 3 * settled)
+    assert_allclose(data.friction, mu * np.hypot(kx, ky) / kx, rtol=1e-9 + 3 * settled)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.6, -0.8)])
+def test_only_motion_along_a_wave_dissipates(direction: tuple[float, float]) -> None:
+    """A wave along y (or x) that slides along x (or y) relaxes as at rest: amplitude 2 k h0 G(t), no friction."""
+    velocity = (FAST * np.array(direction)).tolist()
+    stage = {"velocity": velocity, "duration": 2e-3, "time_step": 2e-4}
+    for waves, along in (((1, 0), direction[0]), ((0, 1), direction[1])):
+        march, rows = marched(wave([stage], waves, (16, 16)))
+        amplitude = np.ptp(march.field("pressure")) / 2
+        if along == 0.0:
+            assert amplitude == pytest.approx(float(2 * K * HEIGHT * relaxation(2e-3, *PRONY)), rel=1e-12)
+            assert_allclose(column(rows, "friction"), 0.0, atol=1e-15)
+        else:
+            assert rows[-1].measures.friction > 1e-4
+
+
+def test_shortest_wave() -> None:
+    """A checkerboard that changes sign in every step: amplitude 2 q h0 (G_inf + G phi 2/(1 + e)), slope 0. To 1e-9."""
+    cells, height = 8, 1e-9
+    stage = {"velocity": 0.004, "distance": 60 * CELL, "cells_per_step": 1}
+    data = wave([stage], (cells // 2, cells // 2), (cells, cells))
+    data["grid"]["size"] = [cells * CELL, cells * CELL]
+    data["surface"]["amplitude"] = height
+    march, rows = marched(data)
+    z = CELL / 0.004 / 1e-3
+    modulus = PRONY[0] + PRONY[1][0] * -np.expm1(-z) / z * 2 / (1 + np.exp(-z))
+    assert modulus == pytest.approx(2.570412e6, rel=1e-6)
+    amplitude = np.ptp(march.field("pressure")) / 2
+    assert amplitude == pytest.approx(2 * np.sqrt(2) * np.pi / CELL * height * modulus, rel=1e-9)
+    assert_allclose(column(rows, "friction"), 0.0, atol=1e-15)
+
+
+# -- partial contact ---------------------------------------------------------------------------------------------------
+
+
+def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> Row:
+    """A sphere, or crossed waves, in partial contact for 4 ms, with half the load from the middle on if `jump`."""
+    halves = [(2e-3, 1.0), (2e-3, 0.5 if jump else 1.0)]
+    step = {"time_step": 4e-3 / steps, "velocity": 0.04}
+    data: Json = {
+        "material": SLS,
+        "numerics": {"tolerance": 1e-9, "integrator": integrator},
+        "output": {"energy": True},
+    }
+    if kind == "sphere":
+        data["grid"] = {"points": 64, "size": 3e-3, "boundary": "free"}
+        data["surface"] = {"shape": "sphere", "radius": 1e-2}
+        data["history"] = [{"force": 0.15 * share, "duration": t, **step} for t, share in halves]
+    else:
+        data["grid"] = {"points": 32, "size": WAVELENGTH}
+        crossed = [(5e-7, [1, 0]), (3e-7, [0, 1])]
+        data["surface"] = [{"shape": "wave", "amplitude": a, "waves": w} for a, w in crossed]
+        data["history"] = [{"pressure": 2e4 * share, "duration": t, **step} for t, share in halves]
+    return marched(data)[1][-1]
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+@pytest.mark.parametrize("kind", ["sphere", "waves"])
+@pytest.mark.parametrize("jump", [False, True])
+def test_order_in_a_moving_contact(kind: str, jump: bool, integrator: Integrator, order: float) -> None:
+    """Friction and dissipation from differences of three step lengths, though points come and go: order to 0.2."""
+    rows = [moving(kind, steps, jump, integrator) for steps in (80, 160, 320)]
+    for name in ("friction", "dissipated"):
+        coarse, middle, fine = column(rows, name)
+        assert np.log2((middle - coarse) / (fine - middle)) == pytest.approx(order, abs=0.2)
+        assert fine == pytest.approx(middle, rel=5e-3)
+
+
+# V tau/a*: rows of time over the creep time, mu R/a*, its error, d R/a*^2. A load step and the start of sliding, both
+# at t = 0, computed by an independent code with exponential steps and extrapolated
+STARTED = {
+    0.1: [
+        (0.2, 0.009198, 7e-4, 1.9046),
+        (0.6, 0.03513, 4e-4, 2.9454),
+        (1.0, 0.05318, 4e-4, 3.5478),
+        (1.4, 0.06489, 9e-4, 3.9245),
+        (1.8, 0.07347, 6e-4, 4.1673),
+    ],
+    1.0: [
+        (0.2, 0.09484, 5e-4, 1.9046),
+        (0.6, 0.3435, 6e-4, 2.9439),
+        (1.0, 0.474, 8e-4, 3.5315),
+        (1.4, 0.5394, 5e-4, 3.8828),
+        (1.8, 0.5746, 7e-4, 4.0975),
+        (2.2, 0.5953, 8e-4, 4.2302),
+    ],
+}
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0])
+def test_sphere_that_starts_to_slide(speed: float) -> None:
+    """Friction and approach within 1 % and the reference's error, at 15 cells per a* and 40 steps per creep time."""
+    creep_time, radius, force = 1e-2, 1e-2, 0.15
+    hertz = np.cbrt(3 * force * radius / (16 * 2.75e6))
+    end = STARTED[speed][-1][0] * creep_time
+    stage = {"force": force, "velocity": speed * hertz / creep_time, "duration": end, "time_step": creep_time / 40}
+    data = {
+        "grid": {"points": 128, "size": 4e-3, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": radius},
+        "material": SLS,
+        "history": [stage],
+        "numerics": {"tolerance": 1e-5},
+        "output": {"energy": True},
+    }
+    _, rows = marched(data)
+    for t, friction, error, approach in STARTED[speed]:
+        row = min(rows, key=lambda row: abs(row.time - t * creep_time))
+        assert row.measures.friction * radius / hertz == pytest.approx(friction, abs=1e-2 * friction + error)
+        assert row.measures.approach * radius / hertz**2 == pytest.approx(approach, rel=1e-2)
+        assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-12)
+
+
+# -- roughness ---------------------------------------------------------------------------------------------------------
+
+TYRE = {  # made up: twelve decades
+    "model": "zener",
+    "modulus_inf": 1e6,
+    "branches": [
+        {"modulus": 1e6 * modulus, "relaxation_time": 5 * 10.0**exponent}
+        for exponent, modulus in enumerate([300, 350, 220, 80, 24, 7, 2.4, 1.0, 0.5, 0.3, 0.2, 0.15], start=-9)
+    ],
+}
+
+
+def rough(points: int, history: list[Json], **changes: Any) -> Json:
+    """16 cells per shortest wave, rms slope 0.02, 0.1 MPa."""
+    return {
+        "grid": {"points": points, "size": 1e-3},
+        "surface": {
+            "shape": "rough",
+            "hurst": 0.9,
+            "long_wavelength": 2.5e-4,
+            "rolloff_wavelength": 2.5e-4,
+            "short_wavelength": 16e-3 / points,
+            "rms_slope": 0.02,
+            "seed": 1,
+        },
+        "material": TYRE,
+        "history": [{"pressure": 1e5, **stage} for stage in history],
+        **changes,
+    }
+
+
+def slide(points: int, cells: int, **more: Any) -> Json:
+    return {"velocity": 0.3, "distance": cells * 1e-3 / points, "cells_per_step": 1, **more}
+
+
+PRESS = {"duration": 1e-4, "time_step": {"first": 1e-9, "growth": 1.3}}
+
+
+def power(rows: list[Row], area: float) -> NDArray[np.float64]:
+    """The work of the forces on the surface since the first row: the integral of W dd - F ds, by trapezoids."""
+    mean = [0.5 * (column(rows, name)[1:] + column(rows, name)[:-1]) for name in ("pressure", "force_x")]
+    steps = [np.diff(column(rows, name)) for name in ("approach", "distance")]
+    return np.concatenate([[0.0], np.cumsum(area * mean[0] * steps[0] - mean[1] * steps[1])])
+
+
+def test_energy_of_a_rough_contact() -> None:
+    """Balance: 1e-3 of the work is asked for, 1e-12 is reached. Work of the forces on the surface: 5e-3 at one cell per
+    step, and then less with each halving of the step by at least 2^1.5, a little less than the order of the integrator.
+    """
+    differences = []
+    for cells in (1.0, 0.5, 0.25):
+        history = [PRESS, slide(128, 40, cells_per_step=cells)]
+        _, rows = marched(rough(128, history, numerics={"tolerance": 1e-6}, output={"energy": True}))
+        for row in rows:
+            assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-12)
+        start = next(n for n, row in enumerate(rows) if row.distance > 0.0) - 1
+        sliding = rows[start:]
+        by_forces = power(sliding, 1e-6)[-1]
+        differences.append(abs(sliding[-1].work - sliding[0].work - by_forces) / by_forces)
+    assert differences[0] < 5e-3
+    assert np.all(np.array(differences[:-1]) > 2**1.5 * np.array(differences[1:]))
+
+
+def test_friction_is_what_is_dissipated() -> None:
+    """Steady sliding of a wave in partial contact: over a period the surface's forces work as much as is lost. 1e-3."""
+    period = WAVELENGTH / FAST
+    stage = {"pressure": 2e4, "velocity": FAST, "duration": 5 * period, "time_step": period / 128}
+    data = wave([stage], points=(128, 1), tolerance=1e-9)
+    data["output"] = {"energy": True}
+    _, rows = marched(data)
+    last = rows[-129:]
+    lost = last[-1].dissipated - last[0].dissipated
+    assert rows[-1].measures.contact_area < 0.9
+    assert_allclose(last[-1].stored, last[0].stored, rtol=1e-4)
+    assert_allclose(power(last, WAVELENGTH**2)[-1], lost, rtol=1e-3)
+
+
+def test_quarters_of_cells() -> None:
+    """64 quarters of a cell and 16 cells: the same heights to 1e-9; friction to 1e-3, as both resolve the time."""
+    waves = [([1, 0], 5e-7), ([1, 1], 3e-7), ([2, -1], 5e-8)]
+    found = []
+    for cells in (1, 0.25):
+        stage = {"velocity": 0.02, "distance": 16 * WAVELENGTH / 256, "cells_per_step": cells}
+        data = wave([{"duration": 5e-3, "time_step": 5e-3}, stage], points=(256, 32), tolerance=1e-8)
+        data["history"][0]["pressure"] = data["history"][1]["pressure"] = 3e4
+        data["surface"] = [{"shape": "wave", "amplitude": a, "waves": w} for w, a in waves]
+        march, rows = marched(data)
+        base, offset = march.scene.path.at(march.position).parts
+        found.append((np.roll(base, offset, axis=1), rows[-1].measures, len(rows)))
+    (heights, whole, steps), (same, quarters, more) = found
+    assert (steps, more) == (19, 67)
+    assert_allclose(same, heights, rtol=0, atol=1e-9 * float(np.ptp(heights)))
+    assert whole.contact_area < 0.95
+    assert_allclose(quarters.friction, whole.friction, rtol=1e-3)
+
+
+def test_along_y_as_along_x(tmp_path: Path) -> None:
+    """A surface that slides along y is the transposed one along x: the same to 1e-7 of solves at 1e-10, at the cost."""
+    rng = np.random.default_rng(3)
+    x, y = np.arange(48) / 48, np.arange(32)[:, None] / 32
+    terms = [(m, n, rng.uniform(0, 2 * np.pi)) for m in range(-3, 4) for n in range(4) if (m, n) != (0, 0)]
+    heights = sum(1e-7 * np.cos(2 * np.pi * (m * x + n * y) + phase) / np.hypot(m, n) for m, n, phase in terms)
+
+    def slid(heights: NDArray[np.float64], size: list[float], velocity: list[float]) -> tuple[March, list[Row]]:
+        path = tmp_path / f"{velocity[0]}.npy"
+        np.save(path, heights)
+        ny, nx = heights.shape
+        data = {
+            "grid": {"points": [nx, ny], "size": size},
+            "surface": {"shape": "file", "path": str(path)},
+            "material": SLS,
+            "history": [{"pressure": 2e3, "velocity": velocity, "distance": 1.25e-4, "cells_per_step": 1}],
+            "numerics": {"tolerance": 1e-10},
+        }
+        return marched(data)
+
+    along_x, rows = slid(heights, [3e-4, 2e-4], [0.05, 0.0])
+    along_y, same = slid(heights.T, [2e-4, 3e-4], [0.0, 0.05])
+    assert rows[-1].measures.contact_area < 0.9
+    expected = along_x.field("pressure")
+    assert_allclose(along_y.field("pressure").T, expected, rtol=0, atol=1e-7 * expected.max())
+    names = {"force_x": "force_y", "force_y": "force_x", "friction": "friction", "approach": "approach"}
+    for name, swapped in names.items():
+        found, wanted = column(same, swapped), column(rows, name)
+        assert_allclose(found, wanted, rtol=0, atol=1e-7 * np.abs(wanted).max())
+    calls = [np.mean(column(each[5:], "operator_calls")) for each in (rows, same)]
+    assert calls[1] < 1.1 * calls[0]
+
+
+# -- cost --------------------------------------------------------------------------------------------------------------
+
+
+def calls_per_step(points: int, history: list[Json], tolerance: float = 1e-4) -> tuple[float, float]:
+    """Operator applications per step after the tenth, and the last friction."""
+    _, rows = marched(rough(points, history, numerics={"tolerance": tolerance}))
+    return float(np.mean(column(rows[11:], "operator_calls"))), rows[-1].measures.friction
+
+
+@pytest.mark.parametrize(
+    ("most", "change"),
+    [
+        (11, {}),
+        (11, {"velocity": [0.0, 0.3]}),
+        (13, {"cells_per_step": 0.25}),
+        (15, {"velocity": [0.2, 0.2]}),
+    ],
+)
+def test_warm_starts_save_work(most: float, change: Json) -> None:
+    """A start that moves with the surface and is extrapolated: 9, 9, 10 and 13 operator applications are measured."""
+    cells = 8 if "cells_per_step" in change else 30
+    calls, _ = calls_per_step(512, [slide(512, cells, **change)])
+    assert calls < most
+
+
+def test_tolerance_of_friction() -> None:
+    """At the tolerance of 1e-4 friction is good to 1e-3."""
+    stages = [slide(256, 30)]
+    assert calls_per_step(256, stages)[1] == pytest.approx(calls_per_step(256, stages, 1e-7)[1], rel=1e-3)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("velocity", [0.3, [0.0, 0.3]])
+def test_memory(comm: MPI.Intracomm, velocity: Any) -> None:
+    """At most one map of a rank's rows per branch and 14 more, counted and traced, beside the blocks of transforms."""
+    data = rough(1024, [slide(1024, 2, velocity=velocity)], numerics={"tolerance": 0.1})
+    data["material"] = {**TYRE, "branches": TYRE["branches"][:2]}  # type: ignore[index]
+    blocks = 4 * BLOCK_BYTES
+    marched({**data, "grid": {**data["grid"], "points": 128}, "numerics": {"accept_unconverged": True}}, comm=comm)
+    tracemalloc.start()
+    try:
+        march, rows = marched(data, comm=comm)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    maps = 8 * march.scene.slab.shape[0] * 1024
+    assert len(rows) == 4
+    assert march.scene.slab.tally["map bytes"] <= 16 * maps + blocks
+    assert peak <= 16 * maps + blocks
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("tolerance", "agreement"), [(1e-11, 1e-8), (1e-4, 1e-3)])
+@pytest.mark.parametrize("velocity", [0.3, [0.2, -0.1]])
+def test_any_number_of_ranks(comm: MPI.Intracomm, tolerance: float, agreement: float, velocity: Any) -> None:
+    """After 200 steps of a rough contact: as one rank, to 1e-8 of solves at 1e-11 and 1e-3 of solves at 1e-4."""
+    steps = {"velocity": velocity, "duration": 200 * 1e-3 / 48 / 0.3, "time_step": 1e-3 / 48 / 0.3}
+    data = rough(48, [steps], numerics={"tolerance": tolerance}, output={"energy": True})
+    data["surface"]["short_wavelength"] = 1.25e-4
+    names = ("pressure", "force_x", "force_y", "friction", "contact_area", "approach", "max_pressure", "dissipated")
+    alone, rows = marched(data)
+    assert len(rows) == 202
+    march, same = marched(data, comm=comm)
+    for name in names:
+        found, expected = column(same, name), column(rows, name)
+        points = 3 / 48**2 if name == "contact_area" and tolerance > 1e-6 else 0.0
+        assert_allclose(found, expected, rtol=0, atol=agreement * np.abs(expected).max() + points, err_msg=name)
+    for name in ("pressure", "displacement"):
+        whole, field = np.concatenate(march.scene.slab.from_all(march.field(name))), alone.field(name)
+        share = agreement if tolerance < 1e-6 else 0.03
+        assert_allclose(whole, field, rtol=0, atol=share * np.abs(field).max(), err_msg=name)

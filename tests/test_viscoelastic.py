@@ -1,0 +1,372 @@
+"""A viscoelastic body under a surface that does not slide: creep, relaxation, unloading, full contact, scales."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import BRANCHES, PRONY, SLS, begun, column, marched
+from numpy.testing import assert_allclose
+
+from parcontact.march import March
+from parcontact.physics.energy import ZenerEnergy
+from parcontact.physics.material import Zener
+from parcontact.theory import lee_radok, westergaard
+
+Json = dict[str, Any]
+FORCE, RADIUS = 0.15, 1e-2  # N, m
+LONG = 1e-2  # s, the creep time of the body
+
+
+def sphere(points: int, size: float, history: list[Json], **numerics: Any) -> Json:
+    return {
+        "grid": {"points": points, "size": size, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": RADIUS},
+        "material": SLS,
+        "history": history,
+        "numerics": {"tolerance": 1e-5, **numerics},
+        "output": {"energy": True},
+    }
+
+
+def contact_radius(march: March, area: np.ndarray) -> np.ndarray:
+    grid = march.scene.job.grid
+    return np.sqrt(area * grid.lx * grid.ly / np.pi)
+
+
+def force(march: March, pressure: np.ndarray) -> np.ndarray:
+    grid = march.scene.job.grid
+    return pressure * grid.lx * grid.ly
+
+
+# -- a sphere ----------------------------------------------------------------------------------------------------------
+
+
+def test_creep_under_a_load() -> None:
+    """Lee and Radok, 40 to 90 cells per radius: radius (from the area), approach and pressure within 0.5 %.
+
+    Pressures are compared in the inner nine tenths of the contact, relative to the highest; the edge is a cell wide.
+    """
+    profiles = []
+
+    def keep(march: March) -> None:
+        if march.row.step:
+            profiles.append(march.field("pressure")[128, 128:])
+
+    history = [{"force": FORCE, "duration": 3e-2, "time_step": {"first": 1e-4, "growth": 1.05}}]
+    march, rows = marched(sphere(256, 3e-3, history), [keep])
+    t = column(rows[1:], "time")
+    radius = lee_radok.load_step_contact_radius(t, FORCE, RADIUS, *PRONY)
+    assert_allclose(contact_radius(march, column(rows[1:], "contact_area")), radius, rtol=5e-3)
+    assert_allclose(column(rows[1:], "approach"), radius**2 / RADIUS, rtol=5e-3)
+    assert_allclose(column(rows[1:], "friction"), 0.0, atol=1e-4)
+    r = np.arange(128) * march.scene.job.grid.dx
+    for n in range(0, len(t), 6):
+        exact = lee_radok.load_step_pressure(r, t[n], FORCE, RADIUS, *PRONY)
+        inner = r < 0.9 * radius[n]
+        assert_allclose(profiles[n][inner], exact[inner], rtol=0, atol=5e-3 * exact.max())
+
+
+def test_relaxation_at_an_approach() -> None:
+    """The force follows G(t) exactly, the contact stays; the sphere's force itself to 0.1 % at 34 cells per radius."""
+    depth = 5e-5
+    history = [{"approach": depth, "duration": 5e-3, "time_step": {"first": 1e-5, "growth": 1.5}}]
+    march, rows = marched(sphere(96, 2e-3, history, tolerance=1e-8))
+    found = force(march, column(rows[1:], "pressure"))
+    exact = lee_radok.displacement_step_force(column(rows[1:], "time"), depth, RADIUS, *PRONY)
+    assert_allclose(found, exact, rtol=1e-3)
+    assert_allclose(found / found[0], exact / exact[0], rtol=1e-6)
+    assert len(set(column(rows[1:], "contact_area"))) == 1
+
+
+@pytest.mark.parametrize("rise", [1e-4, 1e-3])
+def test_retraction(rise: float) -> None:
+    """Ting: force within 1e-4 of its peak, lift-off within one step although the sphere is still below the surface."""
+    depth, steps = 5e-5, 50
+    history = [
+        {"approach": {"from": start, "to": end}, "duration": rise, "time_step": rise / steps}
+        for start, end in ((0.0, depth), (depth, 0.0))
+    ]
+    march, rows = marched(sphere(128, 2e-3, history, tolerance=1e-6))
+    t, found = column(rows, "time"), force(march, column(rows, "pressure"))
+    exact = lee_radok.triangle_force(t, depth, rise, RADIUS, *PRONY)
+    assert_allclose(found, exact, rtol=0, atol=1e-4 * exact.max())
+    lift_off = lee_radok.triangle_lift_off_time(rise, *PRONY)
+    assert t[np.flatnonzero(found)[-1]] == pytest.approx(lift_off, abs=rise / steps)
+    assert found.min() == 0.0
+    assert np.all(found[t > lift_off] == 0.0)
+    assert np.all(column(rows, "contact_area")[t > lift_off] == 0.0)
+    assert column(rows, "approach")[t > lift_off].max() > 0.05 * depth  # no contact, and yet below the surface
+
+
+# time [ms], whether after a jump, force [N], approach [um], radius [mm], pressure [kPa] and displacement [um] in the
+# middle; computed with axisymmetric rings, good to 1e-3 and, the radius, to 5 um
+UNLOADED = [
+    (0.0, True, 0.15, 21.869, 0.470, 327.5, 21.869),
+    (10.0, False, 0.15, 77.618, 0.882, 72.39, 77.618),
+    (10.0, True, 0.0, None, 0.0, 0.0, 67.231),
+    (11.97, False, 0.0, None, 0.0, 0.0, 55.219),
+    (14.98, False, 0.0, None, 0.0, 0.0, 40.852),
+    (20.0, False, 0.0, None, 0.0, 0.0, 24.754),
+    (20.0, True, 0.15, 43.877, 0.537, 250.4, 43.877),
+    (20.97, False, 0.15, 51.531, 0.647, 153.4, 51.530),
+    (30.22, False, 0.15, 83.887, 0.915, 71.45, 83.887),
+    (50.0, False, 0.15, 99.10, 0.997, 70.57, 99.10),
+]
+HALVED = [
+    (10.0, True, 0.075, 73.630, 0.795, 56.04, 73.630),
+    (14.98, False, 0.075, 69.831, 0.800, 56.00, 69.830),
+    (20.0, False, 0.075, 67.512, 0.800, 56.00, 67.512),
+    (20.0, True, 0.15, 71.678, 0.839, 73.83, 71.678),
+    (30.22, False, 0.15, 91.347, 0.958, 70.81, 91.347),
+    (50.0, False, 0.15, 100.1, 1.000, 70.56, 100.09),
+]
+
+
+@pytest.mark.parametrize(("between", "table"), [(0.0, UNLOADED), (0.075, HALVED)])
+def test_unloading_and_loading_again(between: float, table: list[tuple[Any, ...]]) -> None:
+    """No load at all is a state in which the body recovers; all within 1 %."""
+    steps = {"first": 1e-4, "growth": 1.05}
+    loads = [(0.15, 1e-2), (between, 1e-2), (0.15, 3e-2)]
+    history = [{"force": load, "duration": duration, "time_step": steps} for load, duration in loads]
+    found: list[tuple[float, ...]] = []
+
+    def keep(march: March) -> None:
+        m, middle = march.row.measures, (64, 64)
+        radius = float(contact_radius(march, np.array(m.contact_area)))
+        fields = (float(march.field(name)[middle]) if march.row.step else 0.0 for name in ("pressure", "displacement"))
+        load = float(force(march, np.array(m.pressure)))
+        found.append((1e3 * march.row.time, load, 1e6 * m.approach, 1e3 * radius, *fields))
+
+    marched(sphere(128, 3e-3, history), [keep])
+    numbers = np.array(found)[1:] * [1, 1, 1, 1, 1e-3, 1e6]
+    for t, after_jump, *expected in table:
+        there = np.flatnonzero(np.abs(numbers[:, 0] - t) < 1e-6)
+        if there.size:
+            row = numbers[there[-1 if after_jump else 0]]
+        else:
+            row = np.array([np.interp(t, numbers[:, 0], values) for values in numbers.T])
+        for value, wanted in zip(row[1:], expected, strict=True):
+            assert wanted is None or value == pytest.approx(wanted, rel=1e-2, abs=1e-9)
+    recovery = numbers[(numbers[:, 0] > 10.01) & (numbers[:, 0] < 20.0)]
+    if between == 0.0:  # every point decays with the creep time
+        decay = recovery[:, -1] * np.exp(recovery[:, 0] / (1e3 * LONG))
+        assert_allclose(decay, decay[0], rtol=2e-3)
+
+
+def test_no_load_on_a_body_at_rest() -> None:
+    """Nothing happens, and nothing is undefined."""
+    history = [{"force": 0.0, "duration": 1e-3, "time_step": 5e-4}, {"force": FORCE}]
+    march, rows = marched(sphere(16, 3e-3, history))
+    assert [row.measures.friction for row in rows[:3]] == [0.0, 0.0, 0.0]
+    assert [row.measures.contact_area for row in rows[:3]] == [0.0, 0.0, 0.0]
+    assert rows[2].work == rows[2].stored == rows[2].dissipated == 0.0
+    assert_allclose(force(march, np.array(rows[-1].measures.pressure)), FORCE, rtol=1e-12)
+
+
+# -- waves -------------------------------------------------------------------------------------------------------------
+
+
+def test_contact_that_spreads_until_it_is_full() -> None:
+    """Westergaard's wave under a load step, which grows as J(t) says: 1.5 cells of 256 and 1 % in time."""
+    amplitude, wavelength, pressure, cells = 5e-7, 2.5e-4, 1e4, 256
+    data = {
+        "grid": {"points": [cells, 1], "size": [wavelength, wavelength]},
+        "surface": {"shape": "wave", "amplitude": amplitude, "waves": [1, 0]},
+        "material": SLS,
+        "history": [{"pressure": pressure, "duration": 1.5e-2, "time_step": {"first": 5e-5, "growth": 1.02}}],
+        "numerics": {"tolerance": 1e-7},
+    }
+    _, rows = marched(data)
+    t, found = column(rows[1:], "time"), column(rows[1:], "contact_area")
+    low, high = (
+        westergaard.load_step_contact_fraction(factor * t, pressure, amplitude, wavelength, *PRONY)
+        for factor in (0.99, 1.01)
+    )
+    assert np.all((found > low - 1.5 / cells) & (found < high + 1.5 / cells))
+    full = westergaard.load_step_full_contact_time(pressure, amplitude, wavelength, *PRONY)
+    assert full == pytest.approx(10.69e-3, rel=1e-3)
+    assert np.all((found == 1.0) == (t > full))
+
+
+@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
+def test_flat_surface(integrator: str) -> None:
+    """Uniform pressure, no gap, no friction, no energy: a mean pressure moves nothing in a periodic body."""
+    data = {
+        "grid": {"points": 8, "size": 1e-3},
+        "surface": {"shape": "flat"},
+        "material": SLS,
+        "history": [{"pressure": 1e5, "velocity": [0.3, 0.1], "duration": 1e-3, "time_step": 2e-4}],
+        "numerics": {"integrator": integrator},
+        "output": {"energy": True},
+    }
+    march, rows = marched(data)
+    assert_allclose(march.field("pressure"), 1e5, rtol=1e-12)
+    assert_allclose(march.field("gap"), 0.0, atol=1e-15)
+    for row in rows[1:]:
+        assert row.measures.contact_area == 1.0
+        assert_allclose([row.measures.friction, row.work, row.stored, row.dissipated], 0.0, atol=1e-20)
+
+
+# -- branches and scales -----------------------------------------------------------------------------------------------
+
+
+def bumps(**changes: Any) -> Json:
+    return {
+        "grid": {"points": [32, 24], "size": [1e-3, 0.75e-3]},
+        "surface": [
+            {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
+            {"shape": "wave", "amplitude": 5e-7, "waves": [-1, 3], "phase": 0.4},
+            {"shape": "sphere", "radius": 0.05},
+        ],
+        "material": SLS,
+        "history": [
+            {"pressure": 2e4, "duration": 2e-3, "time_step": {"first": 1e-4, "growth": 1.5}},
+            {"pressure": 3e4, "velocity": [0.1, 0.02], "duration": 2e-3, "time_step": 2e-4},
+            {"pressure": 0.0, "duration": 1e-3, "time_step": 5e-4},
+            {"pressure": {"from": 0.0, "to": 2e4}, "velocity": -0.05, "duration": 2e-3, "time_step": 5e-4},
+        ],
+        "numerics": {"tolerance": 1e-9},
+        "output": {"energy": True},
+        **changes,
+    }
+
+
+MEASURES = ("pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure")
+ENERGIES = ("work", "stored", "dissipated")
+
+
+def numbers(data: Json) -> dict[str, np.ndarray]:
+    _, rows = marched(data)
+    return {name: column(rows, name) for name in ("time", *MEASURES, *ENERGIES)}
+
+
+def zener(*branches: Json, modulus_inf: float = 0.0) -> Json:
+    return bumps(material={"model": "zener", "modulus_inf": modulus_inf, "branches": list(branches)})
+
+
+def test_forms_of_one_material() -> None:
+    """The paper's branch; the Maxwell branch and spring that it is; with useless branches beside it. To 1e-9.
+
+    G1 = 0 is a Maxwell branch, eta1 = 0 leaves two springs in series, eta1 = inf the spring G0.
+    """
+    maxwell = {"G0": 2.475e6, "G1": 0.0, "eta1": 2475.0}
+    zeners = [{"G0": 2.75e6, "G1": 2.75e6 / 9, "eta1": 2.75e4 / 9}]
+    series = {"G0": 0.2e6, "G1": 0.2e6, "eta1": 0.0}
+    spring = {"G0": 0.175e6, "G1": 1e6, "eta1": np.inf}
+    reference = numbers(bumps())
+    for same in (zener(*zeners), zener(maxwell, modulus_inf=0.275e6), zener(maxwell, series, spring)):
+        for name, values in numbers(same).items():
+            scale = np.abs(reference[name]).max()
+            assert_allclose(values, reference[name], rtol=0, atol=1e-9 * scale, err_msg=name)
+
+
+@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
+def test_branches_far_from_the_time_steps(integrator: str) -> None:
+    """A relaxation time of 1e9 s is a spring, one of 1e-15 s nothing (after a jump it would be felt). To 1e-8."""
+    load = {"pressure": {"from": 0.0, "to": 2e4}, "velocity": 0.1, "duration": 2e-3, "time_step": 2e-4}
+    common = {"history": [load], "numerics": {"tolerance": 1e-9, "integrator": integrator}}
+
+    def measures(modulus_inf: float, *more: Json) -> dict[str, np.ndarray]:
+        material = {"model": "zener", "modulus_inf": modulus_inf, "branches": [*BRANCHES, *more]}
+        return numbers(bumps(material=material, **common))
+
+    slow = measures(0.275e6, {"modulus": 1e6, "relaxation_time": 1e9})
+    fast = measures(0.275e6, {"modulus": 1e6, "relaxation_time": 1e-15})
+    for found, expected in ((slow, measures(1.275e6)), (fast, measures(0.275e6))):
+        for name in MEASURES:
+            scale = np.abs(expected[name]).max()
+            assert_allclose(found[name], expected[name], rtol=0, atol=1e-8 * scale, err_msg=name)
+
+
+def scaled(pressure: float, length: float, time: float) -> Json:
+    """`bumps` with all pressures and moduli, all lengths and all times multiplied."""
+    data = bumps()
+    data["grid"]["size"] = [length * size for size in data["grid"]["size"]]
+    for shape in data["surface"]:
+        for name in {"amplitude", "radius"} & shape.keys():
+            shape[name] *= length
+    branches = [{"modulus": pressure * b["modulus"], "relaxation_time": time * b["relaxation_time"]} for b in BRANCHES]
+    data["material"] = {"model": "zener", "modulus_inf": pressure * 0.275e6, "branches": branches}
+    for stage in data["history"]:
+        ramp = stage["pressure"]
+        stage["pressure"] = {k: pressure * v for k, v in ramp.items()} if isinstance(ramp, dict) else pressure * ramp
+        stage["duration"] *= time
+        step = stage["time_step"]
+        stage["time_step"] = {**step, "first": time * step["first"]} if isinstance(step, dict) else time * step
+        if "velocity" in stage:
+            stage["velocity"] = (np.array(stage["velocity"]) * (length / time)).tolist()
+    return data
+
+
+@pytest.mark.parametrize(("pressure", "length", "time"), [(1e6, 1.0, 1.0), (1.0, 1e-6, 1.0), (1.0, 1.0, 1e3)])
+def test_scales(pressure: float, length: float, time: float) -> None:
+    """Results scale with the units of pressure, length and time to the rounding of solves at 1e-9."""
+    plain, other = numbers(bumps()), numbers(scaled(pressure, length, time))
+    powers = {"pressure": (1, 0), "max_pressure": (1, 0), "force_x": (1, 2), "force_y": (1, 2)}
+    powers |= {"friction": (0, 0), "contact_area": (0, 0), "approach": (0, 1), "mean_gap": (0, 1)}
+    powers |= dict.fromkeys(ENERGIES, (1, 3))
+    assert_allclose(other["time"], time * plain["time"], rtol=1e-12)
+    for name, (of_pressure, of_length) in powers.items():
+        expected = plain[name] * pressure**of_pressure * length**of_length
+        assert_allclose(other[name], expected, rtol=0, atol=1e-11 * np.abs(expected).max(), err_msg=name)
+
+
+# -- energy ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])
+def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
+    """Stored energy from the branch maps themselves and A^-1, and the balance, after jumps, sliding, no contact.
+
+    In a free scene the inverse of the operator is known only through what has been: the body's laws in pressures.
+    """
+    data = bumps(numerics={"tolerance": 1e-6, "kernel": kernel})
+    data["grid"]["boundary"] = boundary
+    checked = []
+
+    def check(march: March) -> None:
+        energy, body = march.scene.energy, march.scene.material
+        assert isinstance(energy, ZenerEnergy)
+        assert isinstance(body, Zener)
+        body.settle()
+        if energy.memory is not None:
+            energy.memory.settle()
+            assert_allclose(applied(march, energy.memory.u), body.u, rtol=0, atol=1e-12 * np.abs(body.u).max())
+        maps = [body.u, *body.branches]
+        inverses = [inverse(march, index) for index in range(len(maps))]
+        weights = [body.prony.modulus_inf, *(1.0 / body.prony.moduli)]
+        direct = 0.5 * sum(w * np.sum(a * b) for w, a, b in zip(weights, maps, inverses, strict=True))
+        assert energy.balance.stored == pytest.approx(direct, rel=1e-9, abs=1e-30)
+        checked.append(direct)
+
+    _, rows = marched(data, [check])
+    assert max(checked) > 0.0
+    for row in rows:
+        assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-11, abs=1e-30)
+        assert row.dissipated == pytest.approx(sum(row.branch_dissipation), rel=1e-12)
+
+
+def applied(march: March, field: np.ndarray) -> np.ndarray:
+    out = np.empty_like(field)
+    return march.scene.solver.operator.apply(np.ascontiguousarray(field), out)
+
+
+def inverse(march: March, index: int) -> np.ndarray:
+    """A^-1 of the displacement (0) or of a branch map (1, 2, ...)."""
+    scene = march.scene
+    body, energy = scene.material, scene.energy
+    assert isinstance(energy, ZenerEnergy)
+    assert isinstance(body, Zener)
+    if energy.memory is not None:
+        return [energy.memory.u, *energy.memory.branches][index]
+    field = [body.u, *body.branches][index]
+    return scene.solver.preconditioner.apply(field, np.empty_like(field))
+
+
+def test_energy_costs_nothing_unless_asked_for() -> None:
+    """No map and no operator application more."""
+    data = bumps()
+    plain = begun({**data, "output": {}})
+    asked = begun(data)
+    assert plain.scene.energy is None
+    assert asked.scene.slab.tally["map bytes"] == plain.scene.slab.tally["map bytes"]
