@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
 from parcontact.record import plots
@@ -30,9 +32,14 @@ def test_picture_of_a_run(
 ) -> None:
     (tmp_path / "job.yaml").write_text(text)
     assert run_parcontact(["job.yaml", "--quiet"], ranks=0).returncode == 0
-    drawn = []
-    draw = plots.Figure.savefig
-    monkeypatch.setattr(plots.Figure, "savefig", lambda figure, *a, **k: (drawn.append(figure), draw(figure, *a, **k)))
+    drawn: list[Figure] = []
+
+    def save(figure: Figure, *args: Any, **options: Any) -> None:
+        drawn.append(figure)
+        draw(figure, *args, **options)
+
+    draw = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", save)
     picture = plots.plot(tmp_path / "out/job")
     assert picture.read_bytes().startswith(b"\x89PNG")
     named = [axes for axes in drawn[0].axes if axes.get_xlabel()]
