@@ -171,17 +171,17 @@ def _wall(text: str) -> float:
 
 def _load(options: argparse.Namespace, world: MPI.Intracomm) -> job.Job:
     """Root reads the job; the others get what it found."""
-    found: job.Job | job.JobError | None = None
+    found: job.Job | list[str] = []
     if world.rank == 0:
         overrides = [*options.set, *([f"output.directory={options.out}"] if options.out else [])]
         try:
             found = job.load(options.job, overrides)
         except job.JobError as error:
-            found = error
+            found = error.mistakes
     found = world.bcast(found)
-    if isinstance(found, job.Job):
-        return found
-    raise found or InputError("no job")
+    if isinstance(found, list):
+        raise job.JobError(found)
+    return found
 
 
 def _values(text: str) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from .clock import Step, steps
 from .errors import InputError
-from .job import Grid, HeightFile, Job, Stage
+from .job import HeightFile, Job, Stage
 from .jobfile.table import plain
 from .parallel.slab import Slab
 from .record import checkpoint
@@ -24,6 +24,7 @@ from .record.directory import Directory
 SAME = ("grid", "surface", "material", "initial")  # sections that must not change
 SAME_NUMERICS = ("integrator", "kernel", "precision", "slope")
 ROUND_OFF = 1e-9  # relative: steps of two histories this close are the same
+ADVICE = "--restart never starts afresh, --out chooses another directory"
 
 
 @dataclass(frozen=True)
@@ -63,34 +64,33 @@ def choose(job: Job, slab: Slab, directory: Directory, restart: str) -> tuple[Or
         found = slab.agree(_attempt(path, job) if slab.root else None)
         problem = found if isinstance(found, str) else checkpoint.verify(found, slab) if found else "?"
         if isinstance(found, Contents) and not problem:
+            if difference := slab.agree(another_past(found, job) if slab.root else ""):
+                raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
             own = slab.agree(path.absolute().parent == directory.checkpoints.absolute())
             return Origin(found, own), [f"passed over: {text}" for text in problems]
         problems.append(problem)
     if problems:
-        advice = "" if given else "; --restart never starts afresh, --out chooses another directory"
-        raise InputError("\n".join(problems) + advice)
+        raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
     return None, []
 
 
 def _attempt(path: Path, job: Job) -> Contents | str:
-    """A checkpoint without its maps, or why it will not do."""
+    """A checkpoint without its maps, or why it will not do; root only."""
     try:
         contents = checkpoint.inspect(path)
-        if found := "; ".join(differences(contents, plain_job(job), job)):
+        if found := "; ".join(differences(contents.job, plain_job(job))):
             return f"{path} belongs to another job: {found}"
         return contents
     except (InputError, OSError) as error:
         return str(error)
 
 
-def differences(contents: Contents, now: dict[str, Any], job: Job) -> Iterator[str]:
-    """What in a checkpoint's job does not allow this job to go on from it, with both values."""
-    then = contents.job
+def differences(then: dict[str, Any], now: dict[str, Any]) -> Iterator[str]:
+    """What in the job of a checkpoint makes it another one than a job as plain data, with both values."""
     for section in SAME:
         yield from _differences(section, then.get(section), now.get(section))
     for key in SAME_NUMERICS:
         yield from _differences(f"numerics.{key}", then["numerics"].get(key), now["numerics"].get(key))
-    yield from _past(contents, then, job)
 
 
 def _differences(name: str, then: Any, now: Any) -> Iterator[str]:
@@ -108,19 +108,17 @@ def _parts(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(part, dict) for part in value)
 
 
-def _past(contents: Contents, then: dict[str, Any], job: Job) -> Iterator[str]:
-    """The steps already made must be the same; those to come may be others."""
+def another_past(contents: Contents, job: Job) -> str:
+    """Which of the steps already made would be another one in this job, or ''; those to come may be others."""
     number, until = contents.step, contents.time
-    history = TypeAdapter(tuple[Stage, ...]).validate_python(then["history"])
-    old_steps = islice(steps(history, Grid.model_validate(then["grid"]), until, job.initial.pressure), number)
+    history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
+    old_steps = islice(steps(history, job.grid, until, job.initial.pressure), number)
     new_steps = islice(steps(job.history, job.grid, until, job.initial.pressure), number)
     count = 0
     for count, (old, new) in enumerate(zip(old_steps, new_steps, strict=False), 1):
         if difference := next(_apart(old, new), ""):
-            yield f"step {count} of the {number} already made {difference}"
-            return
-    if count < number:
-        yield f"{number} steps were made, but the history now has {count} up to t = {until:g} s"
+            return f"step {count} of the {number} already made {difference}"
+    return f"{number} steps were made, and the job has {count} up to t = {until:g} s" if count < number else ""
 
 
 def _apart(old: Step, new: Step) -> Iterator[str]:

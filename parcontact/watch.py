@@ -17,7 +17,7 @@ from .job import Checkpoint
 from .parallel.slab import Slab
 
 SIGNALS = (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
-LOOK_SECONDS = 1.0  # between two looks for the stop file
+LOOK_SECONDS = 0.2  # between two looks for the stop file
 RESERVE_SECONDS = 3.0  # of wall time for what is not measured: ending MPI, closing files
 FIRST_WRITE = 50e6  # bytes per second: how fast the first checkpoint is expected to be written
 RECENT = 50  # steps whose longest is expected of the next one
@@ -118,11 +118,12 @@ class Watch:
 def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
     """When a run must have ended, in the time of `time.time`: after `wall` seconds, or with its batch job.
 
-    Slurm tells the end of a job, SLURM_JOB_END_TIME; PBS (Torque) how long it may last, PBS_WALLTIME.
+    The end of a job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME, in seconds since 1970; PBS (Torque) says how long it
+    may last, PBS_WALLTIME, which is counted from the start of this program: a little too late.
     """
     born = _born()
     limits = [] if wall is None else [born + wall]
-    for name, start in (("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", born)):
+    for name, start in (("PARCONTACT_END_TIME", 0.0), ("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", born)):
         try:
             limits.append(start + float(environment[name]))
         except (KeyError, ValueError):

@@ -2,17 +2,21 @@
 
 import csv
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pytest
 import yaml
 from mpi4py import MPI
 
 from parcontact import job, runner
+from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
+from parcontact.record import checkpoint
 
 ROUGH = {
     "shape": "rough",
@@ -73,7 +77,8 @@ class Bench:
             "checkpoint": {"every": 1, "keep": 1000},
         }
         for key, value in changes.items():
-            data[key] = {**data.get(key, {}), **value} if isinstance(value, dict) else value
+            merged = isinstance(value, dict) and not value.keys() & {"shape", "model"}
+            data[key] = {**data[key], **value} if merged else value
         return data
 
     def run(self, data: dict[str, Any], out: Path, **options: Any) -> int:
@@ -133,7 +138,7 @@ def cut_anywhere(bench: Bench, data: dict[str, Any]) -> None:
     assert bench.run(data, whole) == 0
     total = len(rows(whole)) - 1
     assert total >= 8
-    for step in range(0 if bench.comm.size == 1 else total // 2, total):
+    for step in range(total) if bench.comm.size == 1 else (1, total // 2, total - 1):
         part = cut(bench, whole, step)
         assert bench.run(data, part) == 0
         if bench.comm.rank == 0:
@@ -150,3 +155,219 @@ def test_cut_anywhere(bench: Bench, name: str) -> None:
 def test_cut_after_steady_start(bench: Bench) -> None:
     data = bench.job("viscoelastic", history=[SLIDE, FASTER], output={"energy": False, "branch_dissipation": False})
     cut_anywhere(bench, data | {"initial": {"state": "steady", "velocity": 0.2, "pressure": 1e5}})
+
+
+# -- other settings ---------------------------------------------------------------------------------------------------
+
+
+def part_way(bench: Bench, data: dict[str, Any], step: int = 6) -> Path:
+    """A run that was stopped after a step."""
+    out = bench.where / "out"
+    assert bench.run(data, bench.where / "whole") == 0
+    return cut(bench, bench.where / "whole", step).rename(out)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"grid": {"points": [20, 16]}}, "grid.points was [20, 14], is [20, 16]"),
+    ({"grid": {"size": [2e-3, 7e-4]}}, "grid.size was [0.001, 0.0007], is [0.002, 0.0007]"),
+    ({"surface": {"seed": 4}}, "surface.0.seed was 3, is 4"),
+    ({"surface": {**ROUGH, "rms_slope": None, "rms_height": 1e-6}}, "surface.0.rms_slope was 0.02, is None"),
+    ({"material": {"modulus_inf": 2e6}}, "material.modulus_inf was 1000000.0, is 2000000.0"),
+    ({"material": ELASTIC}, "material.model was zener, is elastic"),
+    ({"numerics": {"integrator": "backward-euler"}}, "numerics.integrator was exponential, is backward-euler"),
+    ({"numerics": {"kernel": "love"}}, "numerics.kernel was spectral, is love"),
+    ({"numerics": {"precision": "mixed"}}, "numerics.precision was double, is mixed"),
+    (
+        {"history": [{**PRESS, "pressure": 2e5}, SLIDE, FASTER]},
+        "step 1 of the 6 already made had pressure 100000.0, has pressure 200000.0",
+    ),
+    (
+        {"history": [PRESS, {**SLIDE, "velocity": 0.3}, FASTER]},
+        "step 6 of the 6 already made ended at t = 0.00125 s, ends at 0.00116666",
+    ),
+    ({"history": [PRESS]}, "step 6 of the 6 already made ended at t = 0.00125 s, ends at 0.0015"),
+    ({"history": [TOUCH]}, "6 steps were made, and the job has 1 up to t = 0.00125 s"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), REFUSED)
+def test_refused(bench: Bench, changes: dict[str, Any], message: str) -> None:
+    """Another problem, or another past: both values are shown, and nothing is written."""
+    out = part_way(bench, bench.job("viscoelastic"))
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(InputError) as raised:
+        bench.run(bench.job("viscoelastic", **changes), out)
+    assert message in str(raised.value)
+    assert "--restart never starts afresh" in str(raised.value)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_other_settings(bench: Bench) -> None:
+    """Tolerance, outputs, checkpoints and what is still to come may change; measures go on with the new columns."""
+    out = part_way(bench, bench.job("viscoelastic"))
+    changes = {
+        "title": "another",
+        "numerics": {"tolerance": 1e-6},
+        "output": {"fields": ["gap"], "every": 4, "branch_dissipation": False},
+        "checkpoint": {"every": 100, "keep": 1},
+        "history": [PRESS, SLIDE, {**SLIDE, "name": "back", "velocity": -0.2}, TOUCH],
+    }
+    changed = bench.job("viscoelastic", **changes)
+    assert bench.run(changed, out) == 0
+    assert bench.run(changed, bench.where / "afresh") == 0
+    found, afresh, old = rows(out), rows(bench.where / "afresh"), rows(bench.where / "whole")
+    assert [row["step"] for row in found] == [row["step"] for row in afresh]
+    assert found[:7] == [{key: row[key] for key in found[0]} for row in old[:7]]
+    assert float(found[-1]["friction"]) == pytest.approx(float(afresh[-1]["friction"]), rel=0.05)
+    with h5py.File(out / "fields.h5") as file:
+        assert file["step"][...].tolist() == [*range(1, 7), 8, 12, len(found) - 1]
+        assert np.isnan(file["gap"][6:]).sum() == 0
+    assert [path.name for path in (out / "checkpoint").iterdir()] == [f"step-{len(found) - 1}.h5"]
+    contents = checkpoint.inspect(out / "checkpoint" / f"step-{len(found) - 1}.h5")
+    assert [(link.from_step, "another" in link.job) for link in contents.chain] == [(0, False), (6, True)]
+
+
+def test_later_energies(bench: Bench) -> None:
+    """Energies count from the start: they cannot begin half-way, but they can end there."""
+    silent = {"energy": False, "branch_dissipation": False}
+    out = part_way(bench, bench.job("viscoelastic", output=silent))
+    with pytest.raises(InputError, match=r"does not have energy/.*: output\.energy was off"):
+        bench.run(bench.job("viscoelastic"), out)
+    other = cut(bench, bench.where / "whole", 6)
+    assert bench.run(bench.job("viscoelastic", output=silent), other) == 0
+
+
+def test_surface_file(bench: Bench) -> None:
+    """A file of heights may move, but not change."""
+    heights = 1e-6 * np.random.default_rng(0).random((14, 20))
+    np.save(bench.where / "heights.npy", heights)
+    surface = {"shape": "file", "path": str(bench.where / "heights.npy")}
+    out = part_way(bench, bench.job("viscoelastic", surface=[surface]))
+    np.save(bench.where / "moved.npy", heights)
+    moved = bench.job("viscoelastic", surface=[{**surface, "path": str(bench.where / "moved.npy")}])
+    np.save(bench.where / "heights.npy", 2 * heights)
+    with pytest.raises(InputError, match=r"surface\.0\.content was .*, is "):
+        bench.run(bench.job("viscoelastic", surface=[surface]), out)
+    assert bench.run(moved, out) == 0
+
+
+# -- which checkpoint -------------------------------------------------------------------------------------------------
+
+
+def damage(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[-9] ^= 4
+    path.write_bytes(data)
+
+
+def newer(path: Path) -> None:
+    path.write_bytes(path.read_bytes().replace(b"format 1", b"format 2", 1))
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+def of_another_job(path: Path) -> None:
+    shutil.copy(path.parents[2] / "other" / "checkpoint" / path.name, path)
+
+
+FAULTS = [
+    (damage, "is damaged"),
+    (newer, "written by a newer parcontact"),
+    (truncate, "is damaged: it has 5000 bytes instead of"),
+    (of_another_job, "belongs to another job: surface.0.seed was 4, is 3"),
+]
+
+
+@pytest.mark.parametrize(("fault", "message"), FAULTS)
+def test_falls_back(
+    bench: Bench, capfd: pytest.CaptureFixture[str], fault: Callable[[Path], None], message: str
+) -> None:
+    """A checkpoint that will not do is passed over with one message; without a good one nothing is done."""
+    data = bench.job("viscoelastic")
+    bench.run(bench.job("viscoelastic", surface={"seed": 4}), bench.where / "other")
+    out, whole = part_way(bench, data), bench.where / "whole"
+    bad = [out / "checkpoint" / f"step-{step}.h5" for step in (5, 6)]
+    for path in bad:
+        fault(path)
+    capfd.readouterr()
+    assert bench.run(data, out) == 0
+    warnings = [line for line in capfd.readouterr().err.splitlines() if "passed over" in line]
+    assert len(warnings) == 2
+    assert all(message in line and str(path) in line for line, path in zip(warnings, reversed(bad), strict=True))
+    same(whole, out, len(rows(whole)) - 1)
+    for path in (out / "checkpoint").glob("step-*.h5"):
+        fault(path)
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(InputError) as raised:
+        bench.run(data, out)
+    assert message in str(raised.value)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_restart_never(bench: Bench) -> None:
+    data = bench.job("viscoelastic")
+    out = part_way(bench, data)
+    (out / "checkpoint" / "step-99.h5").write_bytes(b"")
+    assert bench.run(data, out, restart="never") == 0
+    same(bench.where / "whole", out, len(rows(out)) - 1)
+    assert not (out / "checkpoint" / "step-99.h5").exists()
+
+
+def test_restart_from_a_path(bench: Bench) -> None:
+    """From an earlier checkpoint of the same directory, whose later ones are put aside; or from another directory."""
+    data, whole = bench.job("viscoelastic"), bench.where / "whole"
+    out = part_way(bench, data)
+    total = len(rows(whole)) - 1
+    assert bench.run(data, out, restart=str(out / "checkpoint" / "step-3.h5"), until=0.0007) == 0
+    assert [row["step"] for row in rows(out)] == ["0", "1", "2", "3", "4", "5"]
+    aside = sorted(path.name for path in (out / "checkpoint").glob("*.aside"))
+    assert aside == [f"step-{step}.h5.aside" for step in (4, 5, 6)]
+    assert bench.run(data, out) == 0
+    same(whole, out, total)
+    new = bench.where / "new"
+    assert bench.run(data, new, restart=str(whole / "checkpoint" / "step-6.h5")) == 0
+    assert rows(new) == rows(whole)[7:]
+    assert maps(new / f"checkpoint/step-{total}.h5") == maps(whole / f"checkpoint/step-{total}.h5")
+
+
+def test_keeps_the_newest(bench: Bench) -> None:
+    data = bench.job("elastic", checkpoint={"every": 3, "keep": 2})
+    out = bench.where / "out"
+    assert bench.run(data, out) == 0
+    total = len(rows(out)) - 1
+    kept = sorted(int(path.stem[5:]) for path in (out / "checkpoint").iterdir())
+    assert kept == [max(step for step in range(0, total, 3)), total]
+
+
+# -- other ranks ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("first", "second"), [(2, 3), (3, 1), (1, 4)])
+@pytest.mark.parametrize("name", ["viscoelastic", "free"])
+def test_other_ranks(
+    comm: MPI.Intracomm, communicators: list[MPI.Intracomm], shared_path: Path, first: int, second: int, name: str
+) -> None:
+    """A run goes on with another number of ranks to the result of one rank, but for the solver's tolerance."""
+    if max(first, second) > comm.size:
+        pytest.skip("needs more ranks")
+    groups = {group.size: Bench(group, shared_path) for group in communicators}
+    out, whole = shared_path / "out", shared_path / "whole"
+    data = Bench(comm, shared_path).job(name, numerics={"tolerance": 1e-9})
+    if 1 in groups:
+        assert groups[1].run(data, whole) == 0
+    if first in groups:
+        assert groups[first].run(data, out, until=1.2e-3) == 0
+    comm.Barrier()
+    if second in groups:
+        assert groups[second].run(data, out) == 0
+    comm.Barrier()
+    if comm.rank == 0:
+        for one, other in zip(rows(whole), rows(out), strict=True):
+            for key in ("time", "distance", "force_x", "contact_area", "approach", "work", "dissipated"):
+                assert float(one[key]) == pytest.approx(float(other[key]), rel=1e-6, abs=1e-12)
+        contents = checkpoint.inspect(out / f"checkpoint/step-{len(rows(out)) - 1}.h5")
+        assert [link.ranks for link in contents.chain] == [first, second]
+    comm.Barrier()

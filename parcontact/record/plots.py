@@ -1,20 +1,21 @@
 """A picture of a run, finished or not: what was measured over time, distance or load, and the last saved maps.
 
-Which panels there are follows from the job: friction if the surface slides, energies if they were asked for, curves over
-the load if all stages are single solves, pressures along a line through a sphere beside Hertz's.
+Which panels there are follows from the job: friction if the surface slides, energies if they were asked for, curves
+over the load if all stages are single solves, pressures along a line through a sphere beside Hertz's.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import yaml
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pydantic import ValidationError
@@ -28,7 +29,7 @@ from . import hdf5, measures, steady_plot
 
 PICTURE = "picture.png"
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-STYLE = {
+STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "axes.spines.right": False,
     "axes.spines.top": False,
@@ -53,18 +54,23 @@ def plot(directory: Path) -> Path:
             return steady_plot.plot(steady)
         raise InputError(f"{directory} holds no run: it has no measures.csv")
     run = Run(directory)
-    panels = [*_histories(run), *_maps(run)]
-    columns = min(len(panels), 2)
-    lines = -(-len(panels) // max(columns, 1))
     with rc_context(STYLE):
-        figure = Figure(figsize=(5.2 * columns, 0.4 + 3.1 * lines), layout="constrained")
-        figure.suptitle(run.job.title or run.job.path.stem, fontsize=11)
-        for panel, axes in zip(panels, np.ravel(figure.subplots(lines, columns, squeeze=False)), strict=False):
-            panel(axes)
-        for axes in figure.axes[len(panels) : lines * columns]:
-            axes.set_axis_off()
+        figure = _figure(run.job.title or directory.name, [list(_histories(run)), _maps(run)])
         figure.savefig(directory / PICTURE, dpi=150)
     return directory / PICTURE
+
+
+def _figure(title: str, groups: Sequence[Sequence[Panel]]) -> Figure:
+    """Groups of panels below each other, each in even rows of at most three."""
+    rows = [
+        list(row) for group in groups if group for row in np.array_split(np.array(group, object), -(-len(group) // 3))
+    ]
+    figure = Figure(figsize=(11.5, 0.4 + 3.0 * len(rows)), layout="constrained")
+    figure.suptitle(title, fontsize=11)
+    for part, panels in zip(figure.subfigures(len(rows), 1, squeeze=False)[:, 0], rows, strict=True):
+        for panel, axes in zip(panels, part.subplots(1, len(panels), squeeze=False)[0], strict=True):
+            panel(axes)
+    return figure
 
 
 class Run:
@@ -172,7 +178,8 @@ def _histories(run: Run) -> Iterator[Panel]:
         yield _lines(over, "approach", "m", [("", where, BLUE)])
     else:
         yield _lines(over, "contact area / nominal area", "", [("", contact, BLUE)], bottom=0.0)
-        yield _lines(over, "mean gap", "m", [("", run.column("mean_gap"), BLUE)], bottom=0.0)
+        if contact.min() < 1.0:
+            yield _lines(over, "mean gap", "m", [("", run.column("mean_gap"), BLUE)], bottom=0.0)
     yield _lines(over, "highest pressure", "Pa", [("", run.column("max_pressure"), RED)], bottom=0.0)
     name, unit, load = run.load
     if run.lasts and np.ptp(load) > 1e-9 * load.max():
@@ -271,7 +278,7 @@ def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
         return
     if min(fields.x.size, fields.y.size) <= STRIP:
         if pressure is not None:
-            yield _strips(fields, pressure)
+            yield _strips(run, fields)
         return
     rounds = [shape for shape in run.job.surface if isinstance(shape, Sphere | Cylinder)]
     if pressure is not None and len(run.job.surface) == 1 and rounds:
@@ -322,9 +329,12 @@ def _map(
         axes.grid(False)
         part = shown[window]
         columns, lines = slice(window[1].start, _edge(window[1])), slice(window[0].start, _edge(window[0]))
-        mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=colors, norm=_norm(part), rasterized=True)
+        lowest, highest = _range(part)
+        colored = Normalize(lowest, highest)
+        mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=colors, norm=colored, rasterized=True)
         axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=name + when, aspect="equal")
-        axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]")
+        beyond = "max" if np.nanmax(part, initial=-np.inf) > highest else "neither"
+        axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]", extend=beyond)
 
     return draw
 
@@ -333,76 +343,111 @@ def _edge(part: slice) -> int | None:
     return None if part.stop is None else part.stop + 1
 
 
-def _norm(values: Array) -> Normalize:
-    """Colours by value; a few very high points do not darken all others."""
+def _range(values: Array) -> tuple[float, float]:
+    """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others."""
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return Normalize(0.0, 1.0)
-    low = min(float(finite.min()), 0.0) if finite.min() >= 0.0 else float(finite.min())
-    return Normalize(low, float(np.percentile(finite, 99.8)) or None)
+        return 0.0, 1.0
+    most, highest = float(np.percentile(finite, 99.5)), float(finite.max())
+    return min(float(finite.min()), 0.0), (highest if highest < 1.4 * most else most) or 1.0
 
 
-def _strips(fields: Fields, pressure: Array) -> Panel:
-    """Pressure along the long side of a narrow map."""
-    along, line = (fields.x, pressure[0]) if fields.x.size > fields.y.size else (fields.y, pressure[:, 0])
-    length, (position,) = _scaled("m", along)
-    unit, (shown,) = _scaled("Pa", line)
+# -- pressures on a line ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Pressures [Pa] on a line [m] at an instant."""
+
+    name: str
+    along: Array
+    pressure: Array
+
+
+def _chosen(run: Run, fields: Fields) -> list[tuple[int, str]]:
+    """Some of the saved instants, evenly, and what tells them apart."""
+    found = []
+    for index in sorted({fields.saved[int(k)] for k in np.linspace(0, len(fields.saved) - 1, INSTANTS)}):
+        name, unit, load = run.load
+        time = fields.file["t"][index]
+        at = np.flatnonzero(run.column("step") == fields.steps[index])
+        value, unit = (time, "s") if run.lasts else (float(load[at[0]]) if at.size else np.nan, unit)
+        label, (scaled,) = _scaled(unit, np.array([value]))
+        found.append((index, f"{scaled[0]:.3g} {label}"))
+    return found
+
+
+def _draw_curves(axes: Axes, curves: Sequence[Curve]) -> tuple[float, float]:
+    """Draw pressures on lines; returns the units of length [m] and pressure [Pa]."""
+    length, distances = _scaled("m", *(curve.along for curve in curves))
+    unit, pressures = _scaled("Pa", *(curve.pressure for curve in curves))
+    for number, (curve, x, p) in enumerate(zip(curves, distances, pressures, strict=True)):
+        shade = 0.85 * number / max(len(curves) - 1, 1)
+        axes.plot(x, p, color=colormaps["plasma"](shade), label=curve.name)
+    axes.set(xlabel=f"[{length}]", ylabel=f"pressure [{unit}]")
+    return _size(length, "m"), _size(unit, "Pa")
+
+
+def _size(label: str, unit: str) -> float:
+    """What a unit with its prefix stands for."""
+    return 10.0 ** next(power for power, prefix in PREFIXES.items() if prefix + unit == label)
+
+
+def _strips(run: Run, fields: Fields) -> Panel:
+    """Pressures along the long side of a narrow map."""
+    lies = fields.x.size > fields.y.size
+    curves = []
+    for index, name in _chosen(run, fields):
+        field = fields.file["pressure"][index]
+        curves.append(Curve(name, fields.x if lies else fields.y, field[0] if lies else field[:, 0]))
 
     def draw(axes: Axes) -> None:
-        axes.plot(position, shown, color=RED)
-        axes.set(xlabel=f"{'x' if along is fields.x else 'y'} [{length}]", ylabel=f"pressure [{unit}]")
-        axes.set_title("pressure at the last saved instant")
-        axes.set_ylim(bottom=0.0)
+        _draw_curves(axes, curves)
+        axes.set_xlabel(("x " if lies else "y ") + axes.get_xlabel())
+        axes.set_title("pressure at some of the saved instants")
+        _legend_beside(axes)
 
     return draw
-
-
-# -- pressures under a sphere -----------------------------------------------------------------------------------------
 
 
 def _profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
-    """Pressures along a line through the axis, seen from the axis, at some of the saved instants."""
-    job = run.job
+    """Pressures along a line through the axis, seen from the axis, beside Hertz's under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
-    centre = shape.center or (job.grid.lx / 2, job.grid.ly / 2)
-    chosen = sorted({fields.saved[int(k)] for k in np.linspace(0, len(fields.saved) - 1, INSTANTS)})
+    centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
     curves = []
-    for index in chosen:
-        step = run.timeline[int(fields.steps[index])]
-        x, y = (fields.x - centre[0] - step.position[0], fields.y - centre[1] - step.position[1])
-        field = fields.file["pressure"][index]
-        distance, line = (y, field[:, np.argmin(np.abs(x))]) if across else (x, field[np.argmin(np.abs(y))])
-        load = float(field.mean() * run.area)
-        curves.append((step, distance, line, load))
-    label, distances = _scaled("m", *(curve[1] for curve in curves))
-    unit, lines = _scaled("Pa", *(curve[2] for curve in curves))
-    reach = 1.3 * max((float(np.abs(d[p > 0.0]).max(initial=0.0)) for d, p in zip(distances, lines, strict=True)))
+    for index, name in _chosen(run, fields):
+        moved = run.timeline[int(fields.steps[index])].position
+        x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
+        line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
+        curves.append(Curve(name, y if across else x, line))
+    force = float(field.mean() * run.area)
+    reach = 1.3 * max(float(np.abs(curve.along[curve.pressure > 0.0]).max(initial=0.0)) for curve in curves)
 
     def draw(axes: Axes) -> None:
-        for number, ((step, _, _, load), distance, line) in enumerate(zip(curves, distances, lines, strict=True)):
-            seconds, (when,) = _scaled("s", np.array([step.time]))
-            text = f"{when[0]:.3g} {seconds}" if run.lasts else f"{load:.3g} N"
-            shade = 0.9 * number / max(len(curves) - 1, 1)
-            axes.plot(distance, line, color=(0.12 + 0.75 * shade, 0.3, 0.55 - 0.4 * shade), label=text)
-        if isinstance(shape, Sphere):
-            _beside_hertz(axes, run, shape, curves[-1][3], unit, label, reach)
-        axes.set(xlabel=f"{'y' if across else 'x'} from the axis [{label}]", ylabel=f"pressure [{unit}]")
-        axes.set(title="pressure along a line through the axis", xlim=(-reach, reach) if reach else None)
+        length, unit = _draw_curves(axes, curves)
+        if isinstance(shape, Sphere) and force > 0.0:
+            r = np.linspace(-reach, reach, 401)
+            for name, modulus, style in _moduli(run.job):
+                pressure = hertz.pressure(np.abs(r), force, shape.radius, modulus, run.job.material.poisson)
+                axes.plot(r / length, pressure / unit, "k" + style, lw=1.0, label=name)
+        axes.set_xlabel(f"{'y' if across else 'x'} from the axis {axes.get_xlabel()}")
+        axes.set_title("pressure on a line through the axis")
+        if reach > 0.0:
+            axes.set_xlim(-reach / length, reach / length)
         axes.set_ylim(bottom=0.0)
-        axes.legend()
+        _legend_beside(axes)
 
     return draw
 
 
-def _beside_hertz(axes: Axes, run: Run, shape: Sphere, force: float, unit: str, label: str, reach: float) -> None:
-    """Hertz's pressures under the last load: of the body itself, or of its first and last moduli."""
-    material, size = run.job.material, 10.0 ** next(p for p, name in PREFIXES.items() if label == name + "m")
-    scale = 10.0 ** next(p for p, name in PREFIXES.items() if unit == name + "Pa")
-    r = np.linspace(-reach, reach, 401) * size
-    kinds = [("Hertz", material.instant_modulus, "--")]
-    if not isinstance(material, Elastic):
-        kinds = [("Hertz, instantaneous modulus", material.instant_modulus, "--")]
-        kinds += [("Hertz, long-term modulus", material.long_modulus, ":")] if material.long_modulus else []
-    for name, modulus, style in kinds if force > 0.0 else []:
-        pressure = hertz.pressure(np.abs(r), force, shape.radius, modulus, material.poisson)
-        axes.plot(r / size, pressure / scale, "k" + style, lw=1.0, label=name)
+def _moduli(job: Job) -> list[tuple[str, float, str]]:
+    """Of the elastic bodies to compare with, and how they are drawn."""
+    material = job.material
+    if isinstance(material, Elastic):
+        return [("Hertz", material.shear_modulus, "--")]
+    ends = [("Hertz, G(0)", material.instant_modulus, "--"), ("Hertz, G(∞)", material.long_modulus, ":")]
+    return [end for end in ends if end[1] > 0.0]
+
+
+def _legend_beside(axes: Axes) -> None:
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, handlelength=1.2)

@@ -38,14 +38,18 @@ class Recorder:
         self._measures: MeasuresFile | None = None
         self.warnings: list[str] = []
 
-        def begin() -> None:
-            path = self.path / "measures.csv"
-            if after is not None:
-                self.warnings += filter(None, [measures.cut_back(path, after, dissipated)])
-            self._measures = MeasuresFile(path, dissipated)
-            self.console = Console(self.path / "run.log", quiet, total)
+        table, log = self.path / "measures.csv", self.path / "run.log"
 
-        hdf5.on_root(slab, begin, f"the output directory {self.path} cannot be written", InputError)
+        def begin_table() -> None:
+            if after is not None:
+                self.warnings += filter(None, [measures.cut_back(table, after, dissipated)])
+            self._measures = MeasuresFile(table, dissipated)
+
+        def begin_log() -> None:
+            self.console = Console(log, quiet, total)
+
+        hdf5.on_root(slab, begin_table, f"cannot write {table}", InputError)
+        hdf5.on_root(slab, begin_log, f"cannot write {log}", InputError)
         self._fields = self._begin_fields(job, provenance, total, after)
 
     def _begin_fields(self, job: Job, provenance: Provenance, total: int, after: int | None) -> FieldsFile | None:

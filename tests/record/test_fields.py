@@ -1,0 +1,133 @@
+"""fields.h5: laid out once, readable at any instant, continued under other settings."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact.parallel.slab import Array, Slab
+from parcontact.record import fields, info
+from parcontact.record.fields import FieldsFile
+from parcontact.record.provenance import Link, Provenance, extended, read_chain
+
+NX, NY = 6, 5
+SIZE = (3.0, 2.0)
+FIRST = Provenance((Link("title: first\n", 1),), (4,))
+SECOND = Provenance(extended(FIRST.chain, Link("title: second\n", 2, from_step=4)))
+
+pytestmark = pytest.mark.mpi
+
+
+def field(slab: Slab, step: int, name: str) -> Array:
+    """This rank's rows of a map that tells its step, name and place."""
+    y, x = np.mgrid[slab.rows.start : slab.rows.stop, :NX]
+    return step + 0.01 * y + 0.001 * x + len(name)
+
+
+def saved(path: Path, slab: Slab, names: tuple[str, ...], steps: list[int], until: int) -> FieldsFile:
+    """A file with the instants up to step `until`."""
+    file = FieldsFile(path, slab, SIZE, names, steps)
+    file.make(FIRST)
+    for step in steps:
+        if step <= until:
+            file.save(step, 0.1 * step, {name: field(slab, step, name) for name in names})
+    file.sync()
+    slab.comm.Barrier()
+    return file
+
+
+def check(path: Path, slab: Slab, steps: list[int], reached: int, names: dict[str, list[int]]) -> None:
+    """Planned steps, how many of them were reached, and for each map the steps at which it holds numbers."""
+    slab.comm.Barrier()
+    whole = Slab(MPI.COMM_SELF, NX, NY)
+    with h5py.File(path) as file:
+        assert file["step"][...].tolist() == steps
+        assert np.flatnonzero(~np.isnan(file["t"][...])).tolist() == list(range(reached))
+        assert np.allclose(file["t"][:reached], 0.1 * np.array(steps[:reached]), rtol=1e-15)
+        assert {name for name in fields.UNITS if name in file} == set(names)
+        for name, there in names.items():
+            for index, step in enumerate(steps[:reached]):
+                expected = field(whole, step, name) if step in there else np.full((NY, NX), np.nan)
+                assert np.array_equal(file[name][index], expected, equal_nan=True)
+    times = ElementTree.parse(path.with_suffix(".xdmf")).iter("Time")
+    assert len(list(times)) == reached
+    slab.comm.Barrier()
+
+
+def test_layout(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Coordinates of the grid's points, scales and units, as xarray and others expect them."""
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    saved(path, slab, ("pressure", "gap"), [2, 4, 6], 4)
+    check(path, slab, [2, 4, 6], 2, {"pressure": [2, 4], "gap": [2, 4]})
+    with h5py.File(path) as file:
+        assert np.allclose(file["x"], np.arange(NX) * 0.5)
+        assert np.allclose(file["y"], np.arange(NY) * 0.4)
+        assert [dimension[0].name for dimension in file["pressure"].dims] == ["/t", "/y", "/x"]
+        assert file["pressure"].attrs["units"] == "Pa"
+        assert file.attrs["job"] == "title: first\n"
+        assert file.attrs["seeds"].tolist() == [4]
+    text, sound = info.describe(path)
+    assert sound
+    assert "2 of 3 instants saved, t = 0.2 s (step 2) to 0.4 s (step 4)" in text
+
+
+def test_goes_on_where_it_was(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """What lies after the step is forgotten, in place, and the chain of runs is longer."""
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    saved(path, slab, ("pressure",), [2, 4, 6, 8], 6)
+    inode = path.stat().st_ino
+    file = FieldsFile(path, slab, SIZE, ("pressure",), [2, 4, 6, 8])
+    assert file.resume(4, SECOND) == ""
+    assert path.stat().st_ino == inode
+    check(path, slab, [2, 4, 6, 8], 2, {"pressure": [2, 4]})
+    with h5py.File(path) as h5:
+        assert [link.job for link in read_chain(h5)] == ["title: first\n", "title: second\n"]
+    slab.comm.Barrier()
+    file.save(6, 0.6, {"pressure": field(slab, 6, "pressure")})
+    file.sync()
+    check(path, slab, [2, 4, 6, 8], 3, {"pressure": [2, 4, 6]})
+
+
+def test_goes_on_with_other_instants_and_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """What was saved stays, also what is no longer asked for at those steps; a map not saved then is NaN there."""
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    saved(path, slab, ("pressure", "displacement"), [2, 4, 6], 6)
+    file = FieldsFile(path, slab, SIZE, ("pressure", "gap"), [3, 6, 9, 10])
+    assert file.resume(5, SECOND) == ""
+    check(path, slab, [2, 4, 6, 9, 10], 2, {"pressure": [2, 4], "gap": []})
+    file.save(6, 0.6, {name: field(slab, 6, name) for name in ("pressure", "gap")})
+    file.sync()
+    check(path, slab, [2, 4, 6, 9, 10], 3, {"pressure": [2, 4, 6], "gap": [6]})
+
+
+def test_lost_or_damaged(comm: MPI.Intracomm, shared_path: Path) -> None:
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    file = FieldsFile(path, slab, SIZE, ("pressure",), [2, 4, 6])
+    assert "is missing" in file.resume(4, SECOND)
+    check(path, slab, [6], 0, {"pressure": []})
+    if slab.root:
+        path.write_bytes(b"no HDF5")
+    slab.comm.Barrier()
+    file = FieldsFile(path, slab, SIZE, ("pressure",), [2, 4, 6])
+    assert "cannot be read" in file.resume(4, SECOND)
+    check(path, slab, [6], 0, {"pressure": []})
+
+
+def test_cut_back_without_going_on(comm: MPI.Intracomm, shared_path: Path) -> None:
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    fields.cut_back(path, slab, 4)
+    saved(path, slab, ("pressure",), [2, 4, 6], 6)
+    fields.cut_back(path, slab, 4)
+    slab.comm.Barrier()
+    with h5py.File(path) as file:
+        assert np.isnan(file["t"][...]).tolist() == [False, False, True]
+
+
+def test_chain_counts_runs_that_are_alike() -> None:
+    link = Link("title: a\n", 2)
+    assert extended((link,), Link("title: a\n", 2, from_step=9))[0].runs == 2
+    assert len(extended((link,), Link("title: a\n", 3, from_step=9))) == 2
+    assert len(extended((link,), Link("title: b\n", 2, from_step=9))) == 2

@@ -1,0 +1,66 @@
+"""measures.csv: exact numbers, cut back without repeating or losing a row."""
+
+import math
+from pathlib import Path
+
+from parcontact.physics.ledger import Measures
+from parcontact.record import measures
+from parcontact.record.measures import COLUMNS, MeasuresFile
+from parcontact.record.row import Row
+
+
+def row(step: int, lost: tuple[float, ...] = ()) -> Row:
+    return Row(step, 0.1 * step, measures=Measures(pressure=1 / 3), dissipated=sum(lost), branch_dissipation=lost)
+
+
+def written(path: Path, count: int, branches: int = 0) -> None:
+    file = MeasuresFile(path, branches)
+    for step in range(count):
+        file.write(row(step, (0.1,) * branches))
+    file.close()
+
+
+def test_numbers_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "measures.csv"
+    written(path, 3)
+    found = measures.read(path)
+    assert list(found) == list(COLUMNS)
+    assert found["step"] == [0, 1, 2]
+    assert found["time"] == [0.0, 0.1, 0.2]
+    assert found["pressure"] == [1 / 3] * 3
+    assert all(math.isnan(value) for value in found["work"])
+
+
+def test_cut_back(tmp_path: Path) -> None:
+    path = tmp_path / "measures.csv"
+    written(path, 6)
+    whole = path.read_text()
+    with path.open("a") as file:
+        file.write("6,0.6,0.")  # a row that was cut off
+    assert measures.cut_back(path, 3, 0) == ""
+    assert path.read_text() == "".join(whole.splitlines(keepends=True)[:5])
+    file_again = MeasuresFile(path, 0)
+    for step in (4, 5):
+        file_again.write(row(step))
+    file_again.close()
+    assert path.read_text() == whole
+
+
+def test_what_is_lost_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "measures.csv"
+    assert "is missing" in measures.cut_back(path, 3, 0)
+    written(path, 3)
+    assert "has 3 of the 6 rows up to step 5" in measures.cut_back(path, 5, 0)
+
+
+def test_other_columns(tmp_path: Path) -> None:
+    """The dissipation of branches may be asked for later, or no longer."""
+    path = tmp_path / "measures.csv"
+    written(path, 3)
+    assert measures.cut_back(path, 2, 2) == ""
+    assert list(measures.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1"]
+    assert math.isnan(measures.read(path)["dissipated_1"][2])
+    assert measures.cut_back(path, 2, 0) == ""
+    assert list(measures.read(path)) == list(COLUMNS)
+    written(tmp_path / "split.csv", 2, branches=2)
+    assert measures.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]

@@ -1,0 +1,225 @@
+"""The program as a user starts it: exit codes, messages, nothing written for bad input."""
+
+import csv
+import os
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from conftest import RunParcontact
+
+from parcontact import __main__, watch
+
+JOB: dict[str, Any] = {
+    "grid": {"points": [16, 12], "size": [1e-3, 7.5e-4]},
+    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
+    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [
+        {"name": "press", "pressure": 1e4, "duration": 1e-3, "time_step": 2.5e-4},
+        {"name": "slide", "pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4, "cells_per_step": 1},
+    ],
+}
+STEPS = 9  # a jump, 4 of pressing, 4 of sliding
+
+Main = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Main:
+    """The command line in this process: exit code, output, errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str | Path) -> tuple[int, str, str]:
+        try:
+            code = __main__.main([str(word) for word in words])
+        except SystemExit as error:
+            code = int(error.code or 0)
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+def job(path: Path, **changes: Any) -> Path:
+    path.write_text(yaml.safe_dump(JOB | changes))
+    return path
+
+
+def rows(out: Path) -> list[dict[str, str]]:
+    with (out / "measures.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_from_job_to_result(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """On two ranks; the same command again finds that it is done."""
+    job(tmp_path / "job.yaml")
+    done = run_parcontact(["job.yaml"], ranks=2)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert lines[0] == "job: 16 x 12 points on 2 ranks"
+    assert [line.split()[0] for line in lines[-STEPS - 3 : -1]] == ["step", *map(str, range(STEPS + 1))]
+    assert lines[-1] == "done: results in out/job"
+    out = tmp_path / "out" / "job"
+    assert [int(row["step"]) for row in rows(out)] == list(range(STEPS + 1))
+    assert {path.name for path in out.iterdir()} == {
+        *("measures.csv", "run.log", "job.yaml", "job.resolved.yaml", "checkpoint"),
+    }
+    again = run_parcontact(["job.yaml"], ranks=2)
+    assert again.returncode == 0
+    assert "finished before, at t = 0.0035 s" in again.stdout
+    assert len(rows(out)) == STEPS + 1
+
+
+BAD: list[tuple[Sequence[str], str]] = [
+    (["absent.yaml"], "absent.yaml"),
+    (["broken.yaml"], "broken.yaml:1:"),
+    (["job.yaml", "--set", "grid.points=0"], "grid.points must be a positive whole number"),
+    (["job.yaml", "--set", "grid.pionts=8"], "did you mean"),
+    (["job.yaml", "--out", "file/out"], "the output directory file/out cannot be written: Not a directory"),
+    (["job.yaml", "--out", "/proc/out"], "the output directory /proc/out cannot be written: No such file"),
+    (["job.yaml", "--restart", "absent.h5"], "absent.h5 cannot be read: No such file or directory"),
+    (["job.yaml", "--restart", "file"], "file is incomplete or damaged: it has no seal"),
+    (["job.yaml", "--until", "-1"], "must be a time [s] of zero or more, got '-1'"),
+    (["job.yaml", "--wall", "soon"], "must be a wall time HH:MM:SS, got 'soon'"),
+    (["job.yaml", "--sett", "grid.points=8"], "unrecognized arguments"),
+    (["info", "absent.h5"], "absent.h5 does not exist"),
+    (["heights.yaml"], "heights.npy has shape (3, 4), but the grid has (ny, nx) = (12, 16)"),
+    (["one_solve.yaml", "--until", "1"], "--until 1 is beyond the end of the history, t = 0 s"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), BAD)
+def test_bad_input(main: Main, tmp_path: Path, words: Sequence[str], message: str) -> None:
+    """One message, exit code 2, and nothing written."""
+    job(tmp_path / "job.yaml")
+    job(tmp_path / "one_solve.yaml", history=[{"pressure": 1e4}])
+    np.save(tmp_path / "heights.npy", np.zeros((3, 4)))
+    job(tmp_path / "heights.yaml", surface={"shape": "file", "path": "heights.npy"})
+    (tmp_path / "broken.yaml").write_text("{")
+    (tmp_path / "file").write_text("")
+    before = sorted(tmp_path.rglob("*"))
+    code, out, err = main(*words)
+    assert code == 2
+    assert message in err
+    assert out == ""
+    assert err.count(message) == 1
+    assert "Traceback" not in err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_bad_input_is_told_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """By root alone."""
+    job(tmp_path / "job.yaml", grid={"points": [16, 12], "size": -1.0})
+    for words in (["job.yaml"], ["--wrong"]):
+        told = run_parcontact(words, ranks=2)
+        assert told.returncode == 2
+        assert told.stderr.count("grid.size" if words == ["job.yaml"] else "usage:") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
+
+
+def test_ranks_that_are_alone(run_parcontact: RunParcontact, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A launcher of another MPI starts ranks that do not see each other: each of them refuses."""
+    job(tmp_path / "job.yaml")
+    monkeypatch.setenv("PMI_SIZE", "2")
+    alone = run_parcontact(["job.yaml"], ranks=0)
+    assert alone.returncode == 2
+    assert "2 ranks were started but each finds itself alone" in alone.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
+
+
+def test_unconverged(main: Main, tmp_path: Path) -> None:
+    """A solve that stops at max_iterations says so: exit code 1, unless the job accepts it."""
+    numerics = {"max_iterations": 1, "tolerance": 1e-10}
+    job(tmp_path / "job.yaml", numerics=numerics)
+    code, _, err = main("job.yaml", "--quiet")
+    assert code == 1
+    assert "step 1 at t = 0 s (stage 'press'): the contact solve" in err
+    assert "max_iterations = 1" in err
+    code, _, err = main("job.yaml", "--quiet", "--set", "numerics.accept_unconverged=true")
+    assert code == 0
+
+
+def test_until(main: Main, tmp_path: Path) -> None:
+    """Stops after the first step that reaches it; goes on; extends a finished run by its last stage."""
+    path = job(tmp_path / "job.yaml")
+    out = tmp_path / "out" / "job"
+    code, said, _ = main(path, "--until", "6e-4")
+    assert code == 0
+    assert "stopped at t = 0.00075 s as asked for" in said
+    assert rows(out)[-1]["time"] == "0.00075"
+    assert "is at t = 0.00075 s, not before --until 0.0006" in main(path, "--until", "6e-4")[1]
+    assert main(path, "--quiet") == (0, "", "")
+    assert len(rows(out)) == STEPS + 1
+    assert main(path, "--quiet", "--until", "0.005")[0] == 0
+    extended = rows(out)
+    assert [int(row["step"]) for row in extended] == list(range(len(extended)))
+    assert float(extended[-2]["time"]) < 0.005 <= float(extended[-1]["time"])
+    steps = [float(b["time"]) - float(a["time"]) for a, b in pairwise(extended[5:])]
+    assert all(step == pytest.approx(6.25e-4, rel=1e-9) for step in steps)
+    assert main(path, "--quiet", "--out", "at-once", "--until", "0.005")[0] == 0
+    for a, b in zip(extended, rows(tmp_path / "at-once"), strict=True):
+        assert {**a, "seconds": ""} == {**b, "seconds": ""}
+
+
+def test_wall_limit_of_a_chain(main: Main, tmp_path: Path) -> None:
+    """Each run stops by itself, with a checkpoint, and says so; together they complete the history."""
+    path = job(tmp_path / "job.yaml")
+    codes: list[int] = []
+    while not codes or codes[-1] == 3:
+        code, said, _ = main(path, "--wall", "0:01")  # this process is older: one step each
+        codes.append(code)
+        assert ("the wall time is nearly used up; run again to go on" in said) == (code == 3)
+    assert codes == [3] * (STEPS - 1) + [0]
+    assert [int(row["step"]) for row in rows(tmp_path / "out" / "job")] == list(range(STEPS + 1))
+    assert main(path, "--quiet", "--out", "at-once")[0] == 0
+    for a, b in zip(rows(tmp_path / "out" / "job"), rows(tmp_path / "at-once"), strict=True):
+        assert {**a, "seconds": ""} == {**b, "seconds": ""}
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("90", 90.0), ("2:30", 150.0), ("01:00:00", 3600.0), ("1-12:00:00", 129600.0), ("100:00:00", 360000.0)],
+)
+def test_wall_times(text: str, seconds: float) -> None:
+    assert __main__._wall(text) == seconds
+
+
+def test_end_of_a_batch_job() -> None:
+    """The earliest limit holds; times are those of the batch system or of this process's start."""
+    assert watch.limit(None, {}) is None
+    born = watch.limit(0.0, {})
+    assert born is not None
+    assert watch.limit(100.0, {"SLURM_JOB_END_TIME": "5000"}) == 5000.0
+    assert watch.limit(None, {"PARCONTACT_END_TIME": "4000", "SLURM_JOB_END_TIME": "5000"}) == 4000.0
+    assert watch.limit(None, {"PBS_WALLTIME": "60"}) == pytest.approx(born + 60.0, abs=0.1)
+    assert watch.limit(50.0, {"PBS_WALLTIME": "60"}) == pytest.approx(born + 50.0, abs=0.1)
+
+
+def test_info_and_check(main: Main, tmp_path: Path) -> None:
+    path = job(tmp_path / "job.yaml", output={"fields": ["pressure"], "every": 3})
+    assert main(path, "--quiet")[0] == 0
+    code, said, _ = main("info", f"out/job/checkpoint/step-{STEPS}.h5")
+    assert code == 0
+    assert said.splitlines()[-1] == "sound: every row matches its checksum"
+    assert "3 of 3 instants saved" in main("info", "out/job/fields.h5")[1]
+    with (tmp_path / "out/job/checkpoint" / f"step-{STEPS}.h5").open("r+b") as file:
+        file.seek(-9, os.SEEK_END)
+        file.write(b"damage")
+    code, said, _ = main("info", f"out/job/checkpoint/step-{STEPS}.h5")
+    assert code == 2
+    assert "is damaged" in said
+    assert main("check", path)[0] == 0
+
+
+def test_help(main: Main) -> None:
+    code, said, _ = main("--help")
+    assert code == 0
+    assert "exit codes" in said
+    code, said, _ = main("run", "--help")
+    for option in ("--restart", "--until", "--wall", "--out", "--quiet", "--set"):
+        assert option in said
