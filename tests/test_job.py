@@ -211,8 +211,8 @@ def test_overrides_of_every_kind(tmp_path: Path) -> None:
     (tmp_path / "road.npy").touch()
     job = job_of(
         tmp_path, CONTRACT, "grid.points=[512, 256]", "history.0.pressure=2e5", "material.branches.1.modulus=7",
-        "numerics.tolerance=0.01", "steady.velocities=[1, 2]", "title=a = b", "history.1.distance=null", "history.1.duration=1",
-        "surface.0.short_wavelength=2e-5",
+        "numerics.tolerance=0.01", "steady.velocities=[1, 2]", "title=a = b", "history.1.distance=null",
+        "history.1.duration=1", "surface.0.short_wavelength=2e-5",
     )  # fmt: skip
     assert job.grid.points == (512, 256)
     assert job.history[0].load.start == 2e5
