@@ -106,7 +106,8 @@ def test_overrides_of_every_kind() -> None:
     text = SMALL.replace("- {", "- {velocity: 1, distance: 2, time_step: 1, ")
     job = job_of(
         text, "grid.points=[512, 256]", "history.0.pressure={from: 1, to: 2e5}", "numerics.tolerance=0.01",
-        "title=a = b", "steady.velocities=1e-1:1e1:3", "history.0.distance=null", "history.0.duration=3", "grid.boundary=free",
+        "title=a = b", "steady.velocities=1e-1:1e1:3", "history.0.distance=null", "history.0.duration=3",
+        "grid.boundary=free",
     )  # fmt: skip
     assert (job.grid.points, job.grid.boundary, job.numerics.kernel) == ((512, 256), "free", "love")
     assert (job.history[0].load.start, job.history[0].load.end) == (1.0, 2e5)
