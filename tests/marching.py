@@ -1,14 +1,15 @@
-"""Jobs as dictionaries, marched in this process."""
+"""Jobs as dictionaries or worked examples, marched in this process."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from parcontact import scene
-from parcontact.job import Job
+from parcontact import scene, steadystart
+from parcontact.job import Job, load
 from parcontact.march import March, run
 from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
@@ -20,14 +21,25 @@ SLS = {"model": "zener", "modulus_inf": 0.275e6, "branches": BRANCHES}
 PRONY = (0.275e6, [2.475e6], [1e-3])  # the same for the closed forms
 
 
-def begun(data: dict[str, Any], comm: MPI.Intracomm = MPI.COMM_SELF) -> March:
+JOBS = Path(__file__).parents[1] / "jobs"
+
+
+def example(name: str, *overrides: str) -> Job:
+    """A job of jobs/."""
+    return load(JOBS / f"{name}.yaml", overrides)
+
+
+def begun(data: dict[str, Any] | Job, comm: MPI.Intracomm = MPI.COMM_SELF) -> March:
     """A march at the start of a job."""
-    job = Job.model_validate(data)
-    return March(scene.build(job, Slab(comm, *job.grid.points)))
+    job = data if isinstance(data, Job) else Job.model_validate(data)
+    march = March(scene.build(job, Slab(comm, *job.grid.points)))
+    if job.initial.state == "steady":
+        steadystart.begin(march)
+    return march
 
 
 def marched(
-    data: dict[str, Any], tasks: Sequence[Callable[[March], None]] = (), comm: MPI.Intracomm = MPI.COMM_SELF
+    data: dict[str, Any] | Job, tasks: Sequence[Callable[[March], None]] = (), comm: MPI.Intracomm = MPI.COMM_SELF
 ) -> tuple[March, list[Row]]:
     """A march at the end of a job, and the row of every instant, the initial one first."""
     march, rows = begun(data, comm), list[Row]()

@@ -1,15 +1,17 @@
 """A viscoelastic body under a surface that does not slide: creep, relaxation, unloading, full contact, scales."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from marching import BRANCHES, PRONY, SLS, begun, column, marched
+from marching import BRANCHES, PRONY, SLS, begun, column, example, marched
 from numpy.testing import assert_allclose
 
 from parcontact.march import March
 from parcontact.physics.energy import ZenerEnergy
 from parcontact.physics.material import Zener
+from parcontact.record.row import Row
 from parcontact.theory import lee_radok, westergaard
 
 Json = dict[str, Any]
@@ -161,6 +163,32 @@ def test_no_load_on_a_body_at_rest() -> None:
     assert [row.measures.contact_area for row in rows[:3]] == [0.0, 0.0, 0.0]
     assert rows[2].work == rows[2].stored == rows[2].dissipated == 0.0
     assert_allclose(force(march, np.array(rows[-1].measures.pressure)), FORCE, rtol=1e-12)
+
+
+def near(rows: list[Row], t: float, name: str) -> float:
+    """A number at an instant, between steps linearly."""
+    return float(np.interp(t, column(rows, "time"), column(rows, name)))
+
+
+def test_example_of_creep() -> None:
+    """What jobs/creep.yaml promises, within 0.5 % of approach and 1 % of radius at a third of its points."""
+    march, rows = marched(example("creep", "grid.points=96"))
+    promised = [(1, 0.5748, 33.03), (3, 0.6985, 48.79), (10, 0.8811, 77.64), (50, 1.0055, 101.1)]
+    for t, radius, approach in [(0, 0.4676, 21.87), *promised]:
+        area = near(rows[1:], 1e-3 * t, "contact_area")
+        assert contact_radius(march, np.array(area)) == pytest.approx(1e-3 * radius, rel=1e-2)
+        assert near(rows[1:], 1e-3 * t, "approach") == pytest.approx(1e-6 * approach, rel=5e-3)
+
+
+@pytest.mark.parametrize(("between", "approach"), [(0.0, 43.88), (0.075, 71.68)])
+def test_example_of_unloading(between: float, approach: float) -> None:
+    """What jobs/unload_reload.yaml promises of the second loading: the approach, to 0.5 % at a third of its points."""
+    _, rows = marched(example("unload_reload", "grid.points=96", f"history.1.force={between}"))
+    jumps = [after for before, after in pairwise(rows) if before.time == after.time]
+    found = [row.measures.approach for row in jumps if row.measures.pressure > 0.0]
+    assert found[0] == pytest.approx(21.87e-6, rel=5e-3)
+    assert found[-1] == pytest.approx(1e-6 * approach, rel=5e-3)
+    assert jumps[1].measures.contact_area == 0.0 or between > 0.0
 
 
 # -- waves -------------------------------------------------------------------------------------------------------------

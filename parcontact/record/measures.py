@@ -84,8 +84,8 @@ def cut_back(path: Path, step: int, branches: int) -> str:
 
 
 def read(path: Path) -> dict[str, list[float]]:
-    """Columns of a measures file by name; NaN for what was not asked for."""
+    """Columns of a measures file by name, also of one that still grows; NaN for what was not asked for."""
     with path.open(newline="") as file:
-        table = list(csv.reader(file))
+        table = list(csv.reader(line for line in file if line.endswith("\n")))
     series = zip(*table[1:], strict=True) if len(table) > 1 else [[] for _ in table[0]]
     return {name: [float(text or "nan") for text in column] for name, column in zip(table[0], series, strict=True)}

@@ -1,0 +1,1 @@
+"""Pictures of runs, panel by panel."""

@@ -1,0 +1,108 @@
+"""Pressures on a line: along a narrow map, or through the axis of a sphere or cylinder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+
+from ...job import Cylinder, Elastic, Job, Sphere
+from ...parallel.slab import Array
+from ...theory import hertz
+from .run import Fields, Panel, Run, scaled, size_of
+
+INSTANTS = 5  # at most so many lines in one panel
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Pressures [Pa] on a line [m] at an instant."""
+
+    name: str
+    along: Array
+    pressure: Array
+
+
+def _chosen(run: Run, fields: Fields) -> list[tuple[int, str]]:
+    """Some of the saved instants, evenly, and what tells them apart."""
+    found = []
+    for index in sorted({fields.saved[int(k)] for k in np.linspace(0, len(fields.saved) - 1, INSTANTS)}):
+        _, unit, load = run.load
+        time = fields.file["t"][index]
+        at = np.flatnonzero(run.column("step") == fields.steps[index])
+        value, unit = (time, "s") if run.lasts else (float(load[at[0]]) if at.size else np.nan, unit)
+        label, (shown,) = scaled(unit, np.array([value]))
+        found.append((index, f"{shown[0]:.3g} {label}"))
+    return found
+
+
+def _draw_curves(axes: Axes, curves: Sequence[Curve]) -> tuple[float, float]:
+    """Draw pressures on lines; returns the units of length [m] and pressure [Pa]."""
+    length, distances = scaled("m", *(curve.along for curve in curves))
+    unit, pressures = scaled("Pa", *(curve.pressure for curve in curves))
+    for number, (curve, x, p) in enumerate(zip(curves, distances, pressures, strict=True)):
+        shade = 0.85 * number / (len(curves) - 1) if len(curves) > 1 else 0.45
+        axes.plot(x, p, color=colormaps["plasma"](shade), label=curve.name)
+    axes.set(xlabel=f"[{length}]", ylabel=f"pressure [{unit}]")
+    return size_of(length, "m"), size_of(unit, "Pa")
+
+
+def strips(run: Run, fields: Fields) -> Panel:
+    """Pressures along the long side of a narrow map."""
+    lies = fields.x.size > fields.y.size
+    curves = []
+    for index, name in _chosen(run, fields):
+        field = fields.file["pressure"][index]
+        curves.append(Curve(name, fields.x if lies else fields.y, field[0] if lies else field[:, 0]))
+
+    def draw(axes: Axes) -> None:
+        _draw_curves(axes, curves)
+        axes.set_xlabel(("x " if lies else "y ") + axes.get_xlabel())
+        axes.set_title("pressure at some of the saved instants")
+        _legend_beside(axes)
+
+    return draw
+
+
+def profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
+    """Pressures along a line through the axis, seen from the axis, beside Hertz's under the last load."""
+    across = isinstance(shape, Cylinder) and shape.axis == "x"
+    centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
+    curves = []
+    for index, name in _chosen(run, fields):
+        moved = run.timeline[int(fields.steps[index])].position
+        x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
+        line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
+        curves.append(Curve(name, y if across else x, line))
+    force = float(field.mean() * run.area)
+    reach = 1.3 * max(float(np.abs(curve.along[curve.pressure > 0.0]).max(initial=0.0)) for curve in curves)
+
+    def draw(axes: Axes) -> None:
+        length, unit = _draw_curves(axes, curves)
+        if isinstance(shape, Sphere) and force > 0.0:
+            r = np.linspace(-reach, reach, 401)
+            for name, modulus, style in _moduli(run.job):
+                pressure = hertz.pressure(np.abs(r), force, shape.radius, modulus, run.job.material.poisson)
+                axes.plot(r / length, pressure / unit, "k" + style, lw=1.0, label=name)
+        axes.set_xlabel(f"{'y' if across else 'x'} from the axis {axes.get_xlabel()}")
+        axes.set_title("pressure on a line through the axis")
+        if reach > 0.0:
+            axes.set_xlim(-reach / length, reach / length)
+        axes.set_ylim(bottom=0.0)
+        _legend_beside(axes)
+
+    return draw
+
+
+def _moduli(job: Job) -> list[tuple[str, float, str]]:
+    """Of the elastic bodies to compare with, and how they are drawn."""
+    material = job.material
+    if isinstance(material, Elastic):
+        return [("Hertz", material.shear_modulus, "--")]
+    ends = [("Hertz, G(0)", material.instant_modulus, "--"), ("Hertz, G(∞)", material.long_modulus, ":")]
+    return [end for end in ends if end[1] > 0.0]
+
+
+def _legend_beside(axes: Axes) -> None:
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, handlelength=1.2)

@@ -1,0 +1,104 @@
+"""Maps of the last saved instant."""
+
+from collections.abc import Iterator
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+
+from ...job import Cylinder, Sphere
+from ...parallel.slab import Array
+from . import lines
+from .run import Fields, Panel, Run, scaled
+
+STRIP = 8  # points across: a map as narrow as this is drawn as a line
+
+
+def maps(run: Run) -> list[Panel]:
+    """Panels of the last saved instant; none if nothing was saved."""
+    try:
+        with h5py.File(run.directory / "fields.h5", "r", locking=False) as file:
+            return list(_panels(run, Fields(file)))
+    except (OSError, KeyError):
+        return []
+
+
+def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
+    pressure, gap, displacement = (fields.last(name) for name in ("pressure", "gap", "displacement"))
+    if not fields.saved:
+        return
+    if min(fields.x.size, fields.y.size) <= STRIP:
+        if pressure is not None:
+            yield lines.strips(run, fields)
+        return
+    rounds = [shape for shape in run.job.surface if isinstance(shape, Sphere | Cylinder)]
+    if pressure is not None and len(run.job.surface) == 1 and rounds:
+        yield lines.profiles(run, fields, rounds[0])
+    time = float(fields.file["t"][fields.saved[-1]])
+    unit, (shown,) = scaled("s", np.array([time]))
+    when = f" at {shown[0]:.4g} {unit}" if run.lasts else ""
+    window = _window(pressure)
+    if pressure is not None:
+        yield _map(fields, np.where(pressure > 0.0, pressure, np.nan), "pressure", "Pa", when, window)
+    if gap is not None:
+        open_ = gap if pressure is None else np.where(pressure > 0.0, np.nan, gap)
+        yield _map(fields, open_, "gap", "m", f"{when}; contact black", window, "Blues_r", "k")
+    elif displacement is not None:
+        yield _map(fields, displacement, "displacement", "m", when, window, "viridis")
+
+
+def _window(pressure: Array | None) -> tuple[slice, slice]:
+    """The rows and columns around a contact that fills only a part of the box; else all of them."""
+    window = (slice(None), slice(None))
+    if pressure is None or not (pressure > 0.0).any():
+        return window
+    cut = []
+    for axis in (1, 0):
+        touched = np.flatnonzero((pressure > 0.0).any(axis=axis))
+        margin = (touched[-1] - touched[0]) // 2 + 3
+        cut.append(slice(max(touched[0] - margin, 0), touched[-1] + margin + 1))
+    whole = pressure[cut[0], cut[1]].size > 0.5 * pressure.size
+    return window if whole else (cut[0], cut[1])
+
+
+def _map(
+    fields: Fields,
+    values: Array,
+    name: str,
+    unit: str,
+    when: str,
+    window: tuple[slice, slice],
+    colors: str = "inferno",
+    blank: str = "0.92",
+) -> Panel:
+    x, y = fields.x, fields.y
+    label, (shown,) = scaled(unit, values)
+    length, (right, top) = scaled("m", np.append(x, 2 * x[-1] - x[-2]), np.append(y, 2 * y[-1] - y[-2]))
+
+    def draw(axes: Axes) -> None:
+        axes.set_facecolor(blank)
+        axes.grid(False)
+        part = shown[window]
+        columns, lines = slice(window[1].start, _edge(window[1])), slice(window[0].start, _edge(window[0]))
+        lowest, highest = _range(part)
+        colored = Normalize(lowest, highest)
+        mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=colors, norm=colored, rasterized=True)
+        axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=name + when, aspect="equal")
+        beyond = "max" if np.nanmax(part, initial=-np.inf) > highest else "neither"
+        axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]", extend=beyond)
+
+    return draw
+
+
+def _edge(part: slice) -> int | None:
+    return None if part.stop is None else part.stop + 1
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return 0.0, 1.0
+    most, highest = float(np.percentile(finite, 99.5)), float(finite.max())
+    return min(float(finite.min()), 0.0), (highest if highest < 1.4 * most else most) or 1.0
