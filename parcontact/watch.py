@@ -8,7 +8,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
@@ -119,15 +119,15 @@ def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> fl
     """When a run must have ended, in the time of `time.time`: after `wall` seconds, or with its batch job.
 
     The end of a job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME, in seconds since 1970; PBS (Torque) says how long it
-    may last, PBS_WALLTIME, which is counted from the start of this program: a little too late.
+    may last, PBS_WALLTIME, which is counted from the start of this program: a little too late. An end before that start
+    is that of another job, whose environment was handed on.
     """
     born = _born()
     limits = [] if wall is None else [born + wall]
     for name, start in (("PARCONTACT_END_TIME", 0.0), ("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", born)):
-        try:
-            limits.append(start + float(environment[name]))
-        except (KeyError, ValueError):
-            continue
+        with suppress(KeyError, ValueError):
+            end = start + float(environment[name])
+            limits += [end] if end > born else []
     return min(limits, default=None)
 
 

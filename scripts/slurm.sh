@@ -15,10 +15,10 @@
 # The end of a job is SLURM_JOB_END_TIME, which parcontact knows. To end the chain, cancel the job: scancel <id>.
 
 bin=${PARCONTACT_BIN:-$SLURM_SUBMIT_DIR/.venv/bin}
-if [ -z "${SLURM_JOB_END_TIME:-}" ]; then   # Slurm before 23.02
-    end=$(squeue --noheader --job "$SLURM_JOB_ID" --format %e) && SLURM_JOB_END_TIME=$(date -d "$end" +%s) &&
-        export SLURM_JOB_END_TIME
-fi
+
+# Newer Slurms set this themselves; with others, what is there would be that of the job that has submitted this one.
+end=$(squeue --noheader --job "$SLURM_JOB_ID" --format %e)
+SLURM_JOB_END_TIME=$(date -d "$end" +%s) && export SLURM_JOB_END_TIME
 
 "$bin/mpirun" -n "$SLURM_NTASKS" "$bin/parcontact" "$@"
 status=$?

@@ -10,9 +10,10 @@ An error on one rank is raised on all, as a RunError in one sentence.
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
@@ -21,6 +22,7 @@ from numpy.typing import DTypeLike, NDArray
 from ..errors import RunError
 from ..parallel.slab import Array, Slab
 
+T = TypeVar("T")
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 PIECE = 1 << 20  # bytes read at a time
 FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
@@ -130,12 +132,21 @@ def read(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -
 
 def sync(path: Path, slab: Slab) -> None:
     """Wait until what any rank has written is on the disk; collective."""
+    while_syncing(path, slab, lambda: None)
+
+
+def while_syncing(path: Path, slab: Slab, meanwhile: Callable[[], T]) -> T:
+    """As `sync`; returns what was done `meanwhile`."""
     problem = ""
-    try:
-        sync_one(path)
-    except OSError as error:
-        problem = f"cannot write {path}: {reason(error)}"
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(sync_one, path)
+        result = meanwhile()
+        try:
+            waiting.result()
+        except OSError as error:
+            problem = f"cannot write {path}: {reason(error)}"
     raise_first(slab, problem)
+    return result
 
 
 def sync_one(path: Path) -> None:
@@ -147,9 +158,7 @@ def sync_one(path: Path) -> None:
         os.close(handle)
 
 
-def on_root(
-    slab: Slab, action: Callable[[], Any], what: str, kind: type[Exception] = RunError
-) -> None:
+def on_root(slab: Slab, action: Callable[[], Any], what: str, kind: type[Exception] = RunError) -> None:
     """Do something on root; collective. Its failure is an error of this kind on every rank, beginning with `what`."""
     problem = ""
     if slab.root:

@@ -21,6 +21,7 @@ REFERENCES = (
     "A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377 (pressure constant on a cell)",
     "M. Frigo, S. G. Johnson, Proc. IEEE 93 (2005) 216 (FFTW)",
 )
+LEFT_OUT = "(too long to be kept)"
 CHAIN_BYTES = 60_000  # of the text of a chain: an attribute of fixed size can be renewed in place
 
 
@@ -52,7 +53,7 @@ class Provenance:
         now = self.chain[-1]
         file.attrs["program"] = now.program
         file.attrs["job"] = now.job
-        file.attrs.create("chain", _fixed(self.chain))
+        file.attrs.create("chain", _fixed(self.chain, now.job))
         file.attrs["ranks"] = now.ranks
         file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64)
         versions = {name: metadata.version(name) for name in LIBRARIES}
@@ -62,7 +63,7 @@ class Provenance:
 
     def renew(self, file: h5py.File) -> None:
         """Put the longer chain into a file that has one; nothing else in it changes its place."""
-        file.attrs.modify("chain", _fixed(self.chain))
+        file.attrs.modify("chain", _fixed(self.chain, file.attrs["job"]))
 
 
 def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
@@ -74,15 +75,16 @@ def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
 
 def read_chain(file: h5py.File) -> tuple[Link, ...]:
     """The chain of runs that made the file."""
-    return tuple(Link(**link) for link in json.loads(bytes(file.attrs["chain"])))
+    links = json.loads(bytes(file.attrs["chain"]))
+    return tuple(Link(**{**link, "job": link["job"] or file.attrs["job"]}) for link in links)
 
 
-def _fixed(chain: tuple[Link, ...]) -> NDArray[np.bytes_]:
-    """As JSON in an array of fixed size; without the oldest links where they do not fit."""
-    text = b"[]"
-    for start in range(len(chain)):
-        whole = json.dumps([asdict(link) for link in chain[start:]]).encode()
-        if len(whole) <= CHAIN_BYTES:
-            text = whole
-            break
-    return np.array(text, dtype=f"S{CHAIN_BYTES}")
+def _fixed(chain: Sequence[Link], job: str) -> NDArray[np.bytes_]:
+    """As JSON in an array of fixed size: an empty job is that of the file; what does not fit is left out."""
+    links = [asdict(replace(link, job="" if link.job == job else link.job)) for link in chain]
+    for link in links:
+        if len(json.dumps(links)) > CHAIN_BYTES and link["job"]:
+            link["job"] = LEFT_OUT
+    while len(json.dumps(links)) > CHAIN_BYTES:
+        links.pop(0)
+    return np.array(json.dumps(links).encode(), dtype=f"S{CHAIN_BYTES}")

@@ -126,6 +126,22 @@ def test_cut_back_without_going_on(comm: MPI.Intracomm, shared_path: Path) -> No
         assert np.isnan(file["t"][...]).tolist() == [False, False, True]
 
 
+def test_chain_of_long_jobs(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """The job of the file is there once; of others that are too long only the facts are kept."""
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    long, longer = Link("a" * 200_000, 1), Link("b" * 300_000, 1, from_step=5)
+    file = FieldsFile(path, slab, SIZE, ("pressure",), [2, 4])
+    file.make(Provenance((long,)))
+    comm.Barrier()
+    with h5py.File(path) as h5:
+        assert read_chain(h5) == (long,)
+    comm.Barrier()
+    file.resume(0, Provenance(extended((long,), longer)))
+    comm.Barrier()
+    with h5py.File(path) as h5:
+        assert [(link.job[:5], link.from_step) for link in read_chain(h5)] == [("aaaaa", 0), ("(too ", 5)]
+
+
 def test_chain_counts_runs_that_are_alike() -> None:
     link = Link("title: a\n", 2)
     assert extended((link,), Link("title: a\n", 2, from_step=9))[0].runs == 2
