@@ -61,9 +61,7 @@ def reached(time: float, until: float) -> bool:
     return time >= until * (1.0 - ROUND_OFF)
 
 
-def steps(
-    history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None
-) -> Iterator[Step]:
+def steps(history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None) -> Iterator[Step]:
     """All steps of a history, numbered from 1; step 0 is the initial state.
 
     Where the history ends before `until`, its last stage goes on with its last time step, velocity and load, to the

@@ -53,9 +53,7 @@ def restore(march: March, contents: Contents, slab: Slab) -> None:
         for name, entry in wanted.items()
         if not entry.is_map
     }
-    march.row = replace(
-        march.row, step=contents.step, time=contents.time, distance=float(numbers["clock/distance"])
-    )
+    march.row = replace(march.row, step=contents.step, time=contents.time, distance=float(numbers["clock/distance"]))
     x, y = numbers["clock/position"].tolist()
     march.position = (x, y)
     march.alpha, march.alpha_old = float(numbers["contact/modulus"]), float(numbers["contact/earlier modulus"])

@@ -172,9 +172,7 @@ def _layout(path: Path) -> tuple[Layout | None, str]:
         return None, f"{path} cannot be read ({hdf5.reason(error)}): the fields saved so far are lost"
 
 
-def xdmf(
-    file: str, times: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]
-) -> str:
+def xdmf(file: str, times: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]) -> str:
     """The XDMF text that describes the saved instants."""
     (ny, nx), (lx, ly) = shape, size
     grids = []

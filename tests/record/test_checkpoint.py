@@ -142,9 +142,7 @@ DAMAGE: list[tuple[Callable[[bytes], bytes], str]] = [
 
 
 @pytest.mark.parametrize(("act", "message"), DAMAGE)
-def test_damage_in_a_sentence(
-    comm: MPI.Intracomm, tmp_path: Path, act: Callable[[bytes], bytes], message: str
-) -> None:
+def test_damage_in_a_sentence(comm: MPI.Intracomm, tmp_path: Path, act: Callable[[bytes], bytes], message: str) -> None:
     path = tmp_path / "file.h5"
     write(path, comm)
     path.write_bytes(act(path.read_bytes()))
