@@ -18,7 +18,7 @@ from .parallel.slab import Slab
 
 SIGNALS = (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
 LOOK_SECONDS = 0.2  # between two looks for the stop file
-RESERVE_SECONDS = 3.0  # of wall time for what is not measured: ending MPI, closing files
+RESERVE_SECONDS = 5.0  # of wall time for what is not measured: ending MPI, closing files
 FIRST_WRITE = 50e6  # bytes per second: how fast the first checkpoint is expected to be written
 RECENT = 50  # steps whose longest is expected of the next one
 

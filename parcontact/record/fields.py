@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parallel.slab import Array, Slab
-from . import hdf5
+from . import hdf5, layout
 from .provenance import Provenance
 
 UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m"}
@@ -36,7 +36,7 @@ class FieldsFile:
 
     def make(self, provenance: Provenance) -> None:
         """Lay the file out anew."""
-        hdf5.lay_out(self.path, self.slab, lambda file: self._build(file, provenance))
+        layout.lay_out(self.path, self.slab, lambda file: self._build(file, provenance))
         self._draw()
 
     def resume(self, step: int, provenance: Provenance) -> str:
@@ -50,7 +50,7 @@ class FieldsFile:
         if found is None:
             self.make(provenance)
         elif found.steps == tuple(self.steps) and set(found.names) == set(self.names):
-            hdf5.change(self.path, self.slab, provenance.renew)
+            layout.change(self.path, self.slab, provenance.renew)
             self._stamp(slice(len(kept), None), np.nan)
             self._draw()
         else:
@@ -81,15 +81,15 @@ class FieldsFile:
         for axis, length, points in zip("xy", self.size, (slab.nx, slab.ny), strict=True):
             axes[axis] = np.arange(points) * (length / points)
         for axis, values in axes.items():
-            dataset = hdf5.fixed(file, axis, values.shape, np.float64)
+            dataset = layout.fixed(file, axis, values.shape, np.float64)
             dataset[...] = values
             dataset.make_scale(axis)
             dataset.attrs["units"] = "s" if axis == "t" else "m"
-        step = hdf5.fixed(file, "step", (count,), np.int64)
+        step = layout.fixed(file, "step", (count,), np.int64)
         step[...] = list(self.steps)
         step.dims[0].attach_scale(file["t"])
         for name in self.names:
-            dataset = hdf5.fixed(file, name, (count, slab.ny, slab.nx), np.float64)
+            dataset = layout.fixed(file, name, (count, slab.ny, slab.nx), np.float64)
             dataset.attrs["units"] = UNITS[name]
             for dimension, axis in enumerate("tyx"):
                 dataset.dims[dimension].attach_scale(file[axis])
@@ -97,7 +97,7 @@ class FieldsFile:
     def _move_over(self, found: "Layout", kept: Sequence[int], provenance: Provenance) -> None:
         """Lay a new file out and copy what stays; a map that was not saved then is NaN."""
         old, new = self.path, self.path.with_name(self.path.name + ".part")
-        hdf5.lay_out(new, self.slab, lambda file: self._build(file, provenance))
+        layout.lay_out(new, self.slab, lambda file: self._build(file, provenance))
         self.path = new
         rows = np.empty(self.slab.shape)
         for step in kept:
@@ -117,7 +117,7 @@ class FieldsFile:
             with h5py.File(self.path, "r") as file:
                 times = file["t"][...]
             times[index] = time
-            hdf5.put(self.path, {"t": times})
+            layout.put(self.path, {"t": times})
 
         hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
 
@@ -140,7 +140,7 @@ def cut_back(path: Path, slab: Slab, step: int) -> None:
         if path.exists():
             with h5py.File(path, "r") as file:
                 times = np.where(file["step"][...] > step, np.nan, file["t"][...])
-            hdf5.put(path, {"t": times})
+            layout.put(path, {"t": times})
 
     hdf5.on_root(slab, forget, f"cannot write {path}")
 

@@ -1,15 +1,12 @@
-"""HDF5 files of which every rank writes and reads its rows: by MPI-IO where h5py has it, else by the ranks in turn.
+"""Rows of maps in HDF5 files: by MPI-IO where h5py has it, else by the ranks in turn; the file is the same either way.
 
-The file is the same either way: root lays it out with places for all maps, then every rank writes into its own, which
-changes nothing else, so that a run killed while it writes leaves a readable file. HDF5 does not survive a disk that is
-full when it writes what is not a map: it does that in memory, from where plain writing takes it to the disk.
-
-An error on one rank is raised on all, as a RunError in one sentence.
+Every rank writes into the places that a file has been laid out with, which changes nothing else in it. An error on one
+rank is raised on all, as a RunError in one sentence.
 """
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,14 +14,12 @@ from typing import Any, BinaryIO, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
 from ..errors import RunError
 from ..parallel.slab import Array, Slab
 
 T = TypeVar("T")
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
-PIECE = 1 << 20  # bytes read at a time
 FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
 
 
@@ -34,90 +29,6 @@ class Part(NamedTuple):
     name: str
     at: tuple[int, ...]
     rows: Array
-
-
-def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], block: int = 0) -> None:
-    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective."""
-
-    def make() -> None:
-        with _memory() as memory:
-            with h5py.File(memory, "w", userblock_size=block) as file:
-                build(file)
-                found = regions(file)
-            size = os.fstat(memory.fileno()).st_size
-            with path.open("wb") as target:
-                target.truncate(size)
-                _copy(memory, target, outside(size, found))
-
-    on_root(slab, make, f"cannot make {path}")
-
-
-def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
-    """Root changes a file, but neither its maps nor its length, with `act(file)`; collective."""
-
-    def apply() -> None:
-        with h5py.File(path, "r") as file:
-            found = regions(file)
-        with _memory() as memory, path.open("r+b") as target:
-            size = os.fstat(target.fileno()).st_size
-            memory.truncate(size)
-            spans = list(outside(size, found))
-            _copy(target, memory, spans)
-            with h5py.File(memory, "r+") as file:
-                act(file)
-            if os.fstat(memory.fileno()).st_size != size:
-                raise ValueError("its length may not change")
-            _copy(memory, target, spans)
-
-    on_root(slab, apply, f"cannot write {path}")
-
-
-def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
-    """Write whole datasets that are no maps; root only."""
-    with h5py.File(path, "r") as file:
-        places = {name: file[name].id.get_offset() for name in values}
-        types = {name: file[name].dtype for name in values}
-    with path.open("r+b") as target:
-        for name, numbers in values.items():
-            _put(target, numbers.astype(types[name]).tobytes(), places[name])
-
-
-def regions(file: h5py.File) -> list[tuple[int, int]]:
-    """Where in a file its maps are, from byte to byte, in order; those next to each other as one."""
-    names: list[str] = []
-    file.visit(names.append)
-    items = (file[name] for name in names)
-    places = [(item.id.get_offset(), item.nbytes) for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
-    merged: list[tuple[int, int]] = []
-    for start, length in sorted(place for place in places if place[1]):
-        merged.append((merged.pop()[0] if merged and merged[-1][1] == start else start, start + length))
-    return merged
-
-
-def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterator[tuple[int, int]]:
-    """All that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
-    for first, last in [*found, (size, size)]:
-        for position in range(start, first, PIECE):
-            yield position, min(position + PIECE, first)
-        start = last
-
-
-def _memory() -> BinaryIO:
-    """A file in memory, whose holes take none."""
-    return open(os.memfd_create("hdf5"), "w+b", buffering=0)
-
-
-def _copy(source: BinaryIO, target: BinaryIO, spans: Iterable[tuple[int, int]]) -> None:
-    for start, stop in spans:
-        _put(target, os.pread(source.fileno(), stop - start, start), start)
-
-
-def _put(target: BinaryIO, data: bytes | memoryview, position: int) -> None:
-    """Write all of it: the system may take less at a time."""
-    rest = memoryview(data)
-    while rest:
-        done = os.pwrite(target.fileno(), rest, position)
-        rest, position = rest[done:], position + done
 
 
 def write(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
@@ -156,6 +67,14 @@ def sync_one(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def overwrite(target: BinaryIO, data: bytes | memoryview, position: int) -> None:
+    """Write all of `data` to its place in a file: the system may take less at a time."""
+    rest = memoryview(data)
+    while rest:
+        done = os.pwrite(target.fileno(), rest, position)
+        rest, position = rest[done:], position + done
 
 
 def on_root(slab: Slab, action: Callable[[], Any], what: str, kind: type[Exception] = RunError) -> None:
@@ -237,7 +156,7 @@ def _alone(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> None:
         places = [move.place for move in moves]
     with path.open("r+b") as target:
         for part, place in zip(parts, places, strict=True):
-            _put(target, part.rows.data.cast("B"), place)
+            overwrite(target, part.rows.data.cast("B"), place)
 
 
 def _together(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> str:
@@ -300,16 +219,3 @@ def replaced(path: Path) -> Iterator[Path]:
     part = path.with_name(path.name + ".part")
     yield part
     part.replace(path)
-
-
-def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:
-    """A dataset whose space is set aside at once, so that writing to it never changes the file's structure."""
-    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    plist.set_layout(h5py.h5d.CONTIGUOUS)
-    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    plist.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    space = h5py.h5s.create_simple(shape)
-    group, _, leaf = name.rpartition("/")
-    parent = file.require_group(group) if group else file
-    h5py.h5d.create(parent.id, leaf.encode(), h5py.h5t.py_create(np.dtype(dtype)), space, dcpl=plist)
-    return parent[leaf]

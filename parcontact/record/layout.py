@@ -1,0 +1,110 @@
+"""HDF5 files laid out with places for all maps before the first is written.
+
+What is not a map is written once, by root; what is one has its place and changes nothing else, so that a run killed
+while it writes leaves a readable file. HDF5 does not survive a disk that is full when it writes what is not a map: it
+does that in memory, from where plain writing takes it to the disk.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from ..parallel.slab import Slab
+from . import hdf5
+from .hdf5 import overwrite
+
+PIECE = 1 << 20  # bytes read at a time
+
+
+def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], block: int = 0) -> None:
+    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective."""
+
+    def make() -> None:
+        with _memory() as memory:
+            with h5py.File(memory, "w", userblock_size=block) as file:
+                build(file)
+                found = regions(file)
+            size = os.fstat(memory.fileno()).st_size
+            with path.open("wb") as target:
+                target.truncate(size)
+                _copy(memory, target, outside(size, found))
+
+    hdf5.on_root(slab, make, f"cannot make {path}")
+
+
+def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
+    """Root changes a file, but neither its maps nor its length, with `act(file)`; collective."""
+
+    def apply() -> None:
+        with h5py.File(path, "r") as file:
+            found = regions(file)
+        with _memory() as memory, path.open("r+b") as target:
+            size = os.fstat(target.fileno()).st_size
+            memory.truncate(size)
+            spans = list(outside(size, found))
+            _copy(target, memory, spans)
+            with h5py.File(memory, "r+") as file:
+                act(file)
+            if os.fstat(memory.fileno()).st_size != size:
+                raise ValueError("its length may not change")
+            _copy(memory, target, spans)
+
+    hdf5.on_root(slab, apply, f"cannot write {path}")
+
+
+def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
+    """Write whole datasets that are no maps; root only."""
+    with h5py.File(path, "r") as file:
+        places = {name: file[name].id.get_offset() for name in values}
+        types = {name: file[name].dtype for name in values}
+    with path.open("r+b") as target:
+        for name, numbers in values.items():
+            overwrite(target, numbers.astype(types[name]).tobytes(), places[name])
+
+
+def regions(file: h5py.File) -> list[tuple[int, int]]:
+    """Where in a file its maps are, from byte to byte, in order; those next to each other as one."""
+    names: list[str] = []
+    file.visit(names.append)
+    items = (file[name] for name in names)
+    places = [(item.id.get_offset(), item.nbytes) for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
+    merged: list[tuple[int, int]] = []
+    for start, length in sorted(place for place in places if place[1]):
+        merged.append((merged.pop()[0] if merged and merged[-1][1] == start else start, start + length))
+    return merged
+
+
+def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterator[tuple[int, int]]:
+    """All that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
+    for first, last in [*found, (size, size)]:
+        for position in range(start, first, PIECE):
+            yield position, min(position + PIECE, first)
+        start = last
+
+
+def _memory() -> BinaryIO:
+    """A file in memory, whose holes take none."""
+    return open(os.memfd_create("hdf5"), "w+b", buffering=0)
+
+
+def _copy(source: BinaryIO, target: BinaryIO, spans: Iterable[tuple[int, int]]) -> None:
+    for start, stop in spans:
+        overwrite(target, os.pread(source.fileno(), stop - start, start), start)
+
+
+def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:
+    """A dataset whose space is set aside at once, so that writing to it never changes the file's structure."""
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_layout(h5py.h5d.CONTIGUOUS)
+    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plist.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    space = h5py.h5s.create_simple(shape)
+    group, _, leaf = name.rpartition("/")
+    parent = file.require_group(group) if group else file
+    h5py.h5d.create(parent.id, leaf.encode(), h5py.h5t.py_create(np.dtype(dtype)), space, dcpl=plist)
+    return parent[leaf]
