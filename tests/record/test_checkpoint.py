@@ -15,7 +15,8 @@ from parcontact.record.checkpoint import Contents, Entry, Facts
 from parcontact.record.provenance import Link, Provenance
 
 NX, NY = 6, 9
-FACTS = Facts(7, 0.25, {"grid": {"points": [NX, NY]}}, Provenance((Link("title: x\n", 2),), (3,)))
+NOON = "2026-01-01T12:00:00+00:00"  # one instant on all ranks
+FACTS = Facts(7, 0.25, {"grid": {"points": [NX, NY]}}, Provenance((Link("title: x\n", 2, started=NOON),), (3,)))
 
 
 def entries(slab: Slab) -> dict[str, Entry]:
