@@ -66,6 +66,8 @@ class March:
             *self._energies(),
             seconds=time.perf_counter() - began,
         )
+        for follow in self.scene.followers:
+            follow(self)
         return self.row
 
     # -- the parts of a step ------------------------------------------------------------------------------------------

@@ -1,14 +1,18 @@
-"""From a job to what runs: the only place that decides which effects exist.
+"""From a job to what runs: the only place that makes effects, as `effects/decisions.py` decides from the job.
 
 Each effect is one object handed to the march; an effect that a job does not call for is never made.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from . import job as jobs
-from .clock import Step, steps
+from .effects import decisions as calls_for
+from .effects.decisions import Decision, Effect
+from .effects.relaxation import relaxation_of
 from .job import Job
 from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
@@ -22,9 +26,9 @@ from .physics.sliding import AnyFraction, Path, WholeCells
 from .physics.surface import Surface, single_wave
 from .physics.units import Units
 from .solve.contact import ContactSolver
-from .theory.viscoelastic import Prony, normal_form, zener_to_prony
+from .theory.viscoelastic import Prony
 
-WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
+Follower = Callable[[Any], None]  # an effect that is told of every step: called with the march when it is committed
 
 
 @dataclass
@@ -64,6 +68,7 @@ class Scene:
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
     lasts: bool
+    followers: list[Follower] = field(default_factory=list)
 
     @property
     def job(self) -> Job:
@@ -76,6 +81,16 @@ class Scene:
     @property
     def units(self) -> Units:
         return self.frame.units
+
+
+FURTHER: tuple[tuple[Decision, Callable[[Scene], Follower]], ...] = (
+    # one line for each effect that follows the steps: what decides on it, what makes it for a scene
+)
+
+
+def effects(job: Job) -> list[Effect]:
+    """Every effect that there is, on or off, and why; from the job alone."""
+    return [decide(job) for decide in (*calls_for.TABLE, *(decide for decide, _ in FURTHER))]
 
 
 def frame(job: Job, slab: Slab) -> Frame:
@@ -95,8 +110,7 @@ def frame(job: Job, slab: Slab) -> Frame:
 def build(job: Job, slab: Slab) -> Scene:
     """Make a job's scene on the ranks of `slab`; collective. Raises InputError for surface files that do not fit."""
     base = frame(job, slab)
-    timeline = tuple(steps(job.history, job.grid, pressure=job.initial.pressure))
-    way = WholeCells if _by_whole_cells(job, timeline) else AnyFraction
+    way = AnyFraction if calls_for.part_cells(job).on else WholeCells
     path: Path = way(base.surface, base.dtype)
     material = _material(base)
     solver = ContactSolver(
@@ -108,22 +122,11 @@ def build(job: Job, slab: Slab) -> Scene:
         job.numerics.max_iterations,
         base.dtype,
     )
-    energy = _energy(job, solver, material) if job.output.energy else None
-    lasts = any(not step.jump for step in timeline)
-    return Scene(base, path, material, solver, Ledger(slab, base.surface, base.units), energy, lasts)
-
-
-def relaxation_of(job: Job) -> Prony:
-    """The relaxation function of a job's material [Pa, s]; one modulus and no terms if it is elastic."""
-    material = job.material
-    if isinstance(material, jobs.Elastic):
-        return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
-    zener = [b for b in material.branches if isinstance(b, jobs.ZenerBranch)]
-    plain = [b for b in material.branches if isinstance(b, jobs.PronyBranch)]
-    series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
-    prony = zener_to_prony(series, kelvin, viscosity, material.modulus_inf)
-    moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
-    return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], [*prony.relaxation_times, *times])
+    energy = _energy(job, solver, material) if calls_for.energies(job).on else None
+    ledger = Ledger(slab, base.surface, base.units)
+    scene = Scene(base, path, material, solver, ledger, energy, calls_for.lasting(job).on)
+    scene.followers += [make(scene) for decide, make in FURTHER if decide(job).on]
+    return scene
 
 
 def facts(built: Scene) -> list[str]:
@@ -156,6 +159,7 @@ def _surface(job: Job, fft: FFT) -> Surface:
             waves = added if waves is None else waves + added
     if waves is not None:
         waves = waves.astype(fft.complex, copy=False)
+        slab.tally["map bytes"] += waves.nbytes
     return Surface(
         slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", job.numerics.slope == "finite-difference"
     )
@@ -166,9 +170,7 @@ def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.HeightFile):
         rows = heightfile.read(part.path, part.dataset, fft.slab)
-        field = fft.slab.empty(fft.dtype)
-        np.multiply(rows, part.scale, out=field, casting="same_kind")
-        return fft.forward(field).copy()
+        return fft.forward(np.multiply(rows, part.scale).astype(fft.dtype, copy=False)).copy()
     return Roughness(
         part.hurst,
         part.long_wavelength,
@@ -189,21 +191,21 @@ def _height(surface: Surface) -> float:
 
 
 def _material(base: Frame) -> Elastic | Zener:
-    if base.prony.moduli.size == 0:
+    if not calls_for.viscoelasticity(base.job).on:
         return Elastic(base.slab, base.prony.modulus_inf)
     return Zener(base.slab, base.prony, base.job.numerics.integrator, base.dtype)
 
 
 def _operator(base: Frame) -> halfspace.Convolution:
     poisson = base.job.material.poisson
-    if base.job.grid.boundary == "free":
+    if calls_for.isolated(base.job).on:
         return halfspace.free(base.slab, base.size, poisson, base.dtype)
     return halfspace.periodic(base.fft, base.size, poisson, base.job.numerics.kernel)
 
 
 def _preconditioner(base: Frame) -> halfspace.Convolution | halfspace.Narrowed:
     poisson = base.job.material.poisson
-    if base.job.numerics.precision == "mixed":
+    if calls_for.mixed_precision(base.job).on:
         return halfspace.Narrowed(halfspace.inverse(FFT(base.slab, dtype=np.float32), base.size, poisson))
     return halfspace.inverse(base.fft, base.size, poisson)
 
@@ -212,7 +214,7 @@ def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> Elast
     slab = solver.slab
     if isinstance(material, Elastic):
         return ElasticEnergy(slab)
-    if job.grid.boundary == "periodic" and job.numerics.kernel == "spectral" and job.numerics.precision == "double":
+    if not calls_for.energy_memory(job).on:
         inverse = solver.preconditioner
         return ZenerEnergy(slab, material, lambda p, dt, du: inverse.apply(du, solver.w))
     memory = Zener(slab, material.prony, material.integrator)
@@ -224,14 +226,3 @@ def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> Elast
         return memory.increment
 
     return ZenerEnergy(slab, material, creep, memory)
-
-
-def _by_whole_cells(job: Job, timeline: tuple[Step, ...]) -> bool:
-    """Whether the surface stands, or slides by whole cells along x on a periodic box."""
-    positions = {step.position for step in timeline}
-    if positions <= {(0.0, 0.0)}:
-        return True
-    if job.grid.boundary == "free":
-        return False
-    cells = np.array([x for x, _ in positions]) / job.grid.dx
-    return all(y == 0.0 for _, y in positions) and bool(np.all(np.abs(cells - np.round(cells)) < WHOLE))

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
+from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace
@@ -163,7 +164,7 @@ def certificate(states: SteadySliding, speed: float, pressure: float) -> float:
     nx, ny = base.job.grid.points
     qx = 2 * np.pi / base.job.grid.lx * np.fft.fftfreq(nx, 1 / nx)
     qy = 2 * np.pi / base.job.grid.ly * np.fft.fftfreq(ny, 1 / ny)
-    law = scene.relaxation_of(base.job)
+    law = relaxation_of(base.job)
     modulus = complex_modulus(-qx * speed, *law)
     modulus[nx // 2] = modulus[nx // 2].real
     q = np.hypot(qx[None, :], qy[:, None])

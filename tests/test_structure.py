@@ -16,6 +16,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"parallel", "jobfile"},
     {"physics", "job"},
     {"solve", "clock"},
+    {"effects"},
     {"record"},
     {"scene"},
     {"steadystate"},

@@ -1,0 +1,20 @@
+"""The relaxation function of a job's material."""
+
+import numpy as np
+
+from .. import job as jobs
+from ..job import Job
+from ..theory.viscoelastic import Prony, normal_form, zener_to_prony
+
+
+def relaxation_of(job: Job) -> Prony:
+    """The relaxation function of a job's material [Pa, s]; one modulus and no terms if it is elastic."""
+    material = job.material
+    if isinstance(material, jobs.Elastic):
+        return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
+    zener = [b for b in material.branches if isinstance(b, jobs.ZenerBranch)]
+    plain = [b for b in material.branches if isinstance(b, jobs.PronyBranch)]
+    series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
+    prony = zener_to_prony(series, kelvin, viscosity, material.modulus_inf)
+    moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
+    return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], [*prony.relaxation_times, *times])
