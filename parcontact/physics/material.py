@@ -37,6 +37,20 @@ class Heights:
         return self.base, self.offset
 
 
+def elapsed(prony: Prony, dt: float) -> Array:
+    """`z = dt/tau` of each branch, at most 1e100 so that nothing overflows."""
+    return np.asarray(dt / np.maximum(prony.relaxation_times, 1e-100 * dt))
+
+
+def coefficients(prony: Prony, integrator: str, dt: float) -> tuple[Array, Array]:
+    """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
+    z = elapsed(prony, dt)
+    if integrator == "backward-euler":
+        return 1.0 / (1.0 + z), prony.moduli / (1.0 + z)
+    phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)
+    return np.exp(-z), prony.moduli * phi
+
+
 class Material(Protocol):
     """The body between two instants; every call is local to this rank."""
 
@@ -85,16 +99,12 @@ class Zener:
         return np.ones_like(self.prony.moduli), np.zeros_like(self.prony.moduli)
 
     def elapsed(self, dt: float) -> Array:
-        """`z = dt/tau` of each branch, at most 1e100 so that nothing overflows."""
-        return dt / np.maximum(self.prony.relaxation_times, 1e-100 * dt)
+        """`z = dt/tau` of each branch."""
+        return elapsed(self.prony, dt)
 
     def coefficients(self, dt: float) -> tuple[Array, Array]:
-        """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
-        z = self.elapsed(dt)
-        if self.integrator == "backward-euler":
-            return 1.0 / (1.0 + z), self.prony.moduli / (1.0 + z)
-        phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)
-        return np.exp(-z), self.prony.moduli * phi
+        """`decay` and `gain` of each branch over a step dt."""
+        return coefficients(self.prony, self.integrator, dt)
 
     def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
         """Modulus alpha and effective heights `h + r/alpha` of a step; may be called again for another dt."""

@@ -1,0 +1,74 @@
+"""Branch condensation: the time scales of a job and the waves of its surface, and what they leave of its branches."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .. import job as jobs
+from ..clock import fractions, steps
+from ..job import Grid, Job
+from ..physics.condense import Band, Condensed, Phase, condense, nothing
+from .relaxation import relaxation_of
+
+
+def condensed(job: Job, until: float = 0.0) -> Condensed:
+    """Which branches of a job's material need a map, if its last stage goes on to `until` [s]; from the job alone."""
+    prony = relaxation_of(job)
+    if prony.moduli.size == 0:
+        return nothing(prony, "the body has no branch")
+    if job.numerics.accuracy == 0.0:
+        return nothing(prony, "numerics.accuracy is 0")
+    if job.output.energy:
+        return nothing(prony, "output.energy counts the energy of every branch")
+    start = job.initial.velocity if job.initial.state == "steady" else None
+    return condense(
+        prony, list(phases(job, until)), list(bands(job)), job.numerics.integrator, job.numerics.accuracy, start
+    )
+
+
+def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
+    """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
+    jumps = _jumping(job)
+    end = 0.0
+    for index, stage in enumerate(job.history):
+        end += stage.seconds
+        longer = max(until - end, 0.0) if stage.seconds and index == len(job.history) - 1 else 0.0
+        ends = [0.0, *fractions(stage, job.grid)]
+        first, last = ((ends[i + 1] - ends[i]) * stage.seconds if stage.seconds else 0.0 for i in (0, -2))
+        yield Phase(stage.seconds + longer, first, last, stage.velocity, index in jumps)
+
+
+def _jumping(job: Job) -> set[int]:
+    """The stages that begin with a jump of the load."""
+    return {step.stage for step in steps(job.history, job.grid, pressure=job.initial.pressure) if step.jump}
+
+
+def bands(job: Job) -> Iterator[Band]:
+    """The waves of a job's surface. Round shapes and files may have every wave from the box to two cells."""
+    grid = job.grid
+    for shape in job.surface:
+        if isinstance(shape, jobs.Wave) and any(shape.waves):
+            kx, ky = (2 * np.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True))
+            yield Band(float(np.hypot(kx, ky)), float(np.hypot(kx, ky)), (kx, ky))
+        elif isinstance(shape, jobs.Rough):
+            longest = min(shape.long_wavelength, max(grid.size))
+            yield Band(2 * np.pi / longest, 2 * np.pi / shape.short_wavelength, _only(grid))
+        elif isinstance(shape, jobs.Cylinder):
+            along = (1.0, 0.0) if shape.axis == "y" else (0.0, 1.0)
+            yield _every(grid, along)
+        elif isinstance(shape, jobs.Sphere | jobs.HeightFile):
+            yield _every(grid, _only(grid))
+
+
+def _every(grid: Grid, direction: tuple[float, float] | None) -> Band:
+    cells = [step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
+    longest = max(grid.size) if direction is None else grid.lx if direction[0] else grid.ly
+    shortest = 2 * min(cells, default=longest / 2)
+    return Band(2 * np.pi / longest, 2 * np.pi / min(shortest, longest), direction)
+
+
+def _only(grid: Grid) -> tuple[float, float] | None:
+    """The direction of all waves on a grid of one line of points; None on a true one."""
+    if grid.nx == 1:
+        return 0.0, 1.0
+    return (1.0, 0.0) if grid.ny == 1 else None

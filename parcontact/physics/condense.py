@@ -1,0 +1,236 @@
+"""Branches that a job cannot tell from springs: which may go without a map, and what that costs at most.
+
+With the notation of `material`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to the
+stress. Two kinds of branches need no map:
+
+    memoryless  far faster than every step: what it remembers of the last step, `decay h`, is dropped, `gain du` stays
+    frozen      far slower than the whole history: h = G u, a part of the elastic modulus
+
+A memoryless branch keeps its share of the instantaneous modulus and of the losses within a step; what is dropped is not
+summed up, as the next h does not contain it. A frozen branch can be woken at any time: its map is G u.
+
+Bounds. Let a wave of the surface pass with the frequency w = |q v|, its displacement u of constant size (full contact).
+The transfer modulus M = stress/u of the wave is wrong by
+
+    memoryless  |dM| <= decay(dt) |h/u|,   |h/u| <= G min(w tau, 1) in sliding, either integrator
+                                           |h/u| <= G after a jump,  G min(tau/dt, 1) at rest
+                |dM| <= |h/u| in a jump (dt = 0) itself, where decay = 1
+    frozen      |dM| = (G/tau) |integral_0^t exp((s - t)/tau) u(s) ds|/|u|
+                     <= G min(1 - exp(-t/tau), sum over phases of min(duration, c/w)/tau)
+
+with c = 2 for the integral of a wave and for the trapezoidal sums of the exponential integrator (x/tan x <= 1), and
+c = pi for those of backward Euler (x/sin x <= pi/2, x = w dt/2). In full contact friction is
+`sum |q| |qx| |A|^2 Im M/p0`, therefore wrong by no more than
+
+    F = (sum |q| |qx| |A|^2 |dM|)/(sum |q| |qx| |A|^2 G''(w))
+
+of its steady value. Waves of one length and of all directions are summed, their power being the same, and F is that of
+the worst length: the whole is no worse than its worst part. In partial contact a modulus that is wrong by |dM| of |G*|
+also makes the area wrong by about that share (area ~ 1/|G*|), and friction with it: this ratio, formed as F, is added.
+That part is an estimate. At rest, the modulus itself is judged: for a frozen branch `G (1 - exp(-t/tau))/G(t)`, which
+also bounds the error of the creep compliance (dJ/J <= dG/G, as J and dG grow and J G <= 1), for a memoryless one |dM|
+over the modulus of the step.
+
+Errors of branches are added; the bound is that of the worst phase for each. Source: the moduli are those of
+J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter 3; friction in full contact is that of
+`theory.full_contact`.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.slab import Array
+from ..theory.viscoelastic import Integrator, Prony, complex_modulus, relaxation
+from .material import coefficients
+
+LENGTHS, DIRECTIONS = 25, 32  # of a band that are looked at
+FOR_FAST = 0.5  # share of the accuracy for memoryless branches: which they are must not depend on how long a job is
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of the history with one velocity [m/s]: how long it lasts [s], its first and its last step [s].
+
+    Steps grow from the first to the last. `jump`: it begins with a jump of the load. A phase may be a jump only.
+    """
+
+    duration: float
+    first: float
+    last: float
+    velocity: tuple[float, float]
+    jump: bool
+
+
+@dataclass(frozen=True)
+class Band:
+    """Waves of the surface: wave numbers [rad/m] from `low` to `high`, along one direction or (None) along all."""
+
+    low: float
+    high: float
+    direction: tuple[float, float] | None = None
+
+    @property
+    def vectors(self) -> tuple[Array, Array]:
+        """Wave vectors (kx, ky) [rad/m], shape (lengths, directions); the opposite ones are the same waves."""
+        if self.high == 0.0:
+            return np.zeros((1, 1)), np.zeros((1, 1))
+        lengths = np.geomspace(self.low, self.high, LENGTHS if self.high > self.low else 1)[:, None]
+        angles = np.pi * (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+        if self.direction is not None:
+            angles = np.array([math.atan2(self.direction[1], self.direction[0])])
+        return lengths * np.cos(angles), lengths * np.sin(angles)
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """What becomes of each branch, by its number in the material; plain data.
+
+    `bound` is the largest relative error of friction (where the body rests: of the modulus) that all folded branches
+    make together, at most `accuracy`. `memoryless_errors` and `frozen_errors` are what each branch would add to it.
+    `reason` says why nothing may be folded, if so.
+    """
+
+    kept: tuple[int, ...]
+    memoryless: tuple[int, ...] = ()
+    frozen: tuple[int, ...] = ()
+    bound: float = 0.0
+    accuracy: float = 0.0
+    memoryless_errors: tuple[float, ...] = ()
+    frozen_errors: tuple[float, ...] = ()
+    reason: str = ""
+
+    @property
+    def folded(self) -> int:
+        """How many branches have no map."""
+        return len(self.memoryless) + len(self.frozen)
+
+
+def nothing(prony: Prony, reason: str) -> Condensed:
+    """Every branch keeps its map."""
+    return Condensed(tuple(range(prony.moduli.size)), reason=reason)
+
+
+def condense(
+    prony: Prony,
+    phases: Sequence[Phase],
+    bands: Sequence[Band],
+    integrator: Integrator,
+    accuracy: float,
+    start: tuple[float, float] | None = None,
+) -> Condensed:
+    """Which branches of a material (Pa, s, in normal form) a history needs on a surface, to an accuracy of friction.
+
+    `start` is the velocity [m/s] of a steady initial state, None for a virgin body: after steady sliding no branch is
+    G u. Memoryless branches are chosen first, within half of the accuracy, and in either kind the cheapest first.
+    """
+    fast, slow = _errors(prony, phases, bands, integrator, start)
+    count = prony.moduli.size
+    if not any(phase.duration for phase in phases) and start is None:
+        fast = np.full(count, np.inf)  # a body that has no time is elastic
+    memoryless, spent = _cheapest(fast, range(count), FOR_FAST * accuracy)
+    frozen, more = _cheapest(slow, (k for k in range(count) if k not in memoryless), accuracy - spent)
+    kept = tuple(k for k in range(count) if k not in memoryless and k not in frozen)
+    return Condensed(kept, memoryless, frozen, spent + more, accuracy, tuple(fast.tolist()), tuple(slow.tolist()))
+
+
+# -- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _cheapest(errors: Array, candidates: Iterable[int], limit: float) -> tuple[tuple[int, ...], float]:
+    """The candidates with the smallest errors, ascending in number, and their sum, which keeps to the limit."""
+    chosen: list[int] = []
+    spent = 0.0
+    for k in sorted(candidates, key=lambda k: float(errors[k])):
+        if limit <= 0.0 or spent + errors[k] > limit:
+            break
+        spent += float(errors[k])
+        chosen.append(k)
+    return tuple(sorted(chosen)), spent
+
+
+def _errors(
+    prony: Prony,
+    phases: Sequence[Phase],
+    bands: Sequence[Band],
+    integrator: Integrator,
+    start: tuple[float, float] | None,
+) -> tuple[Array, Array]:
+    """The error of each branch as a memoryless and as a frozen one: the largest of all phases and waves."""
+    found = [
+        errors
+        for band in bands or [Band(0.0, 0.0)]  # a flat surface: every phase is one of rest
+        for errors in _Passing(prony, integrator, band, start).errors(phases)
+    ]
+    fast, slow = np.max(found, axis=0, initial=0.0)
+    return fast, slow
+
+
+class _Passing:
+    """The waves of a band on their way through the phases; arrays end with an axis of branches."""
+
+    def __init__(self, prony: Prony, integrator: Integrator, band: Band, start: tuple[float, float] | None) -> None:
+        self.prony, self.integrator = prony, integrator
+        self.kx, self.ky = band.vectors
+        self.time, self.seen = 0.0, np.zeros(self.kx.shape)  # [s], and what the integral of a wave's u is at most [s]
+        self.omega = self.frequency(start or (0.0, 0.0))
+        self.held = self.moving if start else np.zeros((*self.kx.shape, prony.moduli.size))  # |h/u| [Pa] at most
+        self.virgin = start is None
+
+    def errors(self, phases: Sequence[Phase]) -> Iterator[tuple[Array, Array]]:
+        for phase in phases:
+            fast: Array = np.zeros(self.prony.moduli.size)
+            if phase.jump:
+                fast = self.share(self.held, self.omega, 0.0)
+                self.held = np.broadcast_to(self.prony.moduli, self.held.shape)
+            slow = np.zeros_like(fast) if self.virgin else np.full_like(fast, np.inf)
+            if phase.duration > 0.0:
+                self.omega = self.frequency(phase.velocity)
+                fast = np.maximum(fast, self.fast(phase))
+                slow = slow + self.slow(phase)
+            yield fast, slow
+
+    def frequency(self, velocity: tuple[float, float]) -> Array:
+        return np.abs(self.kx * velocity[0] + self.ky * velocity[1])
+
+    @property
+    def moving(self) -> Array:
+        """|h/u| [Pa] of each branch in steady sliding, at most."""
+        return np.asarray(self.prony.moduli * np.minimum(self.omega[..., None] * self.prony.relaxation_times, 1.0))
+
+    def fast(self, phase: Phase) -> Array:
+        prony = self.prony
+        resting = prony.moduli * np.minimum(prony.relaxation_times / phase.first, 1.0)
+        before = np.maximum(self.held, self.moving if self.omega.any() else resting)
+        dropped = self.step(phase.first)[0] * before
+        decay, gain = self.step(phase.last)
+        self.held = decay * before + (self.moving if self.omega.any() else gain)
+        return self.share(dropped, self.omega, phase.first)
+
+    def slow(self, phase: Phase) -> Array:
+        self.time += phase.duration
+        swing = np.pi if self.integrator == "backward-euler" else 2.0
+        most = np.divide(swing, self.omega, out=np.full_like(self.omega, np.inf), where=self.omega > 0.0)
+        self.seen = self.seen + np.minimum(phase.duration, most)
+        tau = self.prony.relaxation_times
+        relaxed = -np.expm1(-self.time / tau)
+        if not self.omega.any():
+            return np.asarray(self.prony.moduli * relaxed / relaxation(self.time, *self.prony))
+        wrong = self.prony.moduli * np.minimum(self.seen[..., None] / tau, relaxed)
+        return self.share(wrong, self.omega, self.time)
+
+    def step(self, dt: float) -> tuple[Array, Array]:
+        return coefficients(self.prony, self.integrator, dt)
+
+    def share(self, wrong: Array, omega: Array, dt: float) -> Array:
+        """An error |dM| [Pa] of each wave and branch as one of friction, or at rest of the modulus over a step."""
+        if not omega.any():
+            whole = self.prony.modulus_inf + self.step(dt)[1].sum()
+            return np.asarray(wrong.max(axis=(0, 1)) / whole)
+        modulus = complex_modulus(omega, *self.prony)
+        weight = omega / omega.max(axis=1, keepdims=True)  # |qx|: w over q v
+        error = (weight[..., None] * wrong).sum(axis=1)
+        loss, size = ((weight * part).sum(axis=1)[:, None] for part in (modulus.imag, np.abs(modulus)))
+        return np.asarray((error / loss + error / size).max(axis=0))
