@@ -80,8 +80,8 @@ class March:
         grid, slab, solver = self.scene.job.grid, self.scene.slab, self.scene.solver
         now, before = (1.0 + step.growth) * self.alpha / alpha, step.growth * self.alpha_old / alpha
         along_x, along_y = (
-            round((new - old) / cell)
-            for new, old, cell in zip(step.position, self.position, (grid.dx, grid.dy), strict=True)
+            round((new - old) / cell) % count  # a step may pass more boxes than a machine's whole numbers reach
+            for new, old, cell, count in zip(step.position, self.position, (grid.dx, grid.dy), grid.points, strict=True)
         )
         if along_y:
             self.p_old, solver.w = rows.roll(slab, self.p_old, along_y, solver.w), self.p_old
