@@ -135,6 +135,7 @@ class ContactSolver:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
         self.round_off = ROUND_OFF * float(np.finfo(dtype).eps)
+        self.least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
         self.p, self.u, self.w, self.t, self.r, self.spare = (slab.zeros(dtype) for _ in range(6))
         self.working = slab.zeros(np.bool_)
 
@@ -145,7 +146,7 @@ class ContactSolver:
         not reach the tolerance says why in `failure`; its maps are then the last iterate, not a solution.
         """
         mean = control.value if isinstance(control, MeanPressure) else None
-        if mean == 0.0:
+        if mean is not None and 0.0 <= mean < self.least:
             return self._separated(h)
         centred = mean is not None
         self._begin(mean)
