@@ -159,7 +159,7 @@ def _surface(job: Job, fft: FFT) -> Surface:
             waves = added if waves is None else waves + added
     if waves is not None:
         waves = waves.astype(fft.complex, copy=False)
-        slab.tally["map bytes"] += waves.nbytes
+        slab.tally.hold(waves)
     return Surface(
         slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", job.numerics.slope == "finite-difference"
     )

@@ -35,6 +35,29 @@ def import_wisdom(wisdom: bytes) -> bool:
     return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))
 
 
+def footprint(
+    points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int
+) -> tuple[int, int, int]:
+    """Bytes that one rank of an `FFT` of these lengths holds for maps of `points = (nx, ny)`.
+
+    Of its spectrum, of what it sends in one transform, and of its blocks.
+    """
+    itemsize, waves = 2 * np.dtype(dtype).itemsize, lengths[0] // 2 + 1
+    rows, columns = (part.stop - part.start for part in (deal(count, ranks)[rank] for count in (points[1], waves)))
+    spectrum = lengths[1] * columns * itemsize
+    height = _block_height(rows, waves * itemsize, spectrum, ranks > 1)
+    blocks = height * lengths[0] * itemsize // 2 + (height * waves * itemsize if ranks > 1 else 0)
+    return spectrum, rows * (waves - columns) * itemsize, blocks
+
+
+def _block_height(rows: int, row_bytes: int, spectrum_bytes: int, several: bool) -> int:
+    """Rows in a block. On several ranks the blocks are more memory than one rank needs: an eighth of a map, unless that
+    is tiny. By eights each block is aligned, whatever the length of a row.
+    """
+    most = min(max(spectrum_bytes // 8, BLOCK_BYTES // 8), BLOCK_BYTES) if several else BLOCK_BYTES
+    return min(rows, max(8, most // row_bytes // 8 * 8))
+
+
 class FFT:
     """Plans and buffers of one transform size, made once.
 
@@ -154,16 +177,11 @@ class FFT:
 
     def _make_blocks(self) -> None:
         ny_loc, waves, tally = self.slab.shape[0], self.mx // 2 + 1, self.slab.tally
-        height = self._block_bytes() // (waves * self.complex.itemsize)
-        height = min(ny_loc, max(8, height // 8 * 8))  # by eights each block is aligned, whatever the length of a row
+        several = self._transpose is not None
+        height = _block_height(ny_loc, waves * self.complex.itemsize, self.spectrum.nbytes, several)
         self._blocks = [slice(start, min(start + height, ny_loc)) for start in range(0, ny_loc, max(height, 1))]
         self._row_block = allocate((height, self.mx), self.dtype, tally)
-        self._wave_block = allocate((height if self._transpose else 0, waves), self.complex, tally)
-
-    def _block_bytes(self) -> int:
-        """On several ranks the blocks are more memory than one rank needs: an eighth of a map, unless that is tiny."""
-        eighth = self.spectrum.nbytes // 8 if self._transpose else BLOCK_BYTES
-        return min(max(eighth, BLOCK_BYTES // 8), BLOCK_BYTES)
+        self._wave_block = allocate((height if several else 0, waves), self.complex, tally)
 
     def _make_plans(self) -> None:
         heights = {rows.stop - rows.start for rows in self._blocks}

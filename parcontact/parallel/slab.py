@@ -91,5 +91,5 @@ class Slab:
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[Any]:
     """An uninitialised array aligned for SIMD transforms, its bytes counted."""
     array = pyfftw.empty_aligned(shape, dtype=dtype, n=64)
-    tally["map bytes"] += array.nbytes
+    tally.hold(array)
     return array

@@ -34,7 +34,7 @@ class Convolution:
         self.fft = fft
         scale = 1.0 / (fft.mx * fft.my)
         self.symbol = np.multiply(symbol, scale).astype(fft.dtype if np.isrealobj(symbol) else fft.complex)
-        fft.slab.tally["map bytes"] += self.symbol.nbytes
+        fft.slab.tally.hold(self.symbol)
 
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""

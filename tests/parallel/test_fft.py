@@ -17,7 +17,7 @@ from mpi4py import MPI
 from numpy.typing import DTypeLike, NDArray
 
 from parcontact.parallel import fft as transforms
-from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
+from parcontact.parallel.fft import FFT, export_wisdom, footprint, import_wisdom
 from parcontact.parallel.slab import Slab
 
 pytestmark = pytest.mark.mpi
@@ -183,8 +183,8 @@ def test_memory(communicators: list[MPI.Intracomm]) -> None:
     n = 1024
     for comm in communicators:
         slab = Slab(comm, n, n)
-        FFT(slab)
-        share = slab.tally["map bytes"] / (8 * n * n / comm.size)
+        fft = FFT(slab)
+        share = fft.slab.tally["map bytes at most"] / (8 * n * n / comm.size)
         spectrum, parcels, blocks = 1.0, 1.0 - 1.0 / comm.size, 0.125 if comm.size == 1 else 0.25
         assert share <= (spectrum + parcels) * (1 + 2 / n * comm.size) + blocks
 
@@ -239,3 +239,21 @@ def test_foreign_wisdom(comm: MPI.Intracomm) -> None:
     assert not import_wisdom(b"(fftw-9.9 fftw_wisdom)\x1e\x1e")
     assert import_wisdom(export_wisdom())
     check(Slab(comm, 16, 16), (16, 16), np.float64)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(
+    ("points", "lengths"), [((20, 14), (20, 14)), ((300, 200), (600, 400)), ((2000, 5), (2000, 5))]
+)
+def test_footprint(
+    communicators: list[MPI.Intracomm], points: tuple[int, int], lengths: tuple[int, int], dtype: type
+) -> None:
+    """What a transform holds is known before it is made; ranks without rows too."""
+    for comm in communicators:
+        slab = Slab(comm, *points)
+        fft = FFT(slab, lengths, dtype)
+        spectrum, sent, blocks = footprint(points, lengths, dtype, comm.size, comm.rank)
+        assert spectrum == fft.spectrum.nbytes
+        assert spectrum + sent + blocks == slab.tally["map bytes"]
+        fft.forward(slab.zeros())
+        assert slab.tally["bytes sent"] == sent

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from parcontact.parallel.slab import Slab, deal
+from parcontact.parallel.slab import Slab, allocate, deal
 from parcontact.parallel.tally import Tally
 
 pytestmark = pytest.mark.mpi
@@ -96,3 +96,14 @@ def test_tally_since() -> None:
     tally["shift"] += 1
     assert tally.since(before) == {"fft": 3, "shift": 1}
     assert tally["never counted"] == 0
+
+
+def test_maps_are_counted_while_they_are_held() -> None:
+    """Also through views of them."""
+    tally = Tally()
+    kept = allocate((8, 4), np.float64, tally)
+    part = allocate((8, 4), np.float32, tally)[2:]
+    assert tally["map bytes"] == 256 + 128
+    del part
+    assert tally["map bytes"] == kept.nbytes
+    assert tally["map bytes at most"] == 256 + 128

@@ -232,5 +232,5 @@ def test_state_restores_the_same_digits() -> None:
 def test_memory_is_one_map_per_branch_and_two() -> None:
     """The last displacement, and the buffer in which effective heights and increments take turns."""
     slab = Slab(MPI.COMM_SELF, 32, 16)
-    Zener(slab, normal_form(*TWO), "exponential")
-    assert slab.tally["map bytes"] == (2 + 2) * 32 * 16 * 8
+    material = Zener(slab, normal_form(*TWO), "exponential")
+    assert slab.tally["map bytes"] == (len(material.branches) + 2) * 32 * 16 * 8
