@@ -168,6 +168,18 @@ class ContactSolver:
                 shortened += 1
                 old_product = 0.0
 
+    def judge(self, h: Array, control: MeanPressure | Approach, otherwise: str) -> Contact:
+        """The pressure in `self.p`, scaled to the load, as it is; `otherwise` is its failure unless it is a solution.
+
+        Also marks its working set: the contact and what penetrates. Collective.
+        """
+        mean = control.value if isinstance(control, MeanPressure) else None
+        self._begin(mean)
+        balance = self._weigh(h, control.value) if mean is None else self._weigh(h, 0.0).settled()
+        *_, certificate = self._certify(h, balance, mean)
+        failure = "" if certificate.worst <= self.tolerance else otherwise
+        return Contact(self.p, self.u, balance.d, balance.load / self.slab.points, certificate, 0, 0, failure)
+
     # -- the steps of a solve; `mean` is the mean pressure asked for, None with a given approach -----------------------
 
     def _begin(self, mean: float | None) -> None:
