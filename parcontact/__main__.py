@@ -16,7 +16,7 @@ from .errors import InputError, RunError
 from .parallel.slab import Slab
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # and runner.AGAIN
-VERBS = ("run", "steady", "check", "info", "plot")
+VERBS = ("run", "steady", "check", "info", "plot", "doctor")
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # say how many were started
 STAGGER = 0.5  # seconds for which other ranks let root report an error that all of them have
 PATIENCE = 5.0  # seconds for which a rank that ends with an error waits for the others to do so too
@@ -137,6 +137,10 @@ def _parser() -> argparse.ArgumentParser:
     plot = verbs.add_parser("plot", help="draw a picture of a run")
     plot.add_argument("directory", type=Path, help="output directory of a run")
     plot.set_defaults(act=_plot)
+
+    doctor = verbs.add_parser("doctor", help="run small hard cases on this machine, and say what came out of each")
+    doctor.add_argument("--precision", choices=("double", "single", "mixed"), default="double")
+    doctor.set_defaults(act=_doctor)
     return parser
 
 
@@ -230,6 +234,17 @@ def _plot(options: argparse.Namespace, world: MPI.Intracomm) -> int:
     if world.rank == 0:
         print(f"picture: {plots.plot(options.directory)}")
     return DONE
+
+
+def _doctor(options: argparse.Namespace, world: MPI.Intracomm) -> int:
+    from .doctor import cases
+
+    outcomes = [cases.examine(case, world, options.precision) for case in cases.CASES]
+    wrong = [f"{outcome.case.name}: {text}" for outcome in outcomes for text in outcome.wrong]
+    if world.rank == 0:
+        print(cases.table(outcomes))
+        print("\n".join(wrong) or "all is well")
+    return FAILED if wrong else DONE
 
 
 if __name__ == "__main__":

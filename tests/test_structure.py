@@ -23,7 +23,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"march"},
     {"state", "restart", "watch", "steadystart"},
     {"runner", "curve"},
-    {"study"},
+    {"study", "doctor"},
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

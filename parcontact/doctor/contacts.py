@@ -1,0 +1,126 @@
+"""Contacts of all sizes: one point, almost all points, all points, none."""
+
+import numpy as np
+
+from ..theory import full_contact, hertz, jgh, viscoelastic, westergaard
+from .bench import Bench
+from .jobs import (
+    GLASSY,
+    HEIGHT,
+    MEAN,
+    PRONY,
+    RADIUS,
+    RELAXATION,
+    WAVELENGTH,
+    K,
+    flat,
+    sphere,
+    wave,
+    zener,
+)
+
+ITERATIONS = 60  # a contact may take this many at most
+RUBBER = zener(GLASSY, [], [])
+CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under a pressure, over p side/G
+
+
+def nearly_full(bench: Bench) -> None:
+    """Westergaard's wave and Johnson's at 0.99, 1 and 1.01 of the load that closes the last gap."""
+    for share in (0.99, 1.0, 1.01):
+        mean = share * float(westergaard.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
+        job = wave([{"pressure": mean}, {"pressure": mean}], points=(256, 1), material=RUBBER)
+        march, rows = bench.march(job)
+        x = np.arange(256) * WAVELENGTH / 256
+        exact = westergaard.pressure(x, mean, HEIGHT, WAVELENGTH, GLASSY)
+        bench.expect_all("Westergaard", bench.whole(march, "pressure")[0], exact, 1e-9 if share > 1 else 5e-3)
+        area = float(westergaard.contact_fraction(mean, HEIGHT, WAVELENGTH, GLASSY))
+        bench.expect("area", rows[-1].measures.contact_area, area, 2 / 256 if share <= 1 else 0.0, scale=1.0)
+        _two_ways(bench, share)
+    bench.expect("iterations", bench.iterations, 0.0, ITERATIONS, scale=1.0)
+
+
+def _two_ways(bench: Bench, share: float) -> None:
+    full = float(jgh.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
+    surface = [{"shape": "wave", "amplitude": HEIGHT / 2, "waves": [1, sign]} for sign in (1, -1)]
+    march, rows = bench.march(wave([{"pressure": share * full}], points=(64, 64), material=RUBBER, surface=surface))
+    x = np.arange(64) * WAVELENGTH / 64
+    measures = rows[-1].measures
+    if share >= 1.0:
+        exact = jgh.full_contact_pressure_field(x[None, :], x[:, None], share * full, HEIGHT, WAVELENGTH, GLASSY)
+        bench.expect_all("Johnson", bench.whole(march, "pressure"), exact, 1e-9)
+    closed = float(jgh.high_load_contact_fraction(share * full, HEIGHT, WAVELENGTH, GLASSY))
+    bench.expect("area, Johnson", measures.contact_area, closed, 0.0 if share > 1 else 12 / 64**2, scale=1.0)
+    bench.expect("peak, Johnson", measures.max_pressure, (1.0 + share) * full, 1e-3)
+
+
+def flat_surface(bench: Bench) -> None:
+    """Uniform pressure, no gap, no friction, whatever the step, the velocity and the body; then no load at all."""
+    for dt in (1e-12, 1e-3, 1e12):
+        for velocity in (0.0, [0.3, 0.1], 1e3):
+            loading = {"pressure": MEAN, "velocity": velocity, "duration": 3 * dt, "time_step": dt}
+            unloading = {"pressure": 0.0, "duration": dt, "time_step": dt}
+            _, rows = bench.march(flat([loading, unloading], output={"energy": True}))
+            loaded, free = rows[-3].measures, rows[-1].measures
+            bench.expect("friction", max(row.measures.friction for row in rows), 0.0, 0.0)
+            bench.expect("area", loaded.contact_area, 1.0, 0.0)
+            bench.expect("peak", loaded.max_pressure, MEAN, 1e-12)
+            bench.expect("gap", loaded.mean_gap, 0.0, 1e-15, scale=WAVELENGTH)
+            bench.expect("pressure without load", free.max_pressure, 0.0, 0.0)
+            bench.expect("work", rows[-1].work, 0.0, 1e-12, scale=MEAN * WAVELENGTH**3)
+
+
+def vanishing_load(bench: Bench) -> None:
+    """Hertz's approach ~ W^(2/3) down to some points; then one cell carries all; no load is no pressure."""
+    for force in (0.15, 0.015):
+        size = 4 * float(hertz.contact_radius(force, RADIUS, GLASSY))
+        _, rows = bench.march(sphere([{"force": force}], points=32, size=size, material=RUBBER))
+        exact = float(hertz.approach(force, RADIUS, GLASSY))
+        bench.expect(f"approach, {force:g} N", rows[-1].measures.approach, exact, 1e-3)
+    cell = 1e-4
+    for force in (1e-6, 1e-12, 1e-20 if bench.single else 1e-150):
+        stages = [{"force": force}, {"force": 1e-300}, {"force": 5e-324}, {"force": 0.0}]
+        _, rows = bench.march(sphere(stages, points=8, size=8 * cell, material=RUBBER))
+        pressed, free = rows[1].measures, rows[-1].measures
+        bench.expect("points", 64 * pressed.contact_area, 1.0, 0.0)
+        bench.expect("peak", pressed.max_pressure, force / cell**2, 1e-12)
+        bench.expect("approach", pressed.approach, CELL * force / cell / GLASSY, 1e-9, scale=cell**2 / RADIUS)
+        bench.expect("friction", pressed.friction, 0.0, 0.0)
+        bench.expect("pressure without load", free.max_pressure, 0.0, 0.0)
+        bench.expect("friction without load", free.friction, 0.0, 0.0)
+
+
+def single_point(bench: Bench) -> None:
+    """One cell: its area is h^2, its force p h^2 dH/dx exactly; it slides, and its neighbour takes over."""
+    cell, force, off = 1e-4, 1e-7, 0.3
+    centre = [(4 + off) * cell, 4 * cell]
+    surface = {"shape": "sphere", "radius": RADIUS, "center": centre}
+    sliding = {"force": force, "velocity": 0.1, "duration": 1e-3, "time_step": 5e-5}
+    unit = force * cell / RADIUS
+    _, rows = bench.march(sphere([{"force": force}, sliding], points=8, size=8 * cell, surface=surface))
+    for row in rows[1:]:
+        where = off + row.distance / cell
+        where -= round(where)
+        if abs(abs(where) - 0.5) > 0.1:  # not about half-way, where two points touch
+            bench.expect("points", 64 * row.measures.contact_area, 1.0, 0.0)
+            bench.expect("force", row.measures.force_x, unit * where, 1e-9, scale=unit)
+
+
+WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # and their heights
+
+
+def closed_by_load(bench: Bench) -> None:
+    """Many waves in full contact, sliding: the force is the sum over them, in closed form, steady and of steps."""
+    velocity, points = 0.3 * WAVELENGTH / RELAXATION, 16
+    surface = [
+        {"shape": "wave", "amplitude": share * HEIGHT, "waves": [x, y], "phase": 1.0 * x} for x, y, share in WAVES
+    ]
+    start = {"state": "steady", "velocity": velocity, "pressure": 1e6}
+    stage = {"pressure": 1e6, "velocity": velocity, "distance": 6 * WAVELENGTH, "cells_per_step": 1}
+    _, rows = bench.march(wave([stage], points=(points, points), surface=surface, initial=start))
+    x, y, share = np.array(WAVES).T
+    exact = viscoelastic.complex_modulus(K * x * velocity, *PRONY)
+    discrete = viscoelastic.discrete_modulus(K * x * velocity, WAVELENGTH / points / velocity, *PRONY)
+    for what, row, modulus in (("force", rows[0], exact), ("force of steps", rows[-1], discrete)):
+        forces = full_contact.traction(share * HEIGHT, K * x, K * y, modulus) * WAVELENGTH**2
+        bench.expect_all(what, [row.measures.force_x, row.measures.force_y], forces, 1e-8)
+    bench.expect("area", min(row.measures.contact_area for row in rows), 1.0, 0.0)

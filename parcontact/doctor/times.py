@@ -1,0 +1,122 @@
+"""Times of all sizes: steps far from the relaxation times, moduli far apart, branches that are none, twelve decades."""
+
+import numpy as np
+
+from ..march import March
+from ..theory import viscoelastic
+from .bench import Bench
+from .jobs import GLASSY, HEIGHT, LONG_TERM, PRONY, RELAXATION, WAVELENGTH, Json, K, crossed, sphere, wave, zener
+
+INTEGRATORS: tuple[viscoelastic.Integrator, ...] = ("exponential", "backward-euler")
+STIFF = 2 * K * HEIGHT  # pressure amplitude of the wave in full contact over the modulus
+CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under a pressure, over p side/G
+
+
+def long_steps(bench: Bench) -> None:
+    """After one step of dt >> tau the body is elastic with its long-term modulus, to tau/dt."""
+    elastic, _ = bench.march(crossed([{"pressure": 1e4}], material=zener(LONG_TERM, [], [])))
+    soft = bench.whole(elastic, "pressure")
+    for relaxation, ratio in ((RELAXATION, 1e6), (RELAXATION, 1e12), (RELAXATION, 1e300), (1e-20, np.inf)):
+        for integrator in INTEGRATORS:
+            body: Json = {"material": zener(*PRONY[:2], [relaxation]), "numerics": {"integrator": integrator}}
+            body["output"] = {"energy": ratio > 1e12}
+            dt = min(relaxation * ratio, 1e303)
+            stage = {"duration": dt, "time_step": dt}
+            within = 2.0 * GLASSY / LONG_TERM / ratio + 1e-8
+            march, _ = bench.march(crossed([{"pressure": 1e4, **stage}], **body))
+            bench.expect_all(f"pressure, {integrator}", bench.whole(march, "pressure"), soft, within)
+            march, _ = bench.march(wave([stage], **body))
+            bench.expect("amplitude", bench.amplitude(march), STIFF * LONG_TERM, 2.0 * within)
+
+
+def short_steps(bench: Bench) -> None:
+    """While dt and all of the time are << tau the body is elastic with its modulus at once, sliding or not."""
+    elastic, _ = bench.march(crossed([{"pressure": 4e4}], material=zener(GLASSY, [], [])))
+    hard = bench.whole(elastic, "pressure")
+    for ratio in (1e-6, 1e-13, 1e-15):
+        dt = ratio * RELAXATION
+        for integrator in INTEGRATORS:
+            numerics = {"integrator": integrator}
+            stage = {"velocity": WAVELENGTH / 8 / dt, "duration": 8 * dt, "time_step": dt}
+            march, rows = bench.march(wave([stage], numerics=numerics))
+            within = 30 * ratio + 1e-9
+            bench.expect("amplitude", bench.amplitude(march), STIFF * GLASSY, within)
+            bench.expect("friction", rows[-1].measures.friction, 0.0, within, scale=STIFF * GLASSY * K * HEIGHT / 2e5)
+            ramp = {"pressure": {"from": 0.0, "to": 4e4}, "duration": 2 * dt, "time_step": dt}
+            march, _ = bench.march(crossed([ramp], numerics=numerics))
+            bench.expect_all("pressure", bench.whole(march, "pressure"), hard, within + 1e-8)
+
+
+def moduli_far_apart(bench: Bench) -> None:
+    """A load step on one point: u follows the creep compliance J(t) through decades, long-term only after tau_C.
+
+    Errors of exponential steps: 7.8e-5 at 1e3 : 1 and dt = tau, 8.2e-8 at 1e6 : 1; 1e-3 for one step of 1000 tau_C.
+    """
+    for ratio, error in ((1e3, 8e-5), (1e6, 8.3e-8)):
+        body = (GLASSY / ratio, [GLASSY * (1.0 - 1.0 / ratio)], [RELAXATION])
+        load = 1e-5 * GLASSY / ratio  # [Pa] over the box: far too little for a second point
+        short = {"duration": 20 * RELAXATION, "time_step": RELAXATION}
+        long = {"duration": 1e3 * ratio * RELAXATION, "time_step": 1e3 * ratio * RELAXATION}
+        job = sphere([{"pressure": load, **short}], points=8, size=8e-4, material=zener(*body))
+        _, rows = bench.march(job)
+        compliance = viscoelastic.creep([row.time for row in rows[1:]], *body)
+        point = CELL * 1e-4 * 64 * load
+        for row, j in zip(rows[1:], compliance, strict=True):
+            bench.expect(f"approach, {ratio:g} : 1", row.measures.approach, point * j, error)
+        _, rows = bench.march({**job, "history": [{"pressure": load, **long}]})
+        bench.expect("in the end", rows[-1].measures.approach, point * ratio / GLASSY, 1.1e-3)
+        bench.expect("points", 64 * rows[-1].measures.contact_area, 1.0, 1e-12)
+
+
+def odd_branches(bench: Bench) -> None:
+    """G1 = 0 is a Maxwell branch, eta1 = 0 two springs in series, eta1 = inf a spring: G(t) in full contact, exact."""
+    maxwell = {"G0": 2.475e6, "G1": 0.0, "eta1": 2475.0}
+    series = {"G0": 0.2e6, "G1": 0.2e6, "eta1": 0.0}
+    spring = {"G0": 0.175e6, "G1": 1e6, "eta1": np.inf}
+    both = {"G0": 2.75e6, "G1": 2.75e6 / 9, "eta1": 2.75e4 / 9}
+    stage = {"duration": 3e-3, "time_step": 5e-4}
+    forms: list[tuple[float, list[Json]]] = [(0.275e6, [maxwell]), (0.0, [maxwell, series, spring]), (0.0, [both])]
+    for modulus_inf, branches in forms:
+        material = {"model": "zener", "modulus_inf": modulus_inf, "branches": branches}
+
+        def relaxes(march: March) -> None:
+            exact = STIFF * float(viscoelastic.relaxation(march.row.time, *PRONY))
+            bench.expect("amplitude", bench.amplitude(march), exact, 1e-9)
+
+        bench.march(wave([stage], material=material), relaxes)
+    springs = {"model": "zener", "modulus_inf": 0.0, "branches": [series, {**spring, "G0": 0.9e6}]}
+    march, _ = bench.march(wave([stage], material=springs))
+    bench.expect("springs only", bench.amplitude(march), STIFF * 1e6, 1e-9)
+
+
+SHARES = (300, 350, 220, 80, 24, 7, 2.4, 1, 0.5, 0.3, 0.2, 0.15)  # MPa
+TYRE = (1e6, [1e6 * share for share in SHARES], [5 * 10.0**exponent for exponent in range(-9, 3)])
+
+
+FULL = 5e7  # Pa, enough for full contact
+
+
+def many_decades(bench: Bench) -> None:
+    """Relaxation times from 5 ns to 500 s in one step: the modulus that 8 steps per period give, still settling."""
+    for omega in (1e4, 1e6):
+        dt = 2 * np.pi / 8 / omega
+        for integrator in INTEGRATORS:
+            stage = {"pressure": FULL, "velocity": omega / K, "duration": 40 * dt, "time_step": dt}
+            job = wave([stage], material=zener(*TYRE), numerics={"integrator": integrator})
+            march, rows = bench.march(job)
+            modulus = _settling(omega, dt, len(rows) - 2, integrator)
+            friction = STIFF * HEIGHT * K / 2 * modulus.imag / FULL
+            bench.expect("amplitude", bench.amplitude(march), STIFF * abs(modulus), 1e-9)
+            bench.expect("friction", rows[-1].measures.friction, friction, 1e-9)
+
+
+def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
+    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value."""
+    spring, moduli, times = TYRE
+    total = complex(spring)
+    for modulus, time in zip(moduli, times, strict=True):
+        share = complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator)) / modulus
+        z = dt / time
+        decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
+        total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)
+    return total

@@ -1,0 +1,58 @@
+"""The cases in which contact codes fail, each at its physical outcome, in every precision, on any number of ranks.
+
+What is expected and how far off it may be stands with the cases in parcontact/doctor. In single precision every number
+may be off by 3e-4, and solves are to 1e-5.
+"""
+
+import pytest
+from mpi4py import MPI
+
+from parcontact.doctor.bench import Bench, Finding
+from parcontact.doctor.cases import CASES, Case, Outcome, examine, table
+
+NAMES = [case.examine.__name__ for case in CASES]
+BY_NAME = dict(zip(NAMES, CASES, strict=True))
+
+
+@pytest.fixture
+def ranks(comm: MPI.Intracomm) -> MPI.Intracomm:
+    """One to three: more take long on two cores, and show nothing new."""
+    if comm.size > 3:
+        pytest.skip("on one, two and three ranks only")
+    return comm
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", NAMES)
+def test_double_precision(ranks: MPI.Intracomm, name: str) -> None:
+    assert examine(BY_NAME[name], ranks).wrong == []
+
+
+@pytest.mark.parametrize("precision", ["single", "mixed"])
+@pytest.mark.parametrize("name", NAMES)
+def test_other_precisions(precision: str, name: str) -> None:
+    assert examine(BY_NAME[name], MPI.COMM_SELF, precision).wrong == []
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("precision", ["single", "mixed"])
+@pytest.mark.parametrize("name", ["single_point", "many_decades"])
+def test_other_precisions_on_ranks(ranks: MPI.Intracomm, precision: str, name: str) -> None:
+    assert examine(BY_NAME[name], ranks, precision).wrong == []
+
+
+def test_a_case_that_goes_wrong_is_seen() -> None:
+    """Numbers beyond their limit, numbers that are none, solves that fail."""
+
+    def wrong(bench: Bench) -> None:
+        bench.expect("area", 0.5, 0.6, 0.1)
+        bench.expect("force", float("nan"), 1.0, 0.1)
+        bench.expect("peak", 1.0, 1.05, 0.1)
+
+    outcome = examine(Case("name", "expected", wrong), MPI.COMM_SELF)
+    assert outcome.wrong == ["area 0.5 (0.6 +- 0.06)", "force nan (1 +- 0.1)"]
+    assert "WRONG" in table([outcome])
+    failed = Outcome(outcome.case, (), 0.0, 0, "the contact solve stalled")
+    assert failed.wrong == ["the contact solve stalled"]
+    assert Finding("gap", 0.0, 0.0, 0.0).ok
+    assert not Finding("gap", 1e-300, 0.0, 0.0).ok
