@@ -45,7 +45,7 @@ def run(job: Job, slab: Slab, options: Options) -> int:
                 print(f"{directory.path}: {reason}", flush=True)
             return DONE
         plans.recall(job, slab, origin.plans if origin else None)
-        built = scene.build(job, slab)
+        built = scene.build(job, slab, options.until or 0.0)
         marching = March(built)
         if origin:
             state.restore(marching, origin.contents, slab)

@@ -11,12 +11,14 @@ import numpy as np
 
 from . import job as jobs
 from .effects import decisions as calls_for
+from .effects.condensation import condensed, told_of
 from .effects.decisions import Decision, Effect
 from .effects.relaxation import relaxation_of
 from .job import Job
 from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
 from .physics import halfspace, heightfile
+from .physics.condense import Condensed
 from .physics.energy import ElasticEnergy, ZenerEnergy
 from .physics.ledger import Ledger
 from .physics.material import Elastic, Heights, Zener
@@ -63,6 +65,7 @@ class Scene:
 
     frame: Frame
     path: Path
+    condensed: Condensed
     material: Elastic | Zener
     solver: ContactSolver
     ledger: Ledger
@@ -107,12 +110,16 @@ def frame(job: Job, slab: Slab) -> Frame:
     return Frame(job, slab, fft, surface, roughness, height or job.grid.dx, units, scaled)
 
 
-def build(job: Job, slab: Slab) -> Scene:
-    """Make a job's scene on the ranks of `slab`; collective. Raises InputError for surface files that do not fit."""
+def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
+    """Make a job's scene on the ranks of `slab`, to be marched to the end of its history or, if later, to `until` [s].
+
+    Collective. Raises InputError for surface files that do not fit.
+    """
     base = frame(job, slab)
     way = AnyFraction if calls_for.part_cells(job).on else WholeCells
     path: Path = way(base.surface, base.dtype)
-    material = _material(base)
+    branches = condensed(job, until)
+    material = _material(base, branches)
     solver = ContactSolver(
         slab,
         _operator(base),
@@ -124,19 +131,21 @@ def build(job: Job, slab: Slab) -> Scene:
     )
     energy = _energy(job, solver, material) if calls_for.energies(job).on else None
     ledger = Ledger(slab, base.surface, base.units)
-    scene = Scene(base, path, material, solver, ledger, energy, calls_for.lasting(job).on)
+    scene = Scene(base, path, branches, material, solver, ledger, energy, calls_for.lasting(job).on)
     scene.followers += [make(scene) for decide, make in FURTHER if decide(job).on]
     return scene
 
 
 def facts(built: Scene) -> list[str]:
-    """What a user should know about the surface: its spectral moments and what follows from them."""
+    """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
     found = built.frame.roughness
+    told = told_of(built.condensed, relaxation_of(built.job))
     if found is None:
-        return []
+        return told
     return [
+        *told,
         f"surface: rms height {found.rms_height:.4g} m, rms slope {found.rms_slope:.4g}, Nayak's parameter "
-        f"{found.nayak:.3g}; m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2"
+        f"{found.nayak:.3g}; m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2",
     ]
 
 
@@ -190,10 +199,11 @@ def _height(surface: Surface) -> float:
     return sum(surface.slab.reduce((), [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]))
 
 
-def _material(base: Frame) -> Elastic | Zener:
+def _material(base: Frame, branches: Condensed) -> Elastic | Zener:
     if not calls_for.viscoelasticity(base.job).on:
         return Elastic(base.slab, base.prony.modulus_inf)
-    return Zener(base.slab, base.prony, base.job.numerics.integrator, base.dtype)
+    integrator = base.job.numerics.integrator
+    return Zener(base.slab, base.prony, integrator, base.dtype, branches.memoryless, branches.frozen)
 
 
 def _operator(base: Frame) -> halfspace.Convolution:

@@ -44,8 +44,9 @@ def restore(march: March, contents: Contents, slab: Slab) -> None:
     Raises InputError if the run remembers something that the checkpoint does not have.
     """
     wanted = entries(march)
-    if contents.maps.keys().isdisjoint({MAYBE}):
-        wanted.pop(MAYBE, None)
+    asleep = _asleep(march.scene, contents)
+    for name in asleep if MAYBE in contents.maps else [MAYBE, *asleep]:
+        wanted.pop(name, None)
     _compare(contents, wanted)
     read(contents, slab, wanted)
     numbers = {
@@ -60,7 +61,28 @@ def restore(march: March, contents: Contents, slab: Slab) -> None:
     march.d = float(numbers["contact/approach"])
     for part, owner in _owners(march.scene).items():
         found = {name.removeprefix(f"{part}/"): value for name, value in numbers.items() if name.startswith(f"{part}/")}
-        owner.restore({**owner.state(), **found})  # its maps have been read in place
+        own = {name: value for name, value in owner.state().items() if f"{part}/{name}" not in asleep}
+        owner.restore({**own, **found})  # its maps have been read in place
+
+
+def _asleep(scene: Scene, contents: Contents) -> list[str]:
+    """The maps of branches that were folded when the checkpoint was written, and are not any more.
+
+    Raises InputError for a memoryless one that steps have become too short for: what it remembered is lost.
+    """
+    if not isinstance(scene.material, Zener) or "material/frozen" not in contents.numbers:
+        return []
+    numbers = [k for k in scene.material.kept if f"material/branch {k}" not in contents.maps]
+    for k in numbers:
+        error, accuracy = scene.condensed.memoryless_errors[k], contents.job["numerics"]["accuracy"]
+        if not contents.numbers["material/frozen"][k] and error > accuracy:
+            time = scene.frame.prony.relaxation_times[k]
+            raise InputError(
+                f"{contents.path} has no map of the branch of relaxation time {time:g} s: its run had no step so short "
+                f"that it mattered to numerics.accuracy = {accuracy:g}, now friction would be wrong by {error:.2g}; "
+                "keep to longer steps, or start afresh (--restart never)"
+            )
+    return [f"material/branch {k}" for k in numbers]
 
 
 def _compare(contents: Contents, wanted: dict[str, Entry]) -> None:
@@ -106,6 +128,7 @@ class _Units:
             (r"contact/approach", height, "m"),
             (r"material/displacement", height, "m"),
             (r"material/branch \d+", modulus * height, "Pa m"),
+            (r"(material|memory)/frozen", 1.0, "1"),
             (r"material/moduli", modulus, "Pa"),
             (r"material/relaxation times", 1.0, "s"),
             (r"memory/displacement", strain, "1"),

@@ -23,8 +23,9 @@ def begin(march: March) -> None:
     material = scene.material
     if isinstance(material, Zener):
         material.u[...] = contact.u
-        for own, steady in zip(material.branches, sliding.branch_maps(initial.velocity), strict=True):
-            own[...] = steady
+        for k, steady in enumerate(sliding.branch_maps(initial.velocity)):
+            if k in material.kept:
+                material.branches[material.kept.index(k)] = steady
     march.p[...] = contact.p
     if march.p_old is not None:
         march.p_old[...] = contact.p

@@ -1,6 +1,7 @@
 """Branch condensation: the time scales of a job and the waves of its surface, and what they leave of its branches."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,22 +9,38 @@ from .. import job as jobs
 from ..clock import fractions, steps
 from ..job import Grid, Job
 from ..physics.condense import Band, Condensed, Phase, condense, nothing
+from ..theory.viscoelastic import Prony
 from .relaxation import relaxation_of
 
 
 def condensed(job: Job, until: float = 0.0) -> Condensed:
     """Which branches of a job's material need a map, if its last stage goes on to `until` [s]; from the job alone."""
-    prony = relaxation_of(job)
+    prony, numerics = relaxation_of(job), job.numerics
     if prony.moduli.size == 0:
         return nothing(prony, "the body has no branch")
-    if job.numerics.accuracy == 0.0:
-        return nothing(prony, "numerics.accuracy is 0")
-    if job.output.energy:
-        return nothing(prony, "output.energy counts the energy of every branch")
+    reason = "output.energy counts the energy of every branch" if job.output.energy else ""
+    reason = reason or ("" if numerics.accuracy else "numerics.accuracy is 0")
+    accuracy = 0.0 if reason else numerics.accuracy
     start = job.initial.velocity if job.initial.state == "steady" else None
-    return condense(
-        prony, list(phases(job, until)), list(bands(job)), job.numerics.integrator, job.numerics.accuracy, start
-    )
+    found = condense(prony, list(phases(job, until)), list(bands(job)), numerics.integrator, accuracy, start)
+    return replace(found, reason=reason)
+
+
+def told_of(found: Condensed, prony: Prony) -> list[str]:
+    """What a user should know about the branches of a material [Pa, s]: nothing if they are as the job says."""
+    count = prony.moduli.size
+    if not found.folded:
+        return [f"branches: all {count} have a map: {found.reason}"] if found.reason and count > 1 else []
+    times = {
+        kind: ", ".join(f"{prony.relaxation_times[k]:g}" for k in numbers) + " s"
+        for kind, numbers in (("memoryless", found.memoryless), ("frozen", found.frozen))
+        if numbers
+    }
+    folded = "; ".join(f"{kind} {text}" for kind, text in times.items())
+    return [
+        f"branches: {len(found.kept)} of {count} have a map, {folded}; friction (at rest: the modulus) is wrong by at "
+        f"most {found.bound:.2g} of itself (numerics.accuracy {found.accuracy:g})"
+    ]
 
 
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:

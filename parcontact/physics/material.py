@@ -12,8 +12,12 @@ A step advances `h_k <- decay_k h_k + gain_k (u_new - u)` with, for z = dt/tau_k
 so that `A p = alpha u_new + r`, `alpha = G_inf + sum gain_k`, `r = sum decay_k h_k - (sum gain_k) u`. The contact
 problem of a step is then that of an elastic body of modulus alpha under the effective heights `h + r/alpha` (paper,
 Eq. 9).
+
+Two kinds of branches have no map (`condense` says which and what it costs): of a memoryless one `gain (u_new - u)` is
+all there is, its decay being 0 to the accuracy asked for; a frozen one is the spring `h_k = G_k u`.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -82,13 +86,28 @@ class Elastic:
 class Zener:
     """Relaxing branches: this rank's rows of one map per branch and of the last displacement.
 
+    Branches are known by their number in `prony`. Those of `kept` have a map each, in that order in `branches`; the
+    `memoryless` and `frozen` ones have none.
+
     The maps are advanced when the next step begins, in the same pass that forms its effective heights: until then the
     increment of the displacement waits in the buffer of the effective heights.
     """
 
-    def __init__(self, slab: Slab, prony: Prony, integrator: str, dtype: DTypeLike = np.float64) -> None:
+    def __init__(
+        self,
+        slab: Slab,
+        prony: Prony,
+        integrator: str,
+        dtype: DTypeLike = np.float64,
+        memoryless: Collection[int] = (),
+        frozen: Collection[int] = (),
+    ) -> None:
         self.prony, self.integrator = prony, integrator
-        self.branches = allocate((len(prony.moduli), *slab.shape), dtype, slab.tally)
+        numbers = range(len(prony.moduli))
+        self.kept = [k for k in numbers if k not in memoryless and k not in frozen]
+        self._moving = [k for k in numbers if k not in frozen]
+        self._spring = prony.modulus_inf + float(prony.moduli[list(frozen)].sum())
+        self.branches = allocate((len(self.kept), *slab.shape), dtype, slab.tally)
         self.branches.fill(0.0)
         self.u = slab.zeros(dtype)
         self._work = slab.zeros(dtype)
@@ -96,7 +115,7 @@ class Zener:
 
     @property
     def _still(self) -> tuple[Array, Array]:
-        return np.ones_like(self.prony.moduli), np.zeros_like(self.prony.moduli)
+        return np.ones(len(self.kept)), np.zeros(len(self.kept))
 
     def elapsed(self, dt: float) -> Array:
         """`z = dt/tau` of each branch."""
@@ -108,11 +127,11 @@ class Zener:
 
     def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
         """Modulus alpha and effective heights `h + r/alpha` of a step; may be called again for another dt."""
-        self._step = decay, gain = self.coefficients(dt)
-        alpha = self.prony.modulus_inf + float(gain.sum())
-        loops.begin(
-            self.branches, *self._pending, self._work, decay / alpha, float(gain.sum()) / alpha, self.u, *heights.parts
-        )
+        decay, gain = self.coefficients(dt)
+        total = float(gain[self._moving].sum())
+        self._step = decay, gain = decay[self.kept], gain[self.kept]
+        alpha = self._spring + total
+        loops.begin(self.branches, *self._pending, self._work, decay / alpha, total / alpha, self.u, *heights.parts)
         self._pending = self._still
         return alpha, self._work
 
@@ -134,10 +153,14 @@ class Zener:
     def state(self) -> dict[str, Array]:
         """What a restart needs."""
         self.settle()
-        return {"displacement": self.u, **{f"branch {k}": branch for k, branch in enumerate(self.branches)}}
+        maps = {f"branch {k}": branch for k, branch in zip(self.kept, self.branches, strict=True)}
+        frozen = np.array([float(k not in self._moving) for k in range(len(self.prony.moduli))])
+        return {"displacement": self.u, "frozen": frozen, **maps}
 
     def restore(self, state: dict[str, Array]) -> None:
+        """Go on from a `state`; a branch without a map there wakes up: of a frozen one it is `G_k u`, else 0."""
         self.u[...] = state["displacement"]
-        for k, branch in enumerate(self.branches):
-            branch[...] = state[f"branch {k}"]
+        for k, branch in zip(self.kept, self.branches, strict=True):
+            asleep = self.prony.moduli[k] * state["frozen"][k]
+            branch[...] = state[f"branch {k}"] if f"branch {k}" in state else asleep * self.u
         self._pending = self._still
