@@ -16,7 +16,7 @@ from .errors import InputError, RunError
 from .parallel.slab import Slab
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # and runner.AGAIN
-VERBS = ("run", "steady", "check", "info", "plot", "doctor")
+VERBS = ("run", "steady", "check", "plan", "info", "plot", "doctor")
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # say how many were started
 STAGGER = 0.5  # seconds for which other ranks let root report an error that all of them have
 PATIENCE = 5.0  # seconds for which a rank that ends with an error waits for the others to do so too
@@ -130,6 +130,16 @@ def _parser() -> argparse.ArgumentParser:
     _job_arguments(check)
     check.set_defaults(act=_check)
 
+    plan = verbs.add_parser("plan", help="say what a job will do, and what it costs on so many ranks; writes nothing")
+    _job_arguments(plan)
+    text = "numbers of ranks, N,N,... (default: 1 and as many as there are cores here, or as many as plan)"
+    plan.add_argument("--ranks", metavar="N,...", type=_counts, default=(), help=text)
+    plan.add_argument("--seconds", metavar="T", type=_seconds, default=10.0, help="for how long the job is tried [s]")
+    plan.add_argument("--cores", metavar="N", type=_count, help="cores of a node of the machine that it is for")
+    text = "of that machine's network: seconds of a message, bytes per second of a node (default: 2e-6,12.5e9)"
+    plan.add_argument("--network", metavar="ALPHA,BETA", type=_network, help=text)
+    plan.set_defaults(act=_plan)
+
     info = verbs.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
     info.add_argument("file", type=Path)
     info.set_defaults(act=_info)
@@ -155,6 +165,23 @@ def _seconds(text: str) -> float:
     if not 0.0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"must be a time [s] of zero or more, got {text!r}")
     return value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be positive whole numbers, got {text!r}")
+    return int(text)
+
+
+def _counts(text: str) -> tuple[int, ...]:
+    return tuple(_count(part) for part in text.split(","))
+
+
+def _network(text: str) -> tuple[float, float]:
+    values = _values(text)
+    if len(values) != 2 or min(values) <= 0.0:
+        raise argparse.ArgumentTypeError(f"must be seconds of a message and bytes per second, got {text!r}")
+    return values[0], values[1]
 
 
 def _wall(text: str) -> float:
@@ -216,6 +243,20 @@ def _check(options: argparse.Namespace, world: MPI.Intracomm) -> int:
         print(job.describe(loaded))
         for warning in loaded.warnings:
             print(f"warning: {warning}")
+    return DONE
+
+
+def _plan(options: argparse.Namespace, world: MPI.Intracomm) -> int:
+    started = time.process_time()
+    from .plan import machine, making
+
+    loaded = _load(options, world)
+    ranks = options.ranks or tuple(sorted({1, world.size, *({machine.cores()} if world.size == 1 else ())}))
+    alone = Slab(MPI.COMM_SELF, 1, 1)
+    wanted = making.Wanted(ranks, options.seconds, options.cores, options.network)
+    for line in making.plan(loaded, Slab(world, *loaded.grid.points), alone, wanted, started):
+        if world.rank == 0:
+            print(line, flush=True)
     return DONE
 
 

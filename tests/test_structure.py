@@ -22,7 +22,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"steadystate"},
     {"march"},
     {"state", "restart", "watch", "steadystart"},
-    {"runner", "curve"},
+    {"runner", "curve", "plan"},
     {"study", "doctor"},
     {"__main__"},
 ]

@@ -35,6 +35,11 @@ def import_wisdom(wisdom: bytes) -> bool:
     return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))
 
 
+def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
+    """The name under which transforms of this size are counted."""
+    return f"fft {lengths[0]}x{lengths[1]} {np.dtype(dtype).name}"
+
+
 def footprint(
     points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int
 ) -> tuple[int, int, int]:
@@ -78,7 +83,7 @@ class FFT:
         self.shape = (self.my, self.columns.stop - self.columns.start)
         self.spectrum: Spectrum = allocate(self.shape, self.complex, slab.tally)
         self._transpose = Transpose(slab, dealt, self.spectrum) if slab.comm.size > 1 else None
-        self._name = f"fft {self.mx}x{self.my} {self.dtype.name}"
+        self._name = transform_name((self.mx, self.my), dtype)
         self._make_blocks()
         self._make_plans()
 

@@ -86,9 +86,14 @@ def free(slab: Slab, size: tuple[float, float], poisson: float = 0.5, dtype: DTy
 
     Padding to twice the box makes the cyclic convolution a linear one (paper, reference [12]); nobody outside sees it.
     """
-    lengths = pyfftw.next_fast_len(2 * slab.nx), pyfftw.next_fast_len(2 * slab.ny)
+    lengths = padded_lengths(slab.nx, slab.ny)
     fft = FFT(slab, lengths, dtype)
     return Convolution(fft, tabulate(fft, size, partial(love, poisson=poisson)).real)
+
+
+def padded(nx: int, ny: int) -> tuple[int, int]:
+    """Lengths of the transforms of a free half space: fast ones of at least twice the box."""
+    return pyfftw.next_fast_len(2 * nx), pyfftw.next_fast_len(2 * ny)
 
 
 def tabulate(fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array]) -> NDArray[np.complexfloating]:

@@ -1,0 +1,56 @@
+"""A grid on which a job can be tried in little time: its own, or a coarser one."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..job import Job
+from ..jobfile.table import plain
+from . import memory
+
+PER_POINT = 2e-8  # seconds of an operator call per point, and of what belongs to it: enough to choose a grid by
+CALLS = 200  # operator calls that a trial makes at least
+SHARE = 0.7  # of the memory that is free
+MEMINFO = Path("/proc/meminfo")
+WAVE = 2.0  # cells that the shortest wave needs
+
+
+def grid_for(job: Job, ranks: int, seconds: float) -> Job | None:
+    """The job, or the same on a coarser grid, that can be tried by so many ranks here; None if there is none."""
+    return next((each for each in _coarser(job) if _feasible(each, ranks, seconds)), None)
+
+
+def _feasible(job: Job, ranks: int, seconds: float) -> bool:
+    points = job.grid.nx * job.grid.ny
+    quick = CALLS * PER_POINT * points / ranks <= seconds
+    return quick and memory.total(job, ranks) * ranks <= SHARE * _free()
+
+
+def _coarser(job: Job) -> Iterator[Job]:
+    """The job with 1, 2, 4, ... times its cells, as long as its surface can be put on them."""
+    yield job
+    data: dict[str, Any] = plain(job)
+    while all(n % 2 == 0 for n in data["grid"]["points"]) and min(data["grid"]["points"]) > 64:
+        data["grid"]["points"] = [n // 2 for n in data["grid"]["points"]]
+        cell = max(length / n for length, n in zip(data["grid"]["size"], data["grid"]["points"], strict=True))
+        for shape in data["surface"]:
+            if shape["shape"] == "file":
+                return
+            if "short_wavelength" in shape:
+                shape["short_wavelength"] = max(shape["short_wavelength"], WAVE * cell)
+        try:
+            yield Job.model_validate(data)
+        except ValidationError:  # waves that a coarser grid does not have
+            return
+
+
+def _free() -> int:
+    """Bytes of memory that are free, as far as that is known."""
+    try:
+        facts = dict(line.split(":") for line in MEMINFO.read_text().splitlines())
+        return int(facts["MemAvailable"].split()[0]) << 10
+    except (OSError, KeyError, ValueError):
+        return sys.maxsize

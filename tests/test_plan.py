@@ -1,0 +1,192 @@
+"""The plan of a job: memory to the byte, steps that stand for others, scaling; counts are checked, never times."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import begun, marched
+from mpi4py import MPI
+
+from parcontact import __main__, state
+from parcontact.clock import steps
+from parcontact.effects import decisions as calls_for
+from parcontact.job import Job
+from parcontact.parallel.slab import Slab
+from parcontact.plan import memory, trial
+from parcontact.plan.sample import Sample, Stage, chosen, sample
+from parcontact.plan.scaling import Machine, Scaling
+
+Json = dict[str, Any]
+ROUGH: Json = {
+    "shape": "rough",
+    "hurst": 0.8,
+    "long_wavelength": 2.5e-4,
+    "short_wavelength": 1.25e-4,
+    "rms_slope": 0.02,
+    "seed": 1,
+}
+TWO = {
+    "model": "zener",
+    "modulus_inf": 1e6,
+    "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}, {"modulus": 2e6, "relaxation_time": 1e-4}],
+}
+PRESS = {"pressure": 1e4}
+SLIDE = {"pressure": 1e4, "velocity": 0.1, "duration": 1e-3, "time_step": 1e-4}
+CELLS = {"pressure": 1e4, "velocity": 0.1, "distance": 1.25e-4, "cells_per_step": 1}
+
+
+def job(**changes: Any) -> Job:
+    return Job.model_validate(
+        {
+            "grid": {"points": [48, 40], "size": [1e-3, 1e-3], **changes.pop("grid", {})},
+            "surface": ROUGH,
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "history": [PRESS],
+            **changes,
+        }
+    )
+
+
+JOBS: dict[str, Json] = {
+    "elastic, static": {},
+    "elastic, sliding": {"history": [CELLS]},
+    "viscoelastic": {"material": TWO, "history": [CELLS]},
+    "between cells": {"material": TWO, "history": [SLIDE]},
+    "free": {"grid": {"boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}},
+    "free, energies": {"grid": {"boundary": "free"}, "material": TWO, "history": [SLIDE], "output": {"energy": True}},
+    "energies": {"material": TWO, "history": [CELLS], "output": {"energy": True}},
+    "single": {"material": TWO, "history": [CELLS], "numerics": {"precision": "single"}},
+    "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed"}},
+}
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", JOBS)
+def test_memory(comm: MPI.Intracomm, name: str) -> None:
+    """What each rank holds after a run, and what a checkpoint has in maps, to the byte."""
+    planned = job(**JOBS[name])
+    march, _ = marched(planned, comm=comm)
+    slab = march.scene.slab
+    assert memory.total(planned, comm.size, comm.rank) == slab.tally["map bytes"]
+    maps = [np.asarray(entry.value) for entry in state.entries(march).values() if entry.is_map]
+    saved = sum(rows.nbytes + 4 * len(rows) for rows in maps)
+    assert sum(slab.from_all(saved)) == memory.saved(planned)
+
+
+def test_the_last_rank_has_the_most() -> None:
+    for name, ranks in [("free", 7), ("mixed", 3), ("viscoelastic", 100)]:
+        planned = job(**JOBS[name])
+        assert memory.total(planned, ranks) == max(memory.total(planned, ranks, rank) for rank in range(ranks))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["elastic, static", "viscoelastic", "free, energies"])
+def test_a_short_job_is_tried_whole(comm: MPI.Intracomm, name: str) -> None:
+    """Its counts are those of a run."""
+    planned = job(**JOBS[name])
+    before = begun(planned, comm=comm).scene.slab.tally
+    march, rows = marched(planned, comm=comm)
+    spent = march.scene.slab.tally.since(before)
+    seen = sample(planned, Slab(comm, *planned.grid.points), 1e6)
+    assert seen.steps == seen.tried == len(rows) - 1
+    assert seen.total("operator") == sum(row.operator_calls for row in rows)
+    for count in ("fft", "allreduce", "bytes sent"):
+        assert seen.total(count) == spent.get(count, 0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.7, 1.0])
+@pytest.mark.parametrize("stage", [SLIDE, {**SLIDE, "time_step": {"first": 1e-6, "growth": 1.02}}, CELLS])
+def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
+    """They follow each other without a gap, weigh as much as all, and end where all do."""
+    stage = {**stage, **({"duration": 1e-2} if "duration" in stage else {"distance": 1e-2})}
+    planned = job(history=[stage])
+    whole = list(steps(planned.history, planned.grid))
+    picked = list(chosen(whole, share))
+    assert sum(weight for _, weight in picked) == pytest.approx(len(whole), rel=1e-12)
+    assert picked[0] == (whole[0], 1.0)
+    assert picked[-1][0].time == whole[-1].time
+    assert picked[-1][0].position == whole[-1].position
+    for (before, _), (step, _) in pairwise(picked):
+        assert step.time - step.dt == pytest.approx(before.time, abs=1e-12 * whole[-1].time)
+    if share < 1.0:
+        assert len(picked) <= max(share * len(whole), 5) + 3
+    weighed = [step for step, weight in picked if weight]
+    assert set(weighed) <= set(whole)
+
+
+def test_stages_not_tried_are_like_the_others() -> None:
+    stages = (Stage(4, 4, 4.0, {"fft": 40.0}), Stage(6))
+    seen = Sample(job(), 1, 0.0, stages)
+    assert seen.total("fft") == 100.0
+    assert seen.total("never counted") == 0.0
+
+
+MACHINE = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10)
+
+
+def scaling(points: int, machine: Machine = MACHINE, **counts: float) -> Scaling:
+    planned = job(grid={"points": points})
+    sums = {"seconds": 1.0, "operator": 10.0, f"fft {points}x{points} float64": 20.0, "allreduce": 20.0, **counts}
+    return Scaling.of(planned, Sample(planned, 1, 1.0, (Stage(1, 1, 1.0, sums),)), machine)
+
+
+def test_one_rank_is_what_was_seen() -> None:
+    assert scaling(64).step(1) == pytest.approx(1.0, rel=1e-12)
+    assert scaling(64).messages(1) == 0.0
+    assert scaling(64).efficiency(1) == 1.0
+
+
+def test_work_is_divided() -> None:
+    """Without messages and calls: by the ranks, but for how they slow each other down on a node."""
+    ideal = Machine(cores=4, crowding=2.0, per_call=0.0, copy_rate=1e30, latency=0.0, bandwidth=1e30, near_latency=0.0)
+    assert [scaling(64, ideal).step(ranks) for ranks in (2, 4, 16)] == pytest.approx([(4 / 3) / 2, 2 / 4, 2 / 16])
+
+
+def test_messages_grow_with_ranks_and_scaling_ends() -> None:
+    """Each rank sends one message to every other one in a transpose: 20 of those, 2 us each between nodes."""
+    few = scaling(1024)
+    assert few.messages(1024) == pytest.approx(20 * (7 * 5e-7 + 1016 * 2e-6) + 21 * 10 * 2e-6, rel=0.1)
+    assert few.efficiency(few.end) >= 0.5 > few.efficiency(2 * few.end)
+    assert 8 < few.end < 1024
+    slow = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10, latency=1e-3)
+    assert scaling(1024, slow).end < few.end
+
+
+def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
+    large = job(grid={"points": 2**14}, history=[CELLS])
+    tried = trial.grid_for(large, 1, 1.0)
+    assert tried is not None
+    assert max(tried.grid.points) <= 512
+    assert tried.grid.size == large.grid.size
+    assert sum(1 for _ in calls_for.timeline(tried)) < sum(1 for _ in calls_for.timeline(large))
+    seen = Sample(tried, 1, 1.0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
+    assert Scaling.of(large, seen, MACHINE).sample.steps == sum(1 for _ in calls_for.timeline(large))
+    ratio = Scaling.of(large, seen, MACHINE).step(1) / Scaling.of(tried, seen, MACHINE).step(1)
+    assert ratio > large.grid.nx**2 / tried.grid.nx**2
+    assert trial.grid_for(job(), 1, 10.0) == job()
+
+
+def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a user reads it; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    text = "grid: {points: 32, size: 1.0e-3}\nsurface: {shape: sphere, radius: 1.0e-2}\n"
+    text += "material: {model: elastic, shear_modulus: 1.0e6}\nhistory: [{pressure: 1.0e4}]\n"
+    (tmp_path / "job.yaml").write_text(text)
+    assert __main__.main(["plan", "job.yaml", "--ranks", "1,2,1000", "--cores", "4", "--seconds", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "on   checkpoints" in said
+    assert "off  viscoelasticity" in said
+    assert "1 steps: stage 1 1" in said
+    assert "scaling ends at" in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "job.yaml"]
+
+
+@pytest.mark.parametrize("words", [["--ranks", "0"], ["--ranks", "two"], ["--network", "1"], ["--cores", "-1"]])
+def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        __main__.main(["plan", "job.yaml", *words])
+    assert ended.value.code == 2
+    assert "must be" in capsys.readouterr().err
