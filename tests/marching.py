@@ -1,7 +1,9 @@
 """Jobs as dictionaries or worked examples, marched in this process."""
 
+import importlib.util
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,18 @@ SLS = {"model": "zener", "modulus_inf": 0.275e6, "branches": BRANCHES}
 PRONY = (0.275e6, [2.475e6], [1e-3])  # the same for the closed forms
 
 
-JOBS = Path(__file__).parents[1] / "jobs"
+ROOT = Path(__file__).parents[1]
+JOBS = ROOT / "jobs"
+
+
+def load_script(name: str) -> ModuleType:
+    """A script of scripts/, as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    return script
 
 
 def example(name: str, *overrides: str) -> Job:

@@ -5,13 +5,12 @@ and pressures to 1 % of the highest, Johnson's mean gap to 1e-3 of the amplitude
 measured is given where it is far better.
 """
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from marching import JOBS, load_script
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
@@ -22,8 +21,6 @@ from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
 from parcontact.theory import hertz, jgh, westergaard
 
-ROOT = Path(__file__).parents[1]
-JOBS = ROOT / "jobs"
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
 WAVE = (5e-7, 2.5e-4, 1e6)  # amplitude [m], wavelength [m], shear modulus [Pa] of jobs/westergaard.yaml and waves.yaml
 X = WAVE[1] / 1024 * np.arange(1024.0)  # where the points of jobs/westergaard.yaml are [m]
@@ -59,15 +56,6 @@ def bumps(tmp_path: Path) -> Path:
     path = tmp_path / "bumps.yaml"
     path.write_text(BUMPS)
     return path
-
-
-def load_script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    return script
 
 
 # -- worked examples ---------------------------------------------------------------------------------------------------

@@ -1,0 +1,103 @@
+"""Iterations of cold contact solves over all loads, from one point to all but one in ten thousand, and the last gap.
+
+    python scripts/load_sweep.py [points] [tolerance]
+
+Rough surfaces down to sixteen and to two cells per wave, and a sphere. For Westergaard's and Johnson's waves at 0.99, 1
+and 1.01 of the load of full contact: how many points are open after each iteration.
+"""
+
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics import halfspace
+from parcontact.physics.roughness import Roughness
+from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
+
+Map = NDArray[np.float64]
+MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
+ALMOST = 0.9999  # of all points: there the sweep ends
+
+
+def solver(heights: Map, tolerance: float, max_iterations: int = 500) -> ContactSolver:
+    """For a box of length 1."""
+    ny, nx = heights.shape
+    slab = Slab(MPI.COMM_SELF, nx, ny)
+    fft = FFT(slab)
+    operator, inverse = halfspace.periodic(fft, (1.0, 1.0)), halfspace.inverse(fft, (1.0, 1.0))
+    return ContactSolver(slab, operator, inverse, float(np.ptp(heights)), tolerance, max_iterations)
+
+
+def cold(solving: ContactSolver, heights: Map, mean: float) -> Contact:
+    """A solve from nothing."""
+    solving.p.fill(0.0)
+    return solving.solve(heights, MeanPressure(mean))
+
+
+def rough(points: int, cells: int) -> Map:
+    """Hurst 0.9, four longest waves in the box, the shortest of so many cells, rms slope 1."""
+    fft = FFT(Slab(MPI.COMM_SELF, points, points))
+    waves = Roughness(0.9, 0.25, 0.25, cells / points, 1, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
+    return np.asarray(fft.backward(waves, np.empty((points, points))), dtype=np.float64)
+
+
+def paraboloid(points: int) -> Map:
+    """Its mean slope is of the order of 1."""
+    x = np.arange(points) / points - 0.5
+    return -(x[None, :] ** 2) - x[:, None] ** 2
+
+
+def sweep(heights: Map, tolerance: float, per_decade: int = 4) -> Iterator[tuple[float, float, Contact]]:
+    """Load over E*, contact area, and the solve; from one point until almost all are in contact."""
+    solving = solver(heights, tolerance)
+    load, area = 1e-3 / heights.size / heights.shape[0], 0.0
+    while area < ALMOST:
+        found = cold(solving, heights, load * MODULUS)
+        area = np.count_nonzero(found.p) / heights.size
+        yield load, area, found
+        load *= 10.0 ** ((1.0 if area < 0.5 else 0.25) / per_decade)
+
+
+def last_gap(points: int, two_ways: bool, share: float, tolerance: float) -> list[int]:
+    """How many points are open after each iteration at a share of the load that closes the last gap."""
+    x = np.cos(2 * np.pi * (np.arange(points) + 0.3) / points)
+    heights = x[:, None] * x[None, :] if two_ways else np.tile(x, (points, 1))
+    full = np.pi * MODULUS * (np.sqrt(2.0) if two_ways else 1.0)
+    count = []
+    for limit in range(1, 100):
+        found = cold(solver(heights, tolerance, limit), heights, share * full)
+        count.append(heights.size - int(np.count_nonzero(found.p)))
+        if found.converged:
+            return count
+    raise RuntimeError("did not converge")
+
+
+def reversals(count: list[int]) -> int:
+    """How often a count that has fallen rises, or the other way round."""
+    steps = [after - before for before, after in pairwise(count) if after != before]
+    return sum(first * second < 0 for first, second in pairwise(steps))
+
+
+def main(points: int = 512, tolerance: float = 1e-6) -> None:
+    surfaces = {"16 cells": rough(points, 16), "2 cells": rough(points, 2), "paraboloid": paraboloid(points)}
+    for name, heights in surfaces.items():
+        print(f"{name}: load/E*, contact, iterations")
+        most = 0
+        for load, area, found in sweep(heights, tolerance):
+            print(f"  {load:9.2e} {area:10.6f} {found.iterations:4d} {found.failure}")
+            most = max(most, found.iterations)
+        print(f"  at most {most}")
+    for two_ways, name in ((False, "Westergaard"), (True, "Johnson")):
+        for share in (0.99, 1.0, 1.01):
+            count = last_gap(points // 4, two_ways, share, 1e-3 * tolerance)
+            print(f"{name} at {share}: open points {count}, {reversals(count)} reversals")
+
+
+if __name__ == "__main__":
+    main(*(kind(word) for kind, word in zip((int, float), sys.argv[1:], strict=False)))

@@ -1,0 +1,38 @@
+"""Iterations do not grow out of hand at any load, and the last gap closes without coming and going.
+
+At 512 x 512 points `scripts/load_sweep.py` finds at most 26.
+"""
+
+from itertools import pairwise
+
+import pytest
+from marching import load_script
+
+LIMIT = 60  # iterations to 1e-6
+load_sweep = load_script("load_sweep")
+
+
+@pytest.mark.parametrize("surface", ["sixteen cells", "two cells", "paraboloid"])
+def test_cold_starts_at_all_loads(surface: str) -> None:
+    """From one point to 99.99 % of contact, which grows with the load."""
+    heights = (
+        load_sweep.paraboloid(128) if surface == "paraboloid" else load_sweep.rough(128, 16 if "six" in surface else 2)
+    )
+    areas = []
+    for load, area, found in load_sweep.sweep(heights, 1e-6, per_decade=1):
+        assert found.converged, (load, found.failure)
+        assert found.iterations < LIMIT
+        areas.append(area)
+    assert areas[0] == 1 / heights.size
+    assert areas[-1] >= load_sweep.ALMOST
+    assert all(before <= after for before, after in pairwise(areas))
+
+
+@pytest.mark.parametrize("two_ways", [False, True], ids=["Westergaard", "Johnson"])
+@pytest.mark.parametrize("share", [0.99, 1.0, 1.01])
+def test_last_gap(two_ways: bool, share: float) -> None:
+    """Points open after each iteration to 1e-9, at shares of the load of full contact: they settle from one side."""
+    count = load_sweep.last_gap(128, two_ways, share, 1e-9)
+    assert load_sweep.reversals(count) == 0
+    assert len(count) < 20
+    assert (count[-1] == 0) == (share >= 1.0)
