@@ -18,6 +18,7 @@ from .scene import Scene
 from .solve.contact import Approach, Contact, MeanPressure
 
 Task = Callable[["March"], bool | None]
+ROUND_OFF = 1e-14  # relative to lengths whose sum is compared with 0
 
 
 class March:
@@ -92,7 +93,7 @@ class March:
     def _control(self, step: Step, alpha: float, effective: Array) -> MeanPressure | Approach:
         scene, grid = self.scene, self.scene.job.grid
         if step.control == "approach":
-            d = step.load / scene.units.height
+            d = (step.load + scene.frame.surface.datum) / scene.units.height
             self._refuse_beyond_full_contact(step, d, effective)
             return Approach(d)
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
@@ -103,8 +104,10 @@ class March:
         scene = self.scene
         if scene.job.grid.boundary == "periodic":
             mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
-            if d + mean > 0.0:
-                most = -mean * scene.units.height
+            datum = scene.frame.surface.datum
+            rounding = ROUND_OFF * (abs(step.load) + abs(datum) + scene.frame.height) / scene.units.height
+            if d + mean > rounding:
+                most = -mean * scene.units.height - datum
                 raise RunError(
                     f"step {step.number}: an approach of {step.load:g} m is beyond full contact, which a periodic body "
                     f"reaches at {most:g} m; prescribe a pressure instead"

@@ -33,6 +33,9 @@ from .theory.viscoelastic import Prony
 Follower = Callable[[Any], None]  # an effect that is told of every step: called with the march when it is committed
 
 
+FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
+
+
 @dataclass
 class Frame:
     """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
@@ -153,7 +156,7 @@ def facts(built: Scene) -> list[str]:
 
 
 def _surface(job: Job, fft: FFT) -> Surface:
-    grid, slab = job.grid, fft.slab
+    grid, slab, differences = job.grid, fft.slab, job.numerics.slope == "finite-difference"
     waves: Spectrum | None = None
     shapes: list[Shape] = []
     for part in job.surface:
@@ -166,12 +169,12 @@ def _surface(job: Job, fft: FFT) -> Surface:
         elif not isinstance(part, jobs.Flat):
             added = _waves(part, fft, grid.size)
             waves = added if waves is None else waves + added
-    if waves is not None:
-        waves = waves.astype(fft.complex, copy=False)
-        slab.tally.hold(waves)
-    return Surface(
-        slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", job.numerics.slope == "finite-difference"
-    )
+    surface = Surface(slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
+    surface.level()
+    if surface.waves is not None:
+        surface.waves = surface.waves.astype(fft.complex, copy=False)
+        slab.tally.hold(surface.waves)
+    return surface
 
 
 def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple[float, float]) -> Spectrum:
@@ -179,7 +182,7 @@ def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.HeightFile):
         rows = heightfile.read(part.path, part.dataset, fft.slab)
-        return fft.forward(np.multiply(rows, part.scale).astype(fft.dtype, copy=False)).copy()
+        return _transform(part.scale * rows, fft)
     return Roughness(
         part.hurst,
         part.long_wavelength,
@@ -193,10 +196,21 @@ def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple
     ).spectrum(fft, size)
 
 
+def _transform(heights: Array, fft: FFT) -> Spectrum:
+    """Of heights in double precision, their mean apart: single precision may have no digits for both; collective."""
+    mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
+    spectrum = fft.forward((heights - mean).astype(fft.dtype)).astype(np.complex128)
+    if fft.columns.start == 0 < fft.columns.stop:
+        spectrum[0, 0] += mean * fft.slab.points
+    return spectrum
+
+
 def _height(surface: Surface) -> float:
-    """From the lowest to the highest point [m]: Sz of the standards on roughness."""
+    """From the lowest to the highest point [m], Sz of the standards on roughness; 0 if that is rounding."""
     heights = surface.heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
-    return sum(surface.slab.reduce((), [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]))
+    extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
+    top, bottom = surface.slab.reduce((), extremes)
+    return top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
 
 
 def _material(base: Frame, branches: Condensed) -> Elastic | Zener:

@@ -51,7 +51,7 @@ class Ledger:
             force_y=force_y,
             friction=math.hypot(force_x, force_y) / normal if normal > 0.0 else 0.0,
             contact_area=count / points,
-            approach=d * units.height,
+            approach=d * units.height - self.surface.datum,
             mean_gap=(gaps / points - d) * units.height,
             max_pressure=largest * unit_pressure,
         )

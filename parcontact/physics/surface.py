@@ -26,7 +26,8 @@ class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
     `waves` is this rank's part of the transform of the periodic heights or None; `periodic` wraps the shapes around the
-    box; `scale` turns m into the unit of heights; with `differences` slopes are central differences over a cell.
+    box; `scale` turns m into the unit of heights; with `differences` slopes are central differences over a cell;
+    `datum` [m] is the height from which heights are counted.
     """
 
     slab: Slab
@@ -37,6 +38,7 @@ class Surface:
     periodic: bool = True
     differences: bool = False
     scale: float = 1.0
+    datum: float = 0.0
 
     @property
     def cell(self) -> tuple[float, float]:
@@ -47,6 +49,18 @@ class Surface:
         if self.waves is not None:
             self.waves *= 1.0 / unit / self.scale
         self.scale = 1.0 / unit
+
+    def level(self) -> None:
+        """Count heights from the mean of the waves from now on; collective.
+
+        Contact does not depend on it, but the digits that a large constant costs do.
+        """
+        if self.waves is not None:
+            owner = self.fft.columns.start == 0 < self.fft.columns.stop
+            mean = self.slab.sum(float(self.waves[0, 0].real) if owner else 0.0)[0] / (self.fft.mx * self.fft.my)
+            self.datum += mean / self.scale
+            if owner:
+                self.waves[0, 0] = 0.0
 
     def heights(self, shift: tuple[float, float], out: Array) -> Array:
         """Heights of the surface moved by `shift` [m], this rank's rows; collective."""
