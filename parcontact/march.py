@@ -3,18 +3,21 @@
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
+from . import failure
 from .clock import Step, steps
-from .errors import RunError
+from .failure import StepError
 from .parallel import rows
 from .parallel.slab import Array
 from .physics import loops
 from .physics.energy import ElasticEnergy, ZenerEnergy
 from .physics.material import Zener
 from .record.row import Row
-from .scene import Scene
+from .scene import Scene, solver_on
+from .solve import retry
 from .solve.contact import Approach, Contact, MeanPressure
 
 Task = Callable[["March"], bool | None]
@@ -40,15 +43,16 @@ class March:
         return self.scene.solver.p
 
     def advance(self, step: Step) -> Row:
-        """Solve one step and commit it; collective. Raises RunError when the solve fails and the job forbids that."""
+        """Solve one step and commit it; collective. Raises StepError, and is as before, when that cannot be."""
         began, tally = time.perf_counter(), self.scene.slab.tally
         calls = tally["operator"]
         heights = self.scene.path.at(step.position)
         alpha, effective = self.scene.material.begin(step.dt, heights)
+        control = self._control(step, alpha, effective)
         self._start(step, alpha)
-        contact = self.scene.solver.solve(effective, self._control(step, alpha, effective))
-        if contact.failure and not self.scene.job.numerics.accept_unconverged:
-            raise RunError(self._failure(step, contact))
+        contact, remark = self.scene.solver.solve(effective, control), ""
+        if contact.failure and not self._accepts(contact):
+            contact, remark = self._again(step, effective, control, contact)
         measures = self.scene.ledger.measures(contact.p, alpha, contact.u, effective, contact.d, step.position)
         self.scene.material.commit(contact.u, heights)
         self.alpha_old, self.alpha = self.alpha, alpha
@@ -66,6 +70,7 @@ class March:
             tally["operator"] - calls,
             *self._energies(),
             seconds=time.perf_counter() - began,
+            remark=remark,
         )
         for follow in self.scene.followers:
             follow(self)
@@ -108,14 +113,47 @@ class March:
             rounding = ROUND_OFF * (abs(step.load) + abs(datum) + scene.frame.height) / scene.units.height
             if d + mean > rounding:
                 most = -mean * scene.units.height - datum
-                raise RunError(
+                raise StepError(
                     f"step {step.number}: an approach of {step.load:g} m is beyond full contact, which a periodic body "
                     f"reaches at {most:g} m; prescribe a pressure instead"
                 )
 
-    def _failure(self, step: Step, contact: Contact) -> str:
-        name = self.scene.job.history[step.stage].name
-        return f"step {step.number} at t = {step.time:g} s (stage {name!r}): the contact solve {contact.failure}"
+    def _accepts(self, contact: Contact) -> bool:
+        """Whether the job takes a solve that did not reach the tolerance."""
+        return self.scene.job.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
+
+    def _again(
+        self, step: Step, effective: Array, control: MeanPressure | Approach, failed: Contact
+    ) -> tuple[Contact, str]:
+        """Retry a solve that failed; the contact, and what to say of it. Raises StepError when nothing helps."""
+        scene = self.scene
+        contact, tried = retry.again(scene.solver, effective, control, failed, partial(solver_on, scene.frame))
+        if contact.failure:
+            error = failure.of_solve(scene, step, failed, contact, tried, effective, self._cells(step))
+            self._take_back()
+            raise error
+        what = f"{failure.where(scene, step)}: the contact solve {failed.failure}"
+        return contact, f"{what}; solved when retried with {', with '.join(tried)}"
+
+    def _cells(self, step: Step) -> float:
+        """By how many cells the surface moves in a step."""
+        grid, (x, y), (new_x, new_y) = self.scene.job.grid, self.position, step.position
+        return math.hypot((new_x - x) / grid.dx, (new_y - y) / grid.dy)
+
+    def _take_back(self) -> None:
+        """Be as before a step whose solve has failed.
+
+        The last pressure is kept, the one before it, from which the next would be extrapolated, is lost. A history of
+        single solves keeps no pressure but the one that the solve has spoilt: its next solve starts from none.
+        """
+        solver = self.scene.solver
+        last = self.p_old
+        if last is None:
+            solver.p.fill(0.0)
+        else:
+            solver.p, self.p_old = last, solver.p
+            self.p_old.fill(0.0)
+        self._u = solver.operator.apply(solver.p, solver.u)
 
     def _account(self, step: Step, contact: Contact) -> None:
         energy = self.scene.energy

@@ -7,6 +7,7 @@ from itertools import islice
 from . import march, restart, scene, state, steadystart, watch
 from .clock import Step, reached, steps
 from .errors import InputError, RunError
+from .failure import StepError
 from .job import Job, Rough
 from .march import March
 from .parallel.slab import Slab
@@ -137,12 +138,29 @@ class _Journey:
             self.console.say(f"goes on after step {self.first} from {origin.contents.path}")
         ended = march.done(self.march, [self.decide] if origin else [self.record, self.decide])
         if not ended:
-            march.run(self.march, [self.record, self.decide], islice(self.timeline, self.first, None))
+            self._march()
         if self.saved != self.march.row.step:
             self.save(last=True)
         return self._farewell()
 
+    def _march(self) -> None:
+        try:
+            march.run(self.march, [self.record, self.decide], islice(self.timeline, self.first, None))
+        except StepError as error:
+            raise RunError(f"{error}{self._left()}") from error
+
+    def _left(self) -> str:
+        """Leave a checkpoint of the last good step; what to say of it."""
+        try:
+            if self.saved != self.march.row.step:
+                self.save(last=True)
+        except RunError as error:
+            return f"; {error}"
+        return self._newest()
+
     def record(self, marching: March) -> None:
+        if marching.row.remark:
+            self.console.say(marching.row.remark)
         self.recorder.write(marching.row, marching.field)
 
     def decide(self, marching: March) -> bool:

@@ -4,7 +4,7 @@ Each effect is one object handed to the march; an effect that a job does not cal
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -123,20 +123,21 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     path: Path = way(base.surface, base.dtype)
     branches = condensed(job, until)
     material = _material(base, branches)
-    solver = ContactSolver(
-        slab,
-        _operator(base),
-        _preconditioner(base),
-        base.height / base.units.height,
-        job.numerics.tolerance,
-        job.numerics.max_iterations,
-        base.dtype,
-    )
+    solver = _solver(base, job.numerics.tolerance)
     energy = _energy(job, solver, material) if calls_for.energies(job).on else None
     ledger = Ledger(slab, base.surface, base.units)
     scene = Scene(base, path, branches, material, solver, ledger, energy, calls_for.lasting(job).on)
     scene.followers += [make(scene) for decide, make in FURTHER if decide(job).on]
     return scene
+
+
+def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
+    """A solver for the body of a frame on another grid, for a retry; collective.
+
+    Its transforms are not measured: which plans are the fastest may turn out otherwise after a restart, and with other
+    plans other last digits.
+    """
+    return _solver(replace(base, slab=slab, fft=FFT(slab, dtype=base.dtype, measured=False)), tolerance)
 
 
 def facts(built: Scene) -> list[str]:
@@ -220,17 +221,23 @@ def _material(base: Frame, branches: Condensed) -> Elastic | Zener:
     return Zener(base.slab, base.prony, integrator, base.dtype, branches.memoryless, branches.frozen)
 
 
+def _solver(base: Frame, tolerance: float) -> ContactSolver:
+    height, limit = base.height / base.units.height, base.job.numerics.max_iterations
+    return ContactSolver(base.slab, _operator(base), _preconditioner(base), height, tolerance, limit, base.dtype)
+
+
 def _operator(base: Frame) -> halfspace.Convolution:
     poisson = base.job.material.poisson
     if calls_for.isolated(base.job).on:
-        return halfspace.free(base.slab, base.size, poisson, base.dtype)
+        return halfspace.free(base.slab, base.size, poisson, base.dtype, base.fft.measured)
     return halfspace.periodic(base.fft, base.size, poisson, base.job.numerics.kernel)
 
 
 def _preconditioner(base: Frame) -> halfspace.Convolution | halfspace.Narrowed:
     poisson = base.job.material.poisson
     if calls_for.mixed_precision(base.job).on:
-        return halfspace.Narrowed(halfspace.inverse(FFT(base.slab, dtype=np.float32), base.size, poisson))
+        narrow = FFT(base.slab, dtype=np.float32, measured=base.fft.measured)
+        return halfspace.Narrowed(halfspace.inverse(narrow, base.size, poisson))
     return halfspace.inverse(base.fft, base.size, poisson)
 
 

@@ -17,7 +17,6 @@ from .solve.contact import Certificate
 from .solve.steady import SteadyContact, SteadySolver
 from .theory.viscoelastic import Prony
 
-COARSEST = 32  # points: no coarser grid is used to start from
 COARSE_TOLERANCE = 1e-3  # of the certificate on all grids but the finest
 Vector = tuple[float, float]
 
@@ -214,13 +213,11 @@ class SteadySliding:
 
 
 def _coarser(level: Level) -> Level | None:
-    """The grid of twice the cell, along each direction where points are even and enough; None if there is none."""
-    slab = level.slab
-    nx, ny = (n // 2 if n % 2 == 0 and n >= 2 * COARSEST else n for n in (slab.nx, slab.ny))
-    if (nx, ny) == (slab.nx, slab.ny):
+    """The next coarser grid, if there is one."""
+    coarse = regrid.coarser(level.slab)
+    if coarse is None:
         return None
-    coarse = slab.resized(nx, ny)
-    return Level(coarse, FFT(coarse, dtype=level.fft.dtype), regrid.restrict(slab, coarse, level.heights))
+    return Level(coarse, FFT(coarse, dtype=level.fft.dtype), regrid.restrict(level.slab, coarse, level.heights))
 
 
 def _stiffness(slab: Slab, operator: halfspace.Convolution, dtype: type[np.floating]) -> float:

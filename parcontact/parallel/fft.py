@@ -67,12 +67,18 @@ class FFT:
     """Plans and buffers of one transform size, made once.
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)` (default: equal to
-    it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either. Making and calling one are
-    collective.
+    it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either; `measured`: FFTW tries
+    which plan is the fastest, else it guesses, the same every time. Making and calling one are collective.
     """
 
-    def __init__(self, slab: Slab, lengths: tuple[int, int] | None = None, dtype: DTypeLike = np.float64) -> None:
-        self.slab = slab
+    def __init__(
+        self,
+        slab: Slab,
+        lengths: tuple[int, int] | None = None,
+        dtype: DTypeLike = np.float64,
+        measured: bool = True,
+    ) -> None:
+        self.slab, self.measured = slab, measured
         self.mx, self.my = lengths or (slab.nx, slab.ny)
         if self.mx < slab.nx or self.my < slab.ny:
             raise ValueError(f"transform lengths {self.mx, self.my} are shorter than the map {slab.nx, slab.ny}")
@@ -191,17 +197,18 @@ class FFT:
     def _make_plans(self) -> None:
         heights = {rows.stop - rows.start for rows in self._blocks}
         waves = {height: self._waves(slice(0, height)) for height in heights}
-        self._x_forward = {height: _plan(self._row_block[:height], waves[height], axis=1) for height in heights}
-        self._x_backward = {height: _plan(waves[height], self._row_block[:height], axis=1) for height in heights}
+        self._x_forward = {height: self._plan(self._row_block[:height], waves[height], axis=1) for height in heights}
+        self._x_backward = {height: self._plan(waves[height], self._row_block[:height], axis=1) for height in heights}
         if self.spectrum.size:
-            self._y_forward = _plan(self.spectrum, self.spectrum, axis=0)
-            self._y_backward = _plan(self.spectrum, self.spectrum, axis=0, backward=True)
+            self._y_forward = self._plan(self.spectrum, self.spectrum, axis=0)
+            self._y_backward = self._plan(self.spectrum, self.spectrum, axis=0, backward=True)
 
-
-def _plan(source: NDArray[np.inexact], target: NDArray[np.inexact], axis: int, backward: bool = False) -> pyfftw.FFTW:
-    backward = backward or np.isrealobj(target)
-    flags = ("FFTW_MEASURE", "FFTW_DESTROY_INPUT") if backward else ("FFTW_MEASURE",)
-    return pyfftw.FFTW(source, target, (axis,), "FFTW_BACKWARD" if backward else "FFTW_FORWARD", flags)
+    def _plan(
+        self, source: NDArray[np.inexact], target: NDArray[np.inexact], axis: int, backward: bool = False
+    ) -> pyfftw.FFTW:
+        backward = backward or np.isrealobj(target)
+        flags = ("FFTW_MEASURE" if self.measured else "FFTW_ESTIMATE", *("FFTW_DESTROY_INPUT",) * backward)
+        return pyfftw.FFTW(source, target, (axis,), "FFTW_BACKWARD" if backward else "FFTW_FORWARD", flags)
 
 
 class Transpose:

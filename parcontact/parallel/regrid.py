@@ -4,6 +4,14 @@ import numpy as np
 
 from .slab import Array, Slab
 
+COARSEST = 32  # points: there is no coarser grid
+
+
+def coarser(slab: Slab) -> Slab | None:
+    """The grid of twice the cell, along each direction where points are even and enough; None if there is none."""
+    nx, ny = (n // 2 if n % 2 == 0 and n >= 2 * COARSEST else n for n in (slab.nx, slab.ny))
+    return None if (nx, ny) == (slab.nx, slab.ny) else slab.resized(nx, ny)
+
 
 def factors(fine: Slab, coarse: Slab) -> tuple[int, int]:
     """Cells of the fine grid per cell of the coarse one, along y and x."""

@@ -81,17 +81,23 @@ def inverse(fft: FFT, size: tuple[float, float], poisson: float = 0.5) -> Convol
     return Convolution(fft, q / (1.0 - poisson))
 
 
-def free(slab: Slab, size: tuple[float, float], poisson: float = 0.5, dtype: DTypeLike = np.float64) -> Convolution:
+def free(
+    slab: Slab,
+    size: tuple[float, float],
+    poisson: float = 0.5,
+    dtype: DTypeLike = np.float64,
+    measured: bool = True,
+) -> Convolution:
     """Pressure -> displacement of an unbounded half space loaded inside the box only: Love's coefficients, zero padded.
 
     Padding to twice the box makes the cyclic convolution a linear one (paper, reference [12]); nobody outside sees it.
     """
     lengths = padded_lengths(slab.nx, slab.ny)
-    fft = FFT(slab, lengths, dtype)
+    fft = FFT(slab, lengths, dtype, measured)
     return Convolution(fft, tabulate(fft, size, partial(love, poisson=poisson)).real)
 
 
-def padded(nx: int, ny: int) -> tuple[int, int]:
+def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
     """Lengths of the transforms of a free half space: fast ones of at least twice the box."""
     return pyfftw.next_fast_len(2 * nx), pyfftw.next_fast_len(2 * ny)
 
@@ -105,7 +111,7 @@ def tabulate(fft: FFT, size: tuple[float, float], coefficient: Callable[..., Arr
     padded = slab.resized(fft.mx, fft.my)
     x, y = (step * _distances(count) for step, count in ((dx, fft.mx), (dy, fft.my)))
     table = np.ascontiguousarray(coefficient(x[None, :], y[padded.rows, None], dx, dy))
-    return FFT(padded).forward(table)
+    return FFT(padded, measured=fft.measured).forward(table)
 
 
 def _distances(count: int) -> NDArray[np.int64]:

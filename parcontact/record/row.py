@@ -9,7 +9,10 @@ from ..solve.contact import Certificate
 
 @dataclass(frozen=True)
 class Row:
-    """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start."""
+    """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start.
+
+    `remark` is a sentence for run.log, or '': what was unusual about the step.
+    """
 
     step: int = 0
     time: float = 0.0
@@ -23,3 +26,4 @@ class Row:
     dissipated: float = math.nan
     branch_dissipation: tuple[float, ...] = ()
     seconds: float = 0.0
+    remark: str = ""

@@ -34,8 +34,9 @@ def solve(solver: ContactSolver, h: Array, control: MeanPressure | Approach) -> 
         iterations += search.solve_on_set()
         chosen = search.next_set()
         np.maximum(solver.p, 0.0, out=solver.p)
-        contact = solver.judge(h, control, f"found no contact among {count} sets of points")
-        if contact.converged or not np.isfinite(contact.certificate.worst):
+        spent = f" in max_iterations = {solver.max_iterations}" if iterations >= solver.max_iterations else ""
+        contact = solver.judge(h, control, f"found no contact among {count} sets of points{spent}")
+        if contact.converged or spent or not np.isfinite(contact.certificate.worst):
             break
         solver.working[...] = chosen
     return replace(contact, iterations=iterations)

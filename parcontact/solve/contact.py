@@ -139,11 +139,12 @@ class ContactSolver:
         self.p, self.u, self.w, self.t, self.r, self.spare = (slab.zeros(dtype) for _ in range(6))
         self.working = slab.zeros(np.bool_)
 
-    def solve(self, h: Array, control: MeanPressure | Approach) -> Contact:
+    def solve(self, h: Array, control: MeanPressure | Approach, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure in `self.p` (no value of it negative); collective.
 
-        Under load control the start is scaled to the load, or uniform where it is zero everywhere. A solve that does
-        not reach the tolerance says why in `failure`; its maps are then the last iterate, not a solution.
+        Under load control the start is scaled to the load, or uniform where it is zero everywhere. `length` is that of
+        a step over the exact one. A solve that does not reach the tolerance says why in `failure`; its maps are then
+        the last iterate, not a solution.
         """
         mean = control.value if isinstance(control, MeanPressure) else None
         if mean is not None and 0.0 <= mean < self.least:
@@ -162,7 +163,7 @@ class ContactSolver:
             self.r, self.spare = self.spare, self.r
             kernels.residual(self.working, self.u, h, balance.d + (excess / members if centred else 0.0), self.r)
             slope, old_product = self._turn(old_product, members, centred)
-            balance, halvings = self._descend(h, balance, slope, mean)
+            balance, halvings = self._descend(h, balance, length * slope, mean)
             iteration += 1
             if halvings:
                 shortened += 1

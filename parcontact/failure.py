@@ -1,0 +1,77 @@
+"""What to say of a step that failed: what happened, where, and what to change."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .clock import Step
+from .errors import RunError
+from .parallel.slab import Array
+from .scene import Scene
+from .solve.contact import Contact
+
+ROUNDINGS = 4.0  # of the largest length, over the surface's height: no certificate is sure to be better
+LONG = 1.5  # cells that a surface moves in a long step
+
+
+class StepError(RunError):
+    """A step that could not be made; the run is as it was before it."""
+
+
+def where(scene: Scene, step: Step) -> str:
+    return f"step {step.number} at t = {step.time:g} s (stage {scene.job.history[step.stage].name!r})"
+
+
+def of_solve(
+    scene: Scene, step: Step, failed: Contact, last: Contact, tried: list[str], h: Array, moved: float
+) -> StepError:
+    """A contact solve for heights h that has `failed`, also when `tried` in other ways, up to the `last`; collective.
+
+    `moved` is by how many cells the surface went in the step.
+    """
+    also = f", also with {', with '.join(tried)}" if tried else ""
+    changes = ", or ".join(_changes(scene, step, failed, last, h, moved))
+    return StepError(f"{where(scene, step)}: the contact solve {failed.failure}{also}; {changes}")
+
+
+def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array, moved: float) -> Iterator[str]:
+    """What may help, the likeliest first; collective up to its end."""
+    numerics = scene.job.numerics
+    if not np.isfinite(last.certificate.worst):
+        yield "look for heights, loads or moduli that are not finite or too far apart"
+        return
+    reach, sharp = _reach(scene, last.u, h), _sharp(scene, h)
+    if numerics.tolerance < reach:
+        yield f"{numerics.precision} precision reaches only about {reach:.1g} here: try a larger numerics.tolerance"
+        if numerics.precision == "single":
+            yield "numerics.precision: mixed"
+        return
+    if "max_iterations" in failed.failure:
+        yield f"try numerics.max_iterations above {numerics.max_iterations}"
+    if moved > LONG:
+        yield f"try smaller steps: in this one the surface moves by {moved:.3g} cells"
+    elif step.dt > 0.0:
+        yield "try smaller steps"
+    if sharp > 1.0:
+        yield "try a finer grid: the surface has most of its curvature in waves of less than four cells"
+    yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
+
+
+def _reach(scene: Scene, u: Array, h: Array) -> float:
+    """The certificate that the rounding of displacements and heights allows; collective."""
+    largest = max(scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (u, h)]))
+    return ROUNDINGS * float(np.finfo(u.dtype).eps) * largest / scene.solver.height
+
+
+def _sharp(scene: Scene, h: Array) -> float:
+    """Squares of second differences over those of central ones, along x and y (this rank's rows); collective.
+
+    For a wave of n cells `tan^2(pi/n)`: above 1 where waves of less than four cells prevail.
+    """
+    h = h.astype(np.float64)
+    sums = [0.0, 0.0]
+    for low, middle, high in ((h[:, :-2], h[:, 1:-1], h[:, 2:]), (h[:-2], h[1:-1], h[2:])):
+        sums[0] += float(np.sum((high - 2.0 * middle + low) ** 2))
+        sums[1] += float(np.sum((high - low) ** 2))
+    second, central = scene.slab.sum(*sums)
+    return second / central if central > 0.0 else float(second > 0.0) * np.inf

@@ -1,0 +1,122 @@
+"""A failed solve is tried again, and only then."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics import halfspace
+from parcontact.solve import retry
+from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
+
+from .bodies import Map, rough, solver
+
+LOAD = MeanPressure(0.4)
+
+
+def factory(height: float, **options: Any) -> Callable[[Slab, float], ContactSolver]:
+    """Solvers of one body on any grid."""
+
+    def on(slab: Slab, tolerance: float) -> ContactSolver:
+        fft = FFT(slab, measured=False)
+        operator, inverse = halfspace.periodic(fft, (1.0, 1.0)), halfspace.inverse(fft, (1.0, 1.0))
+        return ContactSolver(slab, operator, inverse, height, tolerance, 500, **options)
+
+    return on
+
+
+def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options: Any) -> tuple[ContactSolver, Any, Any]:
+    """A solver after a solve that failed and its retry: the solver, the first contact, what came of the second."""
+    body = solver(h, **options)
+    first = body.solve(h, control)
+    assert first.failure
+    return body, first, retry.again(body, h, control, first, factory(np.ptp(h)))
+
+
+def test_shorter_steps_go_on_from_where_it_stood() -> None:
+    """Iterations run out just before the end."""
+    h = rough(128)
+    enough = solver(h).solve(h, LOAD).iterations
+    body, first, (contact, tried) = failed_and_again(h, max_iterations=enough - 1)
+    assert contact.converged
+    assert tried == ["shorter steps"]
+    assert first.iterations < contact.iterations < 2 * enough
+    assert body.slab.tally["retry"] == 1
+
+
+@pytest.mark.parametrize(("control", "bad"), [(LOAD, np.inf), (Approach(-0.02), np.inf), (Approach(-0.02), np.nan)])
+def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float) -> None:
+    """The nested start knows nothing of it: the contact is that of a good start, to the tolerance."""
+    h = rough(128)
+    body, good = solver(h, tolerance=1e-9), solver(h, tolerance=1e-9)
+    body.p[3, 4] = bad
+    with np.errstate(invalid="ignore"):
+        first = body.solve(h, control)
+        contact, tried = retry.again(body, h, control, first, factory(np.ptp(h)))
+    expected = good.solve(h, control)
+    assert "not finite" in first.failure
+    assert tried == ["a cold start on 3 nested grids"]
+    assert contact.converged
+    assert_allclose(contact.p, expected.p, atol=1e-7 * expected.p.max())
+
+
+def test_a_nested_start_saves_iterations() -> None:
+    """On the finest grid; so it helps where a cold start runs out of them."""
+    h = rough(256)
+    cold = solver(h).solve(h, LOAD).iterations
+    body = solver(h)
+    retry._nest(body, h, LOAD, factory(np.ptp(h)))
+    assert body.solve(h, LOAD).iterations <= 0.8 * cold
+
+
+def test_everything_is_tried_before_giving_up() -> None:
+    h = rough(64)
+    _, _, (contact, tried) = failed_and_again(h, max_iterations=2, tolerance=1e-12)
+    nested = "a cold start on 2 nested grids"
+    assert tried == ["shorter steps", nested, "sets of points"]
+    assert contact.failure == "found no contact among 1 sets of points in max_iterations = 2"
+    assert contact.iterations == 4 * 2
+
+
+def test_heights_that_are_not_finite_cannot_be_helped() -> None:
+    h = rough(64)
+    body = solver(h)
+    h[0, 0] = np.nan
+    with np.errstate(invalid="ignore"):
+        contact, tried = retry.again(body, h, LOAD, body.solve(h, LOAD), factory(1.0))
+    assert "not finite" in contact.failure
+    assert len(tried) == 1
+
+
+@pytest.mark.parametrize("shape", [(1, 64), (37, 41), (6, 128)])
+def test_grids_that_cannot_be_halved(shape: tuple[int, int]) -> None:
+    """Along a direction of few or odd points they stay as they are."""
+    h = np.random.default_rng(1).standard_normal(shape)
+    body = solver(h, tolerance=1e-9)
+    body.p.fill(np.inf)
+    with np.errstate(invalid="ignore"):
+        contact, tried = retry.again(body, h, LOAD, body.solve(h, LOAD), factory(np.ptp(h)))
+    assert contact.converged
+    grids = {37: 1, 1: 2, 6: 3}[shape[0]]
+    assert tried == ["a cold start" if grids == 1 else f"a cold start on {grids} nested grids"]
+
+
+@pytest.mark.mpi
+def test_all_ranks_agree(comm: MPI.Intracomm) -> None:
+    """On any number of ranks the retry finds the contact of one rank; ranks without rows of a coarse grid take part."""
+    whole = rough(64)
+    slab = Slab(comm, 64, 64)
+    h = whole[slab.rows].copy()
+    body = factory(np.ptp(whole))(slab, 1e-9)
+    body.p.fill(np.inf)
+    with np.errstate(invalid="ignore"):
+        contact, _ = retry.again(body, h, LOAD, body.solve(h, LOAD), factory(np.ptp(whole)))
+    alone = solver(whole, tolerance=1e-9).solve(whole, LOAD)
+    assert contact.converged
+    assert_allclose(contact.p, alone.p[slab.rows], atol=1e-7 * alone.p.max())
+    assert comm.allgather(contact.iterations) == [contact.iterations] * comm.size

@@ -1,0 +1,228 @@
+"""Steps that fail: tried again to the same digits on any restart, or given up with a good checkpoint and advice."""
+
+import re
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import begun, marched
+from mpi4py import MPI
+from numpy.typing import NDArray
+from test_restart import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
+
+from parcontact import state
+from parcontact.clock import steps
+from parcontact.errors import RunError
+from parcontact.failure import StepError
+from parcontact.march import March, run
+from parcontact.solve.contact import Contact, ContactSolver
+
+GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
+
+
+@pytest.fixture
+def bench(comm: MPI.Intracomm, shared_path: Path) -> Bench:
+    return Bench(comm, shared_path)
+
+
+# -- tried again ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def moody(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Solves that fail up to twice: how often is a matter of the contact, and so is the same when repeated."""
+    solve, refused = ContactSolver.solve, [0]
+
+    def refuse(solver: ContactSolver, h: Any, control: Any, length: float = 1.0) -> Contact:
+        contact = solve(solver, h, control, length)
+        if solver.slab.nx < GRID["points"][0]:
+            return contact
+        if refused[0] < solver.slab.sum(float(np.count_nonzero(contact.p)))[0] % 3:
+            refused[0] += 1
+            return replace(contact, failure="is refused")
+        refused[0] = 0
+        return contact
+
+    monkeypatch.setattr(ContactSolver, "solve", refuse)
+
+
+@pytest.mark.mpi
+@pytest.mark.usefixtures("moody")
+@pytest.mark.parametrize("name", ["viscoelastic", "free"])
+def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:
+    """Shorter steps and nested starts follow from the state before the step, whatever the process has done before."""
+    data = bench.job(name, grid=GRID, history=[{**PRESS, "pressure": 1e4}, {**SLIDE, "cells_per_step": 4}])
+    whole = bench.where / "whole"
+    assert bench.run(data, whole) == 0
+    total = len(rows(whole)) - 1
+    for step in (1, total // 2, total - 1) if bench.comm.size == 1 else (total // 2,):
+        part = cut(bench, whole, step)
+        assert bench.run(data, part) == 0
+        if bench.comm.rank == 0:
+            same(whole, part, total)
+    log = bench.comm.bcast((bench.where / "whole" / "run.log").read_text() if bench.comm.rank == 0 else "")
+    retried = re.findall(r"step \d+ at .*: the contact solve is refused; solved when retried with (.*)", log)
+    assert len({text.count(", with ") for text in retried}) >= 2
+    assert all(("nested grids" in text) == (", with " in text) for text in retried)
+    assert f", retry {sum(1 + text.count(', with ') for text in retried)}" in log
+
+
+def test_no_cost_where_nothing_fails() -> None:
+    """As many transforms, operators, reductions and bytes as a program without retries."""
+    data = {"grid": GRID, "surface": ROUGH, "material": ZENER, "history": [PRESS, SLIDE]}
+    march, found = marched(data)
+    tally = march.scene.slab.tally
+    assert tally["retry"] == 0
+    assert not any(row.remark for row in found)
+    assert {name for name in tally if name.startswith("fft ")} == {"fft 64x64 float64"}
+    solves = sum(row.operator_calls for row in found)
+    assert tally["operator"] == solves
+
+
+# -- given up ---------------------------------------------------------------------------------------------------------
+
+
+def remembered(march: March) -> dict[str, NDArray[Any]]:
+    """What a step must leave alone when it fails."""
+    return {name: np.array(entry.value) for name, entry in state.entries(march).items()}
+
+
+@pytest.mark.parametrize("material", [ELASTIC, ZENER])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) -> None:
+    """But the pressure before the last; the step can be made again, and ends where it would have ended.
+
+    Both solve to a certificate of 1e-9.
+    """
+    slide = {"name": "slide", "pressure": 1e5, "velocity": [0.2, 0.1], "duration": 4e-4, "time_step": 1e-4}
+    data = {
+        "grid": {**GRID, "boundary": boundary},
+        "surface": SPHERE if boundary == "free" else ROUGH,
+        "material": material,
+        "history": [PRESS, slide],
+        "numerics": {"tolerance": 1e-9},
+        "output": {"energy": True},
+    }
+    smooth, march = begun(data), begun(data)
+    before: dict[str, Any] = {}
+    shown: list[NDArray[Any]] = []
+
+    def spoil(now: March) -> None:
+        if now.row.step == 7:
+            before.update(remembered(now))
+            shown[:] = [now.field(name).copy() for name in ("pressure", "displacement", "gap")]
+            now.scene.solver.max_iterations = 0
+
+    run(smooth, [])
+    with pytest.raises(StepError, match=r"step 8 at t = \S+ s \(stage 'slide'\): the contact solve did not converge"):
+        run(march, [spoil])
+    after = remembered(march)
+    earlier = before.pop(EARLIER), after.pop(EARLIER)
+    assert earlier[0].any()
+    assert not earlier[1].any()
+    assert before.keys() == after.keys()
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+    assert march.row.step == 7
+    for name, old in zip(("pressure", "displacement", "gap"), shown, strict=True):
+        assert np.array_equal(march.field(name), old)
+    march.scene.solver.max_iterations = 500
+    job = march.scene.job
+    run(march, [], islice(steps(job.history, job.grid), 7, None))
+    limit = 1e-6 * smooth.row.measures.max_pressure
+    np.testing.assert_allclose(march.field("pressure"), smooth.field("pressure"), atol=limit)
+    assert march.row.dissipated == pytest.approx(smooth.row.dissipated, rel=1e-6)
+
+
+LIGHT = {**PRESS, "pressure": 2e4}
+HEAVY = {"name": "heavy", "pressure": 1e7}
+SINGLE = {"precision": "single", "tolerance": 1e-6}  # which rounding allows under the small load, not under the large
+EARLIER = "contact/earlier pressure"
+
+
+def failed(bench: Bench, history: list[dict[str, Any]], numerics: dict[str, Any]) -> tuple[dict[str, Any], Path, str]:
+    """A free job that fails in its last stage: the job, its directory, and what it says; and a run up to there."""
+    data = bench.job("free", grid=GRID, surface=ROUGH, history=history, numerics=numerics)
+    data["checkpoint"] = {"minutes": 100}
+    out = bench.where / "out"
+    with pytest.raises(RunError) as raised:
+        bench.run(data, out)
+    assert bench.run(data | {"history": history[:-1]}, bench.where / "clean") == 0
+    return data, out, str(raised.value)
+
+
+@pytest.mark.mpi
+def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
+    """Of the last good step: what a run to there has; the run goes on from it when the job has been mended."""
+    data, out, said = failed(bench, [LIGHT, HEAVY], SINGLE)
+    last = out / "checkpoint" / "step-5.h5"
+    assert "step 6 at t = 0.001 s (stage 'heavy'): the contact solve stalled" in said
+    assert "single precision reaches only about " in said
+    assert said.endswith(f"numerics.precision: mixed; the newest checkpoint is {last}")
+    if bench.comm.rank == 0:
+        found, clean = maps(last), maps(bench.where / "clean" / "checkpoint" / last.name)
+        assert {name for name in clean if found[name] != clean[name]} <= {EARLIER, f"checksums/{EARLIER}"}
+        assert rows(out) == rows(bench.where / "clean")
+    bench.comm.Barrier()
+    assert bench.run(data | {"numerics": {**SINGLE, "tolerance": 1e-3}}, out) == 0
+    if bench.comm.rank == 0:
+        assert [row["step"] for row in rows(out)] == [str(step) for step in range(7)]
+
+
+def test_approach_beyond_full_contact_leaves_a_checkpoint(bench: Bench) -> None:
+    """It is refused before it is tried: not even the extrapolation is lost."""
+    closed = {"name": "closed", "approach": 1e-3}
+    data = bench.job("viscoelastic", history=[PRESS, closed]) | {"checkpoint": {"minutes": 100}}
+    out, clean = bench.where / "out", bench.where / "clean"
+    with pytest.raises(RunError, match=r"beyond full contact.*; the newest checkpoint is .*step-5\.h5"):
+        bench.run(data, out)
+    assert bench.run(data | {"history": [PRESS]}, clean) == 0
+    if bench.comm.rank == 0:
+        assert maps(out / "checkpoint" / "step-5.h5") == maps(clean / "checkpoint" / "step-5.h5")
+    bench.comm.Barrier()
+
+
+# -- what to change ---------------------------------------------------------------------------------------------------
+
+RUBBER = {"model": "elastic", "shear_modulus": 1e6}
+SAW = {"shape": "wave", "amplitude": 1e-6, "waves": [32, 32]}
+ADVICE: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+    ({"max_iterations": 2}, {}, "try numerics.max_iterations above 2, or try numerics.tolerance above "),
+    ({"tolerance": 1e-18}, {}, "double precision reaches only about "),
+    ({"tolerance": 1e-18, "precision": "mixed"}, {}, "mixed precision reaches only about "),
+    ({"max_iterations": 1, "tolerance": 1e-9}, {"surface": [ROUGH, SAW]}, "a finer grid: the surface has most of its"),
+]
+
+
+@pytest.mark.parametrize(("numerics", "changes", "advice"), ADVICE)
+def test_advice(numerics: dict[str, Any], changes: dict[str, Any], advice: str) -> None:
+    data = {"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [{"pressure": 1e4}], "numerics": numerics}
+    with pytest.raises(StepError, match=re.escape(advice)):
+        marched(data | changes)
+
+
+def test_advice_on_long_steps() -> None:
+    """It is only given of a step in which the surface has moved."""
+    slide = {**SLIDE, "pressure": 1e4, "cells_per_step": 3}
+    march = begun({"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [slide]})
+    with pytest.raises(
+        StepError,
+        match=r"step 2 .*; try numerics\.max_iterations above \d+, or try smaller steps: in this "
+        r"one the surface moves by 2\.\d+ cells, or ",
+    ):
+        run(march, [lambda now: setattr(now.scene.solver, "max_iterations", now.row.step == 0 and 500)])
+
+
+def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
+    """But numbers that are not finite are never accepted."""
+    data = {"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [{"pressure": 1e4}]}
+    numerics = {"max_iterations": 2, "tolerance": 1e-9, "accept_unconverged": True}
+    march, found = marched(data | {"numerics": numerics})
+    assert found[-1].iterations == 2
+    assert march.scene.slab.tally["retry"] == 0
+    march = begun(data | {"numerics": numerics})
+    march.scene.path.at((0.0, 0.0)).base[0, 0] = np.nan
+    with pytest.raises(StepError, match="not finite"):
+        run(march, [])
