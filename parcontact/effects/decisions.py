@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from .. import job as jobs
 from ..clock import Step, steps
 from ..job import Job
+from .condensation import condensed
 from .relaxation import relaxation_of
 
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
@@ -32,6 +33,18 @@ def viscoelasticity(job: Job) -> Effect:
     count = relaxation_of(job).moduli.size
     what = "a branch relaxes" if count == 1 else f"{count} branches relax"
     return Effect("viscoelasticity", count > 0, what if count else "the body has one modulus and no memory")
+
+
+def condensation(job: Job) -> Effect:
+    """Branches far faster or slower than all that happens have no map (`physics/condense.py`)."""
+    name, found = "condensed branches", condensed(job)
+    if not found.folded:
+        return Effect(name, False, found.reason or "no branch is far faster or slower than all that happens")
+    kinds = ((found.memoryless, "memoryless"), (found.frozen, "frozen"))
+    folded = " and ".join(f"{len(numbers)} {kind}" for numbers, kind in kinds if numbers)
+    return Effect(
+        name, True, f"{folded} of {len(found.kept) + found.folded}; error of friction {found.bound:.2g} at most"
+    )
 
 
 def isolated(job: Job) -> Effect:
@@ -140,8 +153,8 @@ def mixed_precision(job: Job) -> Effect:
 
 
 TABLE: tuple[Decision, ...] = (
-    *(viscoelasticity, isolated, sliding, part_cells, lasting, steady_start, approach, mixed_precision, spectrum),
-    *(energies, energy_memory, branch_dissipation, fields, checkpoints),
+    *(viscoelasticity, condensation, isolated, sliding, part_cells, lasting, steady_start, approach, mixed_precision),
+    *(spectrum, energies, energy_memory, branch_dissipation, fields, checkpoints),
 )
 
 

@@ -1,0 +1,121 @@
+"""Plans against runs: five different jobs on 1 and 2 ranks, memory and time, predicted and measured.
+
+    .venv/bin/python scripts/check_plan.py [name ...]
+
+Each job is planned once by one process, as a user would (`parcontact plan --ranks 1,2`), then run on 1 and on 2 ranks.
+Memory is what root holds in maps (`map bytes at most` in run.log), to 10 %; time is that of the whole command, to 30 %.
+The resident memory of a rank is shown beside; it contains the program itself. Takes two to three minutes on two idle
+cores; on a busy machine the times say little.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+MATERIALS = Path(__file__).parents[1] / "jobs" / "materials"
+BIN = Path(sys.executable).parent
+MEMORY, TIME = 0.10, 0.30
+SECONDS = 4  # for which a job is tried
+
+ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2.5e-4, short_wavelength: SHORT, rms_slope: 0.02, seed: 1}"
+TYRE = f"{{include: {MATERIALS / 'synthetic_tyre.yaml'}}}"
+SLS = "{model: zener, modulus_inf: 0.275e6, branches: [{modulus: 2.475e6, relaxation_time: 1.0e-3}]}"
+ELASTIC = "{model: elastic, shear_modulus: 1.0e6}"
+JOBS = {
+    "elastic, eight loads": f"""
+grid: {{points: 1024, size: 1.0e-3}}
+surface: {ROUGH.replace("SHORT", "1.5625e-5")}
+material: {ELASTIC}
+history: [{", ".join(f"{{pressure: {p}}}" for p in (1e3, 2e3, 3e3, 5e3, 7e3, 1e4, 1.4e4, 2e4))}]
+output: {{fields: [pressure, gap]}}
+""",
+    "twelve branches, press and slide": f"""
+grid: {{points: 512, size: 1.0e-3}}
+surface: {ROUGH.replace("SHORT", "3.125e-5")}
+material: {TYRE}
+history:
+  - {{name: press, pressure: 1.0e5, duration: 1.0e-3, time_step: {{first: 1.0e-7, growth: 1.2}}}}
+  - {{name: slide, pressure: 1.0e5, velocity: 0.3, distance: 3.0e-4, cells_per_step: 1}}
+checkpoint: {{every: 100}}
+""",
+    "sphere that slides, energies": f"""
+grid: {{points: 256, size: 1.0e-2, boundary: free}}
+surface: {{shape: sphere, radius: 1.0e-2, center: [3.0e-3, 5.0e-3]}}
+material: {SLS}
+history: [{{force: 0.15, velocity: 0.046765, duration: 2.4e-2, time_step: 1.6e-4}}]
+numerics: {{tolerance: 1.0e-6}}
+output: {{energy: true}}
+""",
+    "mixed precision, elastic sliding": f"""
+grid: {{points: 1024, size: 1.0e-3}}
+surface: {ROUGH.replace("SHORT", "3.125e-5")}
+material: {ELASTIC}
+history: [{{pressure: 5.0e3, velocity: 0.3, distance: 6.0e-5, cells_per_step: 1}}]
+numerics: {{precision: mixed}}
+output: {{fields: [pressure], every: 20}}
+""",
+    "oblique sliding of a rubber": f"""
+grid: {{points: 384, size: 1.0e-3}}
+surface: {ROUGH.replace("SHORT", "6.25e-5")}
+material: {SLS}
+history: [{{pressure: 1.0e4, velocity: [0.02, 0.01], distance: 5.0e-4, time_step: 1.0e-4}}]
+""",
+}
+
+
+def main(names: list[str]) -> int:
+    wrong = 0
+    print(f"{'job':34}{'ranks':>6}{'maps [MB]':>22}{'':>7}{'time [s]':>20}{'':>7}{'resident':>10}")
+    print(f"{'':40}{'planned':>11}{'held':>11}{'':>7}{'planned':>10}{'took':>10}")
+    for name in names or JOBS:
+        with TemporaryDirectory() as directory:
+            path = Path(directory, "job.yaml")
+            path.write_text(JOBS[name])
+            planned = plan(path)
+            for ranks in (1, 2):
+                held, took, resident = run(path, ranks)
+                memory, seconds = planned[ranks]
+                errors = memory / held - 1.0, seconds / took - 1.0
+                wrong += (abs(errors[0]) > MEMORY) + (abs(errors[1]) > TIME)
+                print(
+                    f"{name:34}{ranks:6d}{memory:11.4g}{held:11.4g}{errors[0]:+7.0%}{seconds:10.3g}{took:10.3g}"
+                    f"{errors[1]:+7.0%}{resident:7.0f} MB",
+                    flush=True,
+                )
+    print("within 10 % of memory and 30 % of time" if not wrong else f"NOT within 10 % and 30 %: {wrong} of the errors")
+    return 1 if wrong else 0
+
+
+def plan(path: Path) -> dict[int, tuple[float, float]]:
+    """MB and seconds by number of ranks."""
+    words = [BIN / "parcontact", "plan", path, "--ranks", "1,2", "--seconds", str(SECONDS)]
+    said = subprocess.run(words, cwd=path.parent, env=environment(), capture_output=True, text=True, check=True).stdout
+    rows = re.findall(r"^ +(\d+) +(\S+) .* (\S+) s$", said, re.MULTILINE)
+    return {int(ranks): (float(memory), float(seconds)) for ranks, memory, seconds in rows}
+
+
+def run(path: Path, ranks: int) -> tuple[float, float, float]:
+    """MB of maps on root, seconds, and the largest resident memory of a rank [MB]."""
+    command = [] if ranks == 1 else [BIN / "mpirun", "-n", str(ranks)]
+    words = [str(word) for word in (*command, BIN / "parcontact", path, "--out", f"out{ranks}", "--quiet")]
+    began = time.perf_counter()
+    process = subprocess.Popen(words, cwd=path.parent, env=environment())
+    _, status, usage = os.wait4(process.pid, 0)
+    took = time.perf_counter() - began
+    if status:
+        raise SystemExit(f"{' '.join(words)} failed")
+    log = (path.parent / f"out{ranks}" / "run.log").read_text()
+    (held,) = re.findall(r"map bytes at most (\d+)", log)
+    return int(held) / 1e6, took, usage.ru_maxrss / 1e3
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
