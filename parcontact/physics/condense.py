@@ -209,6 +209,7 @@ class _Passing:
         self.held = decay * before + (self.moving if self.omega.any() else gain)
         return self.share(dropped, self.omega, phase.first)
 
+    @np.errstate(over="ignore")  # infinitely many relaxation times are all right
     def slow(self, phase: Phase) -> Array:
         self.time += phase.duration
         swing = np.pi if self.integrator == "backward-euler" else 2.0
