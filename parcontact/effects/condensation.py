@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import job as jobs
-from ..clock import fractions, steps
+from ..clock import Timeline, divided
 from ..job import Grid, Job
 from ..physics.condense import Band, Condensed, Phase, condense, nothing
 from ..theory.viscoelastic import Prony
@@ -50,38 +50,37 @@ def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     for index, stage in enumerate(job.history):
         end += stage.seconds
         longer = max(until - end, 0.0) if stage.seconds and index == len(job.history) - 1 else 0.0
-        ends = [0.0, *fractions(stage, job.grid)]
-        first, last = ((ends[i + 1] - ends[i]) * stage.seconds if stage.seconds else 0.0 for i in (0, -2))
+        ends = divided(stage, job.grid)
+        first, last = ((ends[i + 1] - ends[i]) * stage.seconds if stage.seconds else 0.0 for i in (0, ends.count - 1))
         yield Phase(stage.seconds + longer, first, last, stage.velocity, index in jumps)
 
 
 def _jumping(job: Job) -> set[int]:
     """The stages that begin with a jump of the load."""
-    return {step.stage for step in steps(job.history, job.grid, pressure=job.initial.pressure) if step.jump}
+    timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)
+    return {span.index for span in timeline.spans if span.jumps}
 
 
 def bands(job: Job) -> Iterator[Band]:
     """The waves of a job's surface. Round shapes and files may have every wave from the box to two cells."""
-    grid = job.grid
+    grid, only = job.grid, _only(job.grid)
+    longest = 2 * np.pi / max(grid.size)
+    finest = max(np.pi / min((cell for cell, n in _cells(grid) if n > 1), default=np.inf), longest)
     for shape in job.surface:
         if isinstance(shape, jobs.Wave) and any(shape.waves):
             kx, ky = (2 * np.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True))
-            yield Band(float(np.hypot(kx, ky)), float(np.hypot(kx, ky)), (kx, ky))
+            yield Band(float(np.hypot(kx, ky)), float(np.hypot(kx, ky)), finest, (kx, ky))
         elif isinstance(shape, jobs.Rough):
-            longest = min(shape.long_wavelength, max(grid.size))
-            yield Band(2 * np.pi / longest, 2 * np.pi / shape.short_wavelength, _only(grid))
+            low, high = (2 * np.pi / length for length in (shape.long_wavelength, shape.short_wavelength))
+            yield Band(max(low, longest), high, finest, only)
         elif isinstance(shape, jobs.Cylinder):
-            along = (1.0, 0.0) if shape.axis == "y" else (0.0, 1.0)
-            yield _every(grid, along)
+            yield Band(longest, finest, finest, (1.0, 0.0) if shape.axis == "y" else (0.0, 1.0))
         elif isinstance(shape, jobs.Sphere | jobs.HeightFile):
-            yield _every(grid, _only(grid))
+            yield Band(longest, finest, finest, only)
 
 
-def _every(grid: Grid, direction: tuple[float, float] | None) -> Band:
-    cells = [step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
-    longest = max(grid.size) if direction is None else grid.lx if direction[0] else grid.ly
-    shortest = 2 * min(cells, default=longest / 2)
-    return Band(2 * np.pi / longest, 2 * np.pi / min(shortest, longest), direction)
+def _cells(grid: Grid) -> Iterator[tuple[float, int]]:
+    return zip((grid.dx, grid.dy), grid.points, strict=True)
 
 
 def _only(grid: Grid) -> tuple[float, float] | None:
