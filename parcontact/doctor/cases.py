@@ -78,7 +78,7 @@ def examine(case: Case, comm: "MPI.Intracomm", precision: str = "double") -> Out
 
 def table(outcomes: Iterable[Outcome]) -> str:
     """In Markdown; numbered from 1."""
-    head = ("", "case", "expected", "came out nearest to its limit", "residual", "iterations", "")
+    head = ("", "case", "expected", "came out, nearest to its limit [SI]", "residual", "iterations", "")
     lines = [head, tuple("-" * len(word) for word in head)]
     for number, outcome in enumerate(outcomes, start=1):
         case, verdict = outcome.case, "WRONG" if outcome.wrong else "ok"

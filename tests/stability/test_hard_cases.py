@@ -5,8 +5,11 @@ may be off by 3e-4, and solves are to 1e-5.
 """
 
 import pytest
+from marching import ROOT
 from mpi4py import MPI
 
+from parcontact import __main__
+from parcontact.doctor import cases
 from parcontact.doctor.bench import Bench, Finding
 from parcontact.doctor.cases import CASES, Case, Outcome, examine, table
 
@@ -50,9 +53,28 @@ def test_a_case_that_goes_wrong_is_seen() -> None:
         bench.expect("peak", 1.0, 1.05, 0.1)
 
     outcome = examine(Case("name", "expected", wrong), MPI.COMM_SELF)
-    assert outcome.wrong == ["area 0.5 (0.6 +- 0.06)", "force nan (1 +- 0.1)"]
+    assert outcome.wrong == ["area = 0.5 (0.6 +- 0.06)", "force = nan (1 +- 0.1)"]
     assert "WRONG" in table([outcome])
     failed = Outcome(outcome.case, (), 0.0, 0, "the contact solve stalled")
     assert failed.wrong == ["the contact solve stalled"]
     assert Finding("gap", 0.0, 0.0, 0.0).ok
     assert not Finding("gap", 1e-300, 0.0, 0.0).ok
+
+
+@pytest.mark.parametrize(
+    ("allowed", "code", "said"), [(0.2, 0, "all is well"), (0.1, 1, "a case: area = 0.5 (0.6 +- 0.06)")]
+)
+def test_verb(
+    allowed: float, code: int, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = Case("a case", "an area", lambda bench: bench.expect("area", 0.5, 0.6, allowed))
+    monkeypatch.setattr(cases, "CASES", (case,))
+    assert __main__.main(["doctor"]) == code
+    assert capsys.readouterr().out.splitlines()[-1] == said
+
+
+def test_table_of_the_readme() -> None:
+    """It has every case, with what is expected of it."""
+    text = (ROOT / "README.md").read_text()
+    for number, case in enumerate(CASES, start=1):
+        assert f"| {number} | {case.name} | {case.expected} |" in " ".join(text.split())
