@@ -1,20 +1,24 @@
 """The instants of a history: every step follows from the job alone, so that a restart needs only a step's number."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import takewhile
+from typing import NamedTuple
 
 from .job import GeometricStep, Grid, Stage
 
 ROUND_OFF = 1e-9  # relative: a duration this close to a whole number of steps is one
+WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """One solve: it ends at `time` [s], `dt` [s] after the last, with the surface at `position` [m].
 
     `dt` = 0 is a jump, at an instant, of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is
-    dt over the dt of the step before, 0 where that was a jump: how far to extrapolate what changes smoothly.
+    dt over the dt of the step before, 0 where that was a jump: how far to extrapolate what changes smoothly. `passed`
+    is the number of steps that this one stands for besides its own.
     """
 
     number: int
@@ -26,6 +30,7 @@ class Step:
     control: str
     load: float
     growth: float
+    passed: int = 0
 
     @property
     def jump(self) -> bool:
@@ -42,62 +47,186 @@ def time_step(stage: Stage, grid: Grid) -> float:
     return stage.time_step or 0.0
 
 
-def fractions(stage: Stage, grid: Grid) -> list[float]:
-    """Ends of the steps of a stage as fractions of it: the last is 1, and no step is longer than asked for."""
-    if stage.seconds == 0.0:
-        return []
-    steps = stage.seconds / time_step(stage, grid)
-    growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
-    if growth == 1.0:
-        count = max(1, math.ceil(steps * (1.0 - ROUND_OFF)))
-        return [index / count for index in range(1, count + 1)]
-    count = max(1, math.ceil(math.log1p(steps * (growth - 1.0)) / math.log(growth) * (1.0 - ROUND_OFF)))
-    whole = math.expm1(count * math.log(growth))
-    return [*(math.expm1(index * math.log(growth)) / whole for index in range(1, count)), 1.0]
-
-
 def reached(time: float, until: float) -> bool:
     """Whether a time is the one asked for, or later."""
     return time >= until * (1.0 - ROUND_OFF)
 
 
-def steps(history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None) -> Iterator[Step]:
-    """All steps of a history, numbered from 1; step 0 is the initial state.
+@dataclass(frozen=True)
+class Fractions:
+    """Ends of `count` steps as fractions of their stage, each `growth` times as long as the one before.
+
+    The last is 1; what goes on beyond it goes on with the last step.
+    """
+
+    count: int
+    growth: float = 1.0
+
+    def __getitem__(self, index: int) -> float:
+        """The end of step `index`, from 1; 0 is the start of the stage."""
+        if index > self.count:
+            return 1.0 + (index - self.count) * (1.0 - self[self.count - 1])
+        if self.growth == 1.0 or index == self.count:
+            return index / self.count
+        return math.expm1(index * math.log(self.growth)) / math.expm1(self.count * math.log(self.growth))
+
+    def beyond(self, until: float) -> int:
+        """How many more steps it takes to reach the fraction `until`."""
+        step = 1.0 - self[self.count - 1]
+        more = max(0, math.ceil((until * (1.0 - ROUND_OFF) - 1.0) / step) - 1)
+        while not reached(self[self.count + more], until):
+            more += 1
+        return more
+
+
+def divided(stage: Stage, grid: Grid) -> Fractions:
+    """The steps of a stage: none is longer than asked for, and an instantaneous stage has none."""
+    if stage.seconds == 0.0:
+        return Fractions(0)
+    steps = stage.seconds / time_step(stage, grid)
+    growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
+    if growth == 1.0:
+        return Fractions(max(1, math.ceil(steps * (1.0 - ROUND_OFF))))
+    count = math.ceil(math.log1p(steps * (growth - 1.0)) / math.log(growth) * (1.0 - ROUND_OFF))
+    return Fractions(max(1, count), growth)
+
+
+@dataclass(frozen=True)
+class Span:
+    """The steps of one stage: after the first `before` of the history a jump or none, then `count` that last.
+
+    They start at `start` [s], with the surface at `origin` [m].
+    """
+
+    index: int
+    stage: Stage
+    before: int
+    jumps: bool
+    count: int
+    ends: Fractions
+    start: float
+    origin: tuple[float, float]
+
+    @property
+    def last(self) -> int:
+        """The number of its last step."""
+        return self.before + self.jumps + self.count
+
+    @property
+    def moves(self) -> bool:
+        return self.count > 0 and any(self.stage.velocity)
+
+    def time(self, index: int) -> float:
+        """When the step `index` of those that last ends [s]."""
+        return self.start + self.ends[index] * self.stage.seconds if index else self.start
+
+    def interval(self, index: int) -> float:
+        """How long the step `index` takes [s]: from the stage alone, as late instants may have no digits for it."""
+        return (self.ends[index] - self.ends[index - 1]) * self.stage.seconds
+
+    def position(self, index: int) -> tuple[float, float]:
+        """Where the surface then is [m]."""
+        slid = self.ends[index] * self.stage.seconds if index else 0.0
+        (x, y), (along_x, along_y) = self.origin, self.stage.velocity
+        return x + along_x * slid, y + along_y * slid
+
+    def step(self, number: int) -> Step:
+        """The step of this number of the history."""
+        index, stage = number - self.before - self.jumps, self.stage
+        facts = (stage.velocity, stage.control)
+        if index == 0:
+            return Step(number, self.index, self.start, 0.0, self.origin, *facts, stage.load.start, 0.0)
+        dt = self.interval(index)
+        growth = dt / self.interval(index - 1) if index > 1 else 0.0
+        load = stage.load.at(min(self.ends[index], 1.0))
+        return Step(number, self.index, self.time(index), dt, self.position(index), *facts, load, growth)
+
+
+class Timeline:
+    """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are kept, not their steps.
 
     Where the history ends before `until`, its last stage goes on with its last time step, velocity and load, to the
     first step that reaches it; a last stage that is one solve cannot go on. `pressure` [Pa] is that of the initial
     state, None for a virgin body.
     """
-    number, time, position = 0, 0.0, (0.0, 0.0)
-    before = None if pressure is None else ("pressure", pressure)
-    for index, stage in enumerate(history):
-        start, origin, last_dt = time, position, 0.0
-        facts = (stage.velocity, stage.control)
-        if _jumps(stage, before):
-            number += 1
-            yield Step(number, index, time, 0.0, position, *facts, stage.load.start, 0.0)
-        ends = fractions(stage, grid)
-        last = index == len(history) - 1
-        for fraction in _beyond(ends, (until - start) / stage.seconds) if last and ends else ends:
-            number += 1
-            end = start + fraction * stage.seconds
-            dt, time = end - time, end
-            slid = fraction * stage.seconds
-            position = (origin[0] + stage.velocity[0] * slid, origin[1] + stage.velocity[1] * slid)
-            growth = dt / last_dt if last_dt else 0.0
-            yield Step(number, index, time, dt, position, *facts, stage.load.at(min(fraction, 1.0)), growth)
-            last_dt = dt
-        before = (stage.control, stage.load.end)
+
+    def __init__(
+        self, history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None
+    ) -> None:
+        self.spans: list[Span] = []
+        number, time, position = 0, 0.0, (0.0, 0.0)
+        before = None if pressure is None else ("pressure", pressure)
+        for index, stage in enumerate(history):
+            ends = divided(stage, grid)
+            more = ends.beyond((until - time) / stage.seconds) if ends.count and index == len(history) - 1 else 0
+            span = Span(index, stage, number, _jumps(stage, before), ends.count + more, ends, time, position)
+            self.spans.append(span)
+            number, time, position = span.last, span.time(ends.count), span.position(ends.count)
+            before = (stage.control, stage.load.end)
+        self._lasts = [span.last for span in self.spans]
+
+    def __len__(self) -> int:
+        return self._lasts[-1] if self._lasts else 0
+
+    def __getitem__(self, number: int) -> Step:
+        """The step of this number, from 1."""
+        if not 1 <= number <= len(self):
+            raise IndexError(number)
+        return self.span(number).step(number)
+
+    def __iter__(self) -> Iterator[Step]:
+        return self.after(0)
+
+    def after(self, number: int) -> Iterator[Step]:
+        """The steps that follow."""
+        return (self[later] for later in range(number + 1, len(self) + 1))
+
+    def span(self, number: int) -> Span:
+        """That of a step."""
+        return self.spans[bisect_left(self._lasts, number)]
+
+    @property
+    def end(self) -> float:
+        """When the last step ends [s]."""
+        return self[len(self)].time if self._lasts and len(self) else 0.0
+
+    @property
+    def lasts(self) -> bool:
+        """Whether there is more than jumps."""
+        return any(span.count for span in self.spans)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the surface leaves its place."""
+        return any(span.moves for span in self.spans)
+
+    def first_reaching(self, time: float) -> int:
+        """The number of the first step that reaches a time [s], or that of the last step."""
+        return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
+
+    def first_between_cells(self, grid: Grid) -> Step | None:
+        """The first step after which the surface is not moved by whole cells along x."""
+        for span in filter(lambda span: span.moves, self.spans):
+            (x, _), (slid, _) = span.origin, span.position(span.ends.count)
+            start, each = x / grid.dx, (slid - x) / grid.dx / span.ends.count
+            worst = abs(start - round(start)) + abs(each - round(each)) * span.count
+            if span.ends.growth == 1.0 and not span.stage.velocity[1] and worst < WHOLE / 2:
+                continue
+            for step in (span.step(number) for number in range(span.before + span.jumps + 1, span.last + 1)):
+                cells = step.position[0] / grid.dx
+                if step.position[1] != 0.0 or abs(cells - round(cells)) >= WHOLE:
+                    return step
+        return None
+
+    def shared(self, other: "Timeline") -> int:
+        """How many of the first steps are those of another history too, stage by stage."""
+        same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
+        return max((span.last for span, _ in same), default=0)
 
 
-def _beyond(ends: list[float], until: float) -> Iterator[float]:
-    """The ends of the steps of a stage, and on with the last step until the fraction `until` is reached."""
-    yield from ends
-    step = 1.0 - (ends[-2] if len(ends) > 1 else 0.0)
-    count = 0
-    while not reached(1.0 + count * step, until):
-        count += 1
-        yield 1.0 + count * step
+def steps(history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None) -> Iterator[Step]:
+    """The steps of a `Timeline`, one after the other."""
+    return iter(Timeline(history, grid, until, pressure))
 
 
 def _jumps(stage: Stage, before: tuple[str, float] | None) -> bool:

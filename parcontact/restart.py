@@ -4,7 +4,6 @@ import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from .clock import Step, steps
+from .clock import Step, Timeline
 from .errors import InputError
 from .job import HeightFile, Job, Stage
 from .jobfile.table import plain
@@ -112,12 +111,11 @@ def another_past(contents: Contents, job: Job) -> str:
     """Which of the steps already made would be another one in this job, or ''; those to come may be others."""
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
-    old_steps = islice(steps(history, job.grid, until, job.initial.pressure), number)
-    new_steps = islice(steps(job.history, job.grid, until, job.initial.pressure), number)
-    count = 0
-    for count, (old, new) in enumerate(zip(old_steps, new_steps, strict=False), 1):
-        if difference := next(_apart(old, new), ""):
-            return f"step {count} of the {number} already made {difference}"
+    old, new = (Timeline(stages, job.grid, until, job.initial.pressure) for stages in (history, job.history))
+    count = min(number, len(old), len(new))
+    for step in range(old.shared(new) + 1, count + 1):
+        if difference := next(_apart(old[step], new[step]), ""):
+            return f"step {step} of the {number} already made {difference}"
     return f"{number} steps were made, and the job has {count} up to t = {until:g} s" if count < number else ""
 
 

@@ -2,10 +2,9 @@
 
 import time
 from dataclasses import dataclass
-from itertools import islice
 
 from . import march, restart, scene, state, steadystart, watch
-from .clock import Step, reached, steps
+from .clock import Timeline, reached
 from .errors import InputError, RunError
 from .failure import StepError
 from .job import Job, Rough
@@ -39,7 +38,7 @@ def run(job: Job, slab: Slab, options: Options) -> int:
     directory = Directory(job.output.directory, slab)
     with Signals().noted() as signals, directory.claimed():
         origin, warnings = restart.choose(job, slab, directory, options.restart)
-        timeline = tuple(steps(job.history, job.grid, options.until or 0.0, job.initial.pressure))
+        timeline = Timeline(job.history, job.grid, options.until or 0.0, job.initial.pressure)
         _refuse_no_end(timeline, options.until)
         if origin and (reason := _nothing_to_do(origin, timeline, options.until)):
             if slab.root and not options.quiet:
@@ -65,16 +64,15 @@ def run(job: Job, slab: Slab, options: Options) -> int:
             recorder.close()
 
 
-def _refuse_no_end(timeline: tuple[Step, ...], until: float | None) -> None:
-    end = timeline[-1].time if timeline else 0.0
-    if until is not None and not reached(end, until):
+def _refuse_no_end(timeline: Timeline, until: float | None) -> None:
+    if until is not None and not reached(timeline.end, until):
         raise InputError(
-            f"--until {until:g} is beyond the end of the history, t = {end:g} s, and its last stage is one solve: "
-            "there is no time step to go on with"
+            f"--until {until:g} is beyond the end of the history, t = {timeline.end:g} s, and its last stage is one "
+            "solve: there is no time step to go on with"
         )
 
 
-def _nothing_to_do(origin: Origin, timeline: tuple[Step, ...], until: float | None) -> str:
+def _nothing_to_do(origin: Origin, timeline: Timeline, until: float | None) -> str:
     contents = origin.contents
     if contents.step >= len(timeline):
         return f"finished before, at t = {contents.time:g} s (--restart never runs it afresh, --until goes on)"
@@ -111,7 +109,7 @@ class _Journey:
     def __init__(
         self,
         marching: March,
-        timeline: tuple[Step, ...],
+        timeline: Timeline,
         directory: Directory,
         recorder: Recorder,
         watching: Watch,
@@ -145,7 +143,7 @@ class _Journey:
 
     def _march(self) -> None:
         try:
-            march.run(self.march, [self.record, self.decide], islice(self.timeline, self.first, None))
+            march.run(self.march, [self.record, self.decide], self.timeline.after(self.first))
         except StepError as error:
             raise RunError(f"{error}{self._left()}") from error
 

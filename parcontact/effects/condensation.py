@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import job as jobs
-from ..clock import Timeline, divided
+from ..clock import Timeline
 from ..job import Grid, Job
 from ..physics.condense import Band, Condensed, Phase, condense, nothing
 from ..theory.viscoelastic import Prony
@@ -45,20 +45,9 @@ def told_of(found: Condensed, prony: Prony) -> list[str]:
 
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
-    jumps = _jumping(job)
-    end = 0.0
-    for index, stage in enumerate(job.history):
-        end += stage.seconds
-        longer = max(until - end, 0.0) if stage.seconds and index == len(job.history) - 1 else 0.0
-        ends = divided(stage, job.grid)
-        first, last = ((ends[i + 1] - ends[i]) * stage.seconds if stage.seconds else 0.0 for i in (0, ends.count - 1))
-        yield Phase(stage.seconds + longer, first, last, stage.velocity, index in jumps)
-
-
-def _jumping(job: Job) -> set[int]:
-    """The stages that begin with a jump of the load."""
-    timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)
-    return {span.index for span in timeline.spans if span.jumps}
+    for span in Timeline(job.history, job.grid, until, job.initial.pressure).spans:
+        first, last = (span.time(n) - span.time(n - 1) if n else 0.0 for n in (min(1, span.count), span.count))
+        yield Phase(span.time(span.count) - span.start, first, last, span.stage.velocity, span.jumps)
 
 
 def bands(job: Job) -> Iterator[Band]:

@@ -4,16 +4,14 @@
 that is off allocates nothing, calls nothing and writes nothing.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from .. import job as jobs
-from ..clock import Step, steps
+from ..clock import Timeline
 from ..job import Job
 from .condensation import condensed
 from .relaxation import relaxation_of
-
-WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def isolated(job: Job) -> Effect:
 
 def sliding(job: Job) -> Effect:
     """A surface that moves."""
-    moves = any(any(step.position) for step in timeline(job))
+    moves = timeline(job).moves
     return Effect("sliding", moves, "the surface moves" if moves else "the surface stands in all stages")
 
 
@@ -69,18 +67,15 @@ def _part_cells(job: Job) -> tuple[bool, str]:
         return False, "the surface stands"
     if job.grid.boundary == "free":
         return True, "a free box is not cyclic: the heights are made anew"
-    for step in timeline(job):
-        cells = step.position[0] / job.grid.dx
-        if step.position[1] != 0.0:
-            return True, "the surface moves along y too"
-        if abs(cells - round(cells)) >= WHOLE:
-            return True, f"step {step.number} ends between cells"
-    return False, "every step is of whole cells along x"
+    step = timeline(job).first_between_cells(job.grid)
+    if step is None:
+        return False, "every step is of whole cells along x"
+    return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
 
 
 def lasting(job: Job) -> Effect:
     """The last pressure but one, from which the next one is extrapolated."""
-    lasts = any(not step.jump for step in timeline(job))
+    lasts = timeline(job).lasts
     return Effect("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
 
 
@@ -158,6 +153,6 @@ TABLE: tuple[Decision, ...] = (
 )
 
 
-def timeline(job: Job) -> Iterator[Step]:
+def timeline(job: Job) -> Timeline:
     """All steps of a job."""
-    return steps(job.history, job.grid, pressure=job.initial.pressure)
+    return Timeline(job.history, job.grid, pressure=job.initial.pressure)

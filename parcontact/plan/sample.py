@@ -139,4 +139,4 @@ def chosen(steps: Sequence[Step], share: float) -> Iterator[tuple[Step, float]]:
 def _leap(steps: Sequence[Step], first: int, stop: int) -> Step:
     """Some steps in one."""
     start = steps[first].time - steps[first].dt
-    return replace(steps[stop - 1], dt=steps[stop - 1].time - start, growth=0.0)
+    return steps[stop - 1]._replace(dt=steps[stop - 1].time - start, growth=0.0)

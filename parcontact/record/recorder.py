@@ -54,7 +54,7 @@ class Recorder:
 
     def _begin_fields(self, job: Job, provenance: Provenance, total: int, after: int | None) -> FieldsFile | None:
         path, output = self.path / "fields.h5", job.output
-        steps: Sequence[int] = [n for n in range(1, total + 1) if n % output.every == 0 or n == total]
+        steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), *([total] if total else [])})
         if not output.fields or not steps:
             if after is not None:
                 fields.cut_back(path, self.slab, after)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ...clock import Step, steps
+from ...clock import Timeline
 from ...errors import InputError
 from ...job import Job
 from ...parallel.slab import Array
@@ -50,15 +50,15 @@ class Run:
         return ("force", "N", pressure * self.area) if self.free else ("pressure", "Pa", pressure)
 
     @cached_property
-    def timeline(self) -> dict[int, Step]:
+    def timeline(self) -> Timeline:
         """What the job says about each step."""
         last = float(self._columns["time"][-1])
-        return {step.number: step for step in steps(self.job.history, self.job.grid, last, self.job.initial.pressure)}
+        return Timeline(self.job.history, self.job.grid, last, self.job.initial.pressure)
 
     @property
     def stages(self) -> NDArray[np.int64]:
         """The stage of every row; the initial state belongs to the first."""
-        return np.array([self.timeline[int(n)].stage if n else 0 for n in self.column("step")])
+        return np.array([self.timeline.span(int(n)).index if n else 0 for n in self.column("step")])
 
     @property
     def lasts(self) -> bool:
