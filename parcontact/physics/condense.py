@@ -242,9 +242,15 @@ class _Passing:
         """An error |dM| [Pa] of each wave and branch as a part of friction; waves at rest have `modulus` [Pa]."""
         moving = complex_modulus(self.omega, *self.prony)
         size = np.where(self.omega > 0.0, np.abs(moving), modulus)
-        error = (wrong / size[..., None]).max(axis=(0, 1))
+        error = _over(wrong, size[..., None]).max(axis=(0, 1))
         if self.omega.any():
             weight = self.omega[:-1] / self.omega[:-1].max(axis=1, keepdims=True)  # |qx|: w over q v
             loss = (weight * moving[:-1].imag).sum(axis=1)
-            error = error + (np.einsum("ij,ijk->ik", weight, wrong[:-1]) / loss[:, None]).max(axis=0)
+            error = error + _over(np.einsum("ij,ijk->ik", weight, wrong[:-1]), loss[:, None]).max(axis=0)
         return np.asarray(error)
+
+
+def _over(wrong: Array, size: Array) -> Array:
+    """An error as a part of a size: none if there is no error, infinite if there is no size (a fluid long at rest)."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return np.asarray(np.nan_to_num(wrong / size, nan=0.0, posinf=np.inf))
