@@ -46,8 +46,9 @@ def told_of(found: Condensed, prony: Prony) -> list[str]:
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
     for span in Timeline(job.history, job.grid, until, job.initial.pressure).spans:
-        first, last = (span.time(n) - span.time(n - 1) if n else 0.0 for n in (min(1, span.count), span.count))
-        yield Phase(span.time(span.count) - span.start, first, last, span.stage.velocity, span.jumps)
+        first, last = (span.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
+        duration = span.ends[span.count] * span.stage.seconds if span.count else 0.0
+        yield Phase(duration, first, last, span.stage.velocity, span.jumps)
 
 
 def bands(job: Job) -> Iterator[Band]:

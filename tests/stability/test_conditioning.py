@@ -101,3 +101,22 @@ def test_a_flat_file_is_flat(constant: float, tmp_path: Path) -> None:
     # an approach that just touches is full contact, but for rounding, and not beyond it
     march, rows = marched({**data, "history": [{"approach": -constant}, {"pressure": 1.0}]})
     assert_allclose(march.field("pressure"), 1.0, rtol=1e-9)
+
+
+# -- the datum of time -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("step", [2.5e-12, {"first": 1e-15, "growth": 10.0}])
+def test_a_short_stage_late_in_a_history(step: Any, tmp_path: Path) -> None:
+    """After 300 years an instant has no digits for picoseconds, a step must have them all: the body then does what it
+    does after a day, its memory being of 10 ps. To 1e-6 of the work, with solves to 1e-10."""
+
+    def work(rest: float) -> NDArray[np.float64]:
+        data = job(noise(2.0**-20), tmp_path, {"pressure": 3e4}, tolerance=1e-10)
+        data["material"]["branches"] = [{"modulus": 3e6, "relaxation_time": 1e-11}]
+        short = {"pressure": {"from": 3e4, "to": 5e4}, "duration": 1e-11, "time_step": step}
+        data["history"] = [{"pressure": 3e4, "duration": rest, "time_step": rest}, short]
+        _, rows = marched(data)
+        return column(rows, "work")[3:] - rows[2].work
+
+    assert_allclose(work(1e10), work(1e5), rtol=1e-6)
