@@ -26,6 +26,7 @@ def load_again(bench: Bench) -> None:
     virgin, again = rows[1].measures, rows[-1].measures
     t, u = np.array(middle).T
     bench.expect("at once", virgin.approach, 21.869e-6, 5e-3)
+    bench.expect("snap back", u[0], 67.231e-6, 5e-3)
     bench.expect_all("recovery", u / u[0], np.exp(-(t - t[0]) / CREEP), 2e-3)
     unloaded = [row.measures for row in rows if row.measures.pressure == 0.0]
     bench.expect("pressure without load", max(measures.max_pressure for measures in unloaded), 0.0, 0.0)
