@@ -73,7 +73,7 @@ class March:
             remark=remark,
         )
         for follow in self.scene.followers:
-            follow(self)
+            follow(self, step)
         return self.row
 
     # -- the parts of a step ------------------------------------------------------------------------------------------

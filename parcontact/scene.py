@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import job as jobs
+from .clock import Step
 from .effects import decisions as calls_for
 from .effects.condensation import condensed, told_of
 from .effects.decisions import Decision, Effect
@@ -30,7 +31,7 @@ from .physics.units import Units
 from .solve.contact import ContactSolver
 from .theory.viscoelastic import Prony
 
-Follower = Callable[[Any], None]  # an effect that is told of every step: called with the march when it is committed
+Follower = Callable[[Any, Step], None]  # an effect that is told of every step: called with the march and the step made
 
 
 FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat

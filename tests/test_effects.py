@@ -15,6 +15,7 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import runner, scene
+from parcontact.clock import Step
 from parcontact.effects import decisions as calls_for
 from parcontact.effects.decisions import Effect
 from parcontact.job import Job
@@ -260,20 +261,26 @@ def test_displacement_control() -> None:
     assert spent == before + 1 + of_solve + of_measures
 
 
-def test_followers() -> None:
-    """None by default; each is told of every step once it is made."""
-    planned = job(history=[PRESS])
-    march = begun(planned)
-    assert march.scene.followers == []
-    seen: list[int] = []
+def test_a_new_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line in the scene: it is in the table, and made where a job calls for it; it is told of every step made."""
 
-    def follow(marching: March) -> None:
-        seen.append(marching.row.step)
+    def titled(planned: Job) -> Effect:
+        return Effect("a new one", bool(planned.title), "the job has a title" if planned.title else "no title")
 
-    march.scene.followers.append(follow)
-    for step in calls_for.timeline(planned):
-        march.advance(step)
-    assert seen == [1, 2, 3, 4, 5]
+    class Follower:
+        def __init__(self, built: scene.Scene) -> None:
+            self.seen: list[int] = []
+
+        def __call__(self, march: March, step: Step) -> None:
+            assert march.row.step == step.number
+            self.seen.append(step.number)
+
+    assert begun(job(title="mine")).scene.followers == []
+    monkeypatch.setattr(scene, "FURTHER", ((titled, Follower),))
+    off, on = job(history=[PRESS]), job(history=[PRESS], title="mine")
+    assert [row(planned, "a new one").on for planned in (off, on)] == [False, True]
+    assert marched(off)[0].scene.followers == []
+    assert [follower.seen for follower in marched(on)[0].scene.followers] == [[1, 2, 3, 4, 5]]  # type: ignore[attr-defined]
 
 
 # -- what is written --------------------------------------------------------------------------------------------------
