@@ -1,0 +1,224 @@
+"""Branches without a map in whole runs: what they save and cost, and that restarts wake them."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+from marching import begun, column, load_script, marched
+from mpi4py import MPI
+from numpy.testing import assert_allclose, assert_array_equal
+
+from parcontact import job, runner, scene
+from parcontact.effects.condensation import bands, condensed, phases
+from parcontact.errors import InputError
+from parcontact.job import Job
+from parcontact.parallel.slab import Slab
+from parcontact.physics.condense import Band, Phase
+from parcontact.physics.material import Zener
+
+Json = dict[str, Any]
+
+NX, NY = 24, 10
+FAST, MIDDLE, SLOW, FROZEN = 1e-6, 1e-3, 3.0, 1e4  # relaxation times [s]; a step is 0.2 ms, the slide 2.5 ms
+SLIDE: Json = {"pressure": 1e5, "velocity": 0.2, "distance": 0.5e-3, "cells_per_step": 1}
+SHORT: Json = {"pressure": 1e5, "velocity": 0.2, "duration": 1e-6, "time_step": 5e-7}
+
+
+def data(*history: Json, times: tuple[float, ...] = (FAST, MIDDLE, SLOW, FROZEN), **changes: Any) -> Json:
+    """Two waves that slide on a body with terms of 1 MPa, in partial contact."""
+    material = {"modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": tau} for tau in times]}
+    return {
+        "grid": {"points": [NX, NY], "size": [1e-3, 0.4e-3]},
+        "surface": [{"shape": "wave", "amplitude": 4e-6, "waves": waves} for waves in ([2, 0], [1, 1])],
+        "material": {"model": "zener", **material},
+        "history": list(history) or [SLIDE],
+        "numerics": {"tolerance": 1e-9, **changes.pop("numerics", {})},
+        **changes,
+    }
+
+
+def sliding(*history: Json, **changes: Any) -> Job:
+    return Job.model_validate(data(*history, **changes))
+
+
+# -- from a job to its time scales -------------------------------------------------------------------------------------
+
+
+def test_phases_of_a_job() -> None:
+    """Stages with their jumps, steps and velocities; the last one goes on to the first step that reaches the end."""
+    press = {"pressure": {"from": 0.0, "to": 1e5}, "duration": 7e-3, "time_step": {"first": 1e-3, "growth": 2.0}}
+    raised = {**SLIDE, "pressure": 3e5, "velocity": [0.0, 0.1], "distance": 1e-4, "time_step": 4e-4}
+    del raised["cells_per_step"]
+    found = list(phases(sliding(press, SLIDE, {"pressure": 3e5}, raised), until=0.0111))
+    expected = [
+        Phase(7e-3, 1e-3, 4e-3, (0.0, 0.0), jump=False),
+        Phase(2.5e-3, 2.5e-3 / 12, 2.5e-3 / 12, (0.2, 0.0), jump=False),
+        Phase(0.0, 0.0, 0.0, (0.0, 0.0), jump=True),
+        Phase(5 / 3 * 1e-3, 1e-3 / 3, 1e-3 / 3, (0.0, 0.1), jump=False),
+    ]
+    for own, other in zip(found, expected, strict=True):
+        assert (own.velocity, own.jump) == (other.velocity, other.jump)
+        assert_allclose((own.duration, own.first, own.last), (other.duration, other.first, other.last), rtol=1e-9)
+
+
+def test_bands_of_surfaces() -> None:
+    """Waves have their own; roughness that of its waves; round shapes that of the box and the cells."""
+    finest = np.pi / (0.4e-3 / NY)
+    rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2e-4, "short_wavelength": 1e-4, "rms_slope": 0.1}
+    sphere, ridge = {"shape": "sphere", "radius": 1e-2}, {"shape": "cylinder", "radius": 1e-2, "axis": "x"}
+    found = list(bands(sliding(surface=[rough, sphere, ridge, {"shape": "flat"}])))
+    assert found == [
+        Band(2 * np.pi / 2e-4, 2 * np.pi / 1e-4, np.pi / (0.4e-3 / NY)),
+        Band(2 * np.pi / 1e-3, finest, finest),
+        Band(2 * np.pi / 1e-3, finest, finest, (0.0, 1.0)),
+    ]
+    wave = next(iter(bands(sliding(surface={"shape": "wave", "amplitude": 1e-6, "waves": [3, -1]}))))
+    assert wave.low == wave.high == np.hypot(3 * 2 * np.pi / 1e-3, 2 * np.pi / 0.4e-3)
+
+
+# -- what it saves and costs -------------------------------------------------------------------------------------------
+
+
+def test_folded_branches_have_no_map_and_friction_is_within_the_bound() -> None:
+    """Three of four branches: as many maps less, nothing else more; friction differs, but within the bound."""
+    (fewer, new), (whole, old) = (marched(sliding(numerics={"accuracy": accuracy})) for accuracy in (1e-2, 0.0))
+    found = fewer.scene.condensed
+    assert (found.kept, found.memoryless, found.frozen) == ((1,), (0,), (2, 3))
+    tallies = whole.scene.slab.tally, fewer.scene.slab.tally
+    assert tallies[0]["map bytes"] - tallies[1]["map bytes"] == 3 * 8 * NX * NY
+    friction = column(new, "friction"), column(old, "friction")
+    assert 0.2 < fewer.row.measures.contact_area < 0.9
+    wrong = np.max(np.abs(friction[0] - friction[1])) / friction[1][-1]
+    assert 0.01 * found.bound < wrong < found.bound <= 1e-2
+
+
+def test_nothing_to_fold_costs_nothing() -> None:
+    """All counts and all rows are those of a run that must not fold."""
+    runs = [marched(sliding(times=(MIDDLE,), numerics={"accuracy": accuracy})) for accuracy in (1e-3, 0.0)]
+    tallies = [march.scene.slab.tally for march, _ in runs]
+    assert runs[0][0].scene.condensed.folded == 0
+    assert tallies[0] == tallies[1]
+    for name in ("friction", "contact_area", "max_pressure"):
+        assert_array_equal(column(runs[0][1], name), column(runs[1][1], name))
+
+
+def test_energies_keep_every_branch() -> None:
+    found = begun(sliding(output={"energy": True})).scene
+    assert found.condensed.folded == 0
+    assert scene.facts(found)[0] == "branches: all 4 have a map: output.energy counts the energy of every branch"
+
+
+def test_a_steady_start_freezes_nothing() -> None:
+    """The memoryless branch has no map to fill."""
+    start = {"state": "steady", "velocity": 0.2, "pressure": 1e5}
+    fewer, whole = (
+        begun(sliding(initial=start, numerics={"tolerance": 1e-6, "accuracy": accuracy})).scene
+        for accuracy in (1e-3, 0.0)
+    )
+    assert (fewer.condensed.memoryless, fewer.condensed.frozen) == ((0,), ())
+    assert isinstance(fewer.material, Zener)
+    assert isinstance(whole.material, Zener)
+    assert_array_equal(fewer.material.branches, whole.material.branches[1:])
+
+
+def test_script() -> None:
+    """What scripts/condensation.py marches, on a grid so small that it says nothing about friction."""
+    script = load_script("condensation")
+    runs = [script.sliding(64, accuracy, 1e-1) for accuracy in (0.0, 1e-3)]
+    assert [len(rows) for rows in script.together(runs)] == [33, 33]
+    assert [len(run.scene.condensed.kept) for run in runs] == [12, 5]
+    assert script.memory_pass(runs[0]) > 0.0
+
+
+# -- restarts ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Place:
+    """Runs jobs in one output directory that all ranks see."""
+
+    comm: MPI.Intracomm
+    where: Path
+
+    def run(self, content: Json, name: str = "out", **options: Any) -> None:
+        path = self.where / f"{name}.yaml"
+        if self.comm.rank == 0:
+            path.write_text(yaml.safe_dump(content))
+        self.comm.Barrier()
+        loaded = job.load(path, [f"output.directory={self.where / name}", "checkpoint={every: 100}"])
+        runner.run(loaded, Slab(self.comm, *loaded.grid.points), runner.Options(quiet=True, **options))
+
+    def friction(self, name: str = "out") -> list[str]:
+        with (self.where / name / "measures.csv").open(newline="") as file:
+            return [row["friction"] for row in csv.DictReader(file)]
+
+    def maps(self, step: int, name: str = "out") -> dict[str, bytes]:
+        """The maps of a checkpoint."""
+        parts = ("contact", "material")
+        with h5py.File(self.where / name / "checkpoint" / f"step-{step}.h5") as file:
+            return {f"{part}/{key}": file[part][key][()].tobytes() for part in parts for key in file[part]}
+
+
+@pytest.fixture
+def place(comm: MPI.Intracomm, shared_path: Path) -> Place:
+    return Place(comm, shared_path)
+
+
+@pytest.mark.mpi
+def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
+    """Two pieces are the whole, and no map of a folded branch is in the checkpoint."""
+    content = data(numerics={"accuracy": 1e-2})
+    place.run(content, "whole")
+    place.run(content, until=1e-3)
+    place.run(content)
+    assert place.friction() == place.friction("whole")
+    assert place.maps(13) == place.maps(13, "whole")
+    assert [name for name in place.maps(13) if "branch" in name] == ["material/branch 1"]
+
+
+@pytest.mark.mpi
+def test_a_longer_run_wakes_frozen_branches(place: Place) -> None:
+    """In twice the time the slow branch is G u no more. Its map is made, and friction is that of a run that always had
+    it: within the accuracy, and not the same."""
+    content = data(numerics={"accuracy": 1.5e-3})
+    place.run(content)
+    before = place.maps(13)
+    place.run(content, until=5e-3)
+    place.run(content, "whole", until=5e-3)
+    assert "material/branch 2" not in before
+    assert "material/branch 2" in place.maps(25)
+    found, expected = (np.array([float(text) for text in place.friction(name)]) for name in ("out", "whole"))
+    assert 0.0 < np.max(np.abs(found - expected)) / expected[-1] < 1.5e-3
+
+
+def test_a_lower_accuracy_wakes_all_and_a_higher_one_folds(place: Place) -> None:
+    """Either way the run goes on; the branch that had no memory starts again with none."""
+    place.run(data(numerics={"accuracy": 1e-2}), until=1e-3)
+    place.run(data(numerics={"accuracy": 0.0}), until=2e-3)
+    assert sum("branch" in name for name in place.maps(11)) == 4
+    place.run(data(numerics={"accuracy": 1e-2}))
+    place.run(data(numerics={"accuracy": 0.0}), "whole")
+    assert sum("branch" in name for name in place.maps(13)) == 1
+    found, expected = (np.array([float(text) for text in place.friction(name)]) for name in ("out", "whole"))
+    assert 0.0 < np.max(np.abs(found - expected)) / expected[-1] < 1e-2
+
+
+def test_steps_too_short_for_a_branch_without_memory_are_refused(place: Place) -> None:
+    """A stage to come with shorter steps would need what the branch remembered; a fresh start does it."""
+    place.run(data(SLIDE))
+    with pytest.raises(InputError, match=r"has no map of the branch of relaxation time 1e-06 s: .*never"):
+        place.run(data(SLIDE, SHORT))
+    place.run(data(SLIDE, SHORT), restart="never", until=2e-4)
+
+
+def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
+    Place(MPI.COMM_SELF, tmp_path).run(data(numerics={"accuracy": 1e-2}), until=2e-4)
+    log = (tmp_path / "out" / "run.log").read_text()
+    bound = condensed(sliding(numerics={"accuracy": 1e-2})).bound
+    assert "branches: 1 of 4 have a map, memoryless 1e-06 s; frozen 3, 10000 s; " in log
+    assert f"wrong by at most {bound:.2g} of itself (numerics.accuracy 0.01)" in log
