@@ -41,8 +41,8 @@ FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relati
 class Frame:
     """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
 
-    `height` [m] is that of the surface from its lowest to its highest point (a cell's length if it is flat); `size` and
-    `prony` are the box and the relaxation function in the run's units (and seconds).
+    `height` [m] is that of the surface from its lowest to its highest point (the shorter side of a cell if it is flat);
+    `size` and `prony` are the box and the relaxation function in the run's units (and seconds).
     """
 
     job: Job
@@ -111,7 +111,7 @@ def frame(job: Job, slab: Slab) -> Frame:
     units = Units.near(height, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
     surface.rescale(units.height)
     scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    return Frame(job, slab, fft, surface, roughness, height or job.grid.dx, units, scaled)
+    return Frame(job, slab, fft, surface, roughness, height or min(job.grid.dx, job.grid.dy), units, scaled)
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
