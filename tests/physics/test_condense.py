@@ -162,6 +162,17 @@ def test_tyre_at_three_metres_per_second() -> None:
     assert found.bound <= 1e-3
 
 
+@pytest.mark.parametrize("accuracy", [1e-7, 1e-4, 1.5e-4, 3.3e-4, 4.1e-4, 1e-2])
+def test_errors_add_up_to_the_accuracy_at_most(accuracy: float) -> None:
+    """Half of it at most is for memoryless branches; one branch more of either kind would be too much."""
+    phases = [slide(5e-4 / 3, 1e-3 / 512 / 3, 3.0, jump=True)]
+    found = condense(TYRE, phases, [ROAD], "exponential", accuracy)
+    fast, slow = (np.array(errors) for errors in (found.memoryless_errors, found.frozen_errors))
+    assert fast[list(found.memoryless)].sum() <= accuracy / 2 < fast[: len(found.memoryless) + 1].sum()
+    kept = list(found.kept)
+    assert found.bound <= accuracy < found.bound + slow[kept].min()
+
+
 def test_no_accuracy_no_folding() -> None:
     found = condense(TYRE, [slide(1e-9, 1e-9)], [ROAD], "exponential", 0.0)
     assert found.folded == 0
