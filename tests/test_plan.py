@@ -10,7 +10,7 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import __main__, state
-from parcontact.clock import steps
+from parcontact.clock import Timeline
 from parcontact.effects import decisions as calls_for
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
@@ -102,8 +102,9 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
     """They follow each other without a gap, weigh as much as all, and end where all do."""
     stage = {**stage, **({"duration": 1e-2} if "duration" in stage else {"distance": 1e-2})}
     planned = job(history=[stage])
-    whole = list(steps(planned.history, planned.grid))
-    picked = list(chosen(whole, share))
+    timeline = Timeline(planned.history, planned.grid)
+    whole = list(timeline)
+    picked = list(chosen(timeline, range(1, len(timeline) + 1), share))
     assert sum(weight for _, weight in picked) == pytest.approx(len(whole), rel=1e-12)
     assert picked[0] == (whole[0], 1.0)
     assert picked[-1][0].time == whole[-1].time

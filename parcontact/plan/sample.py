@@ -6,13 +6,12 @@ short enough, is made as it is.
 """
 
 import time
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import groupby
+from itertools import islice
 
 from .. import scene, steadystart
-from ..clock import Step
+from ..clock import Step, Timeline
 from ..effects import decisions as calls_for
 from ..job import Job
 from ..march import March
@@ -68,9 +67,9 @@ class Sample:
 
     def of(self, job: Job) -> "Sample":
         """What this says of the same job on another grid: its number of steps may be another one in each stage."""
-        counts = Counter(step.stage for step in calls_for.timeline(job))
-        stages = tuple(replace(stage, steps=counts[index]) for index, stage in enumerate(self.stages))
-        return replace(self, stages=stages)
+        spans = calls_for.timeline(job).spans
+        stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(self.stages, spans, strict=True))
+        return replace(self, stages=tuple(stages))
 
 
 def sample(job: Job, slab: Slab, seconds: float) -> Sample:
@@ -81,24 +80,22 @@ def sample(job: Job, slab: Slab, seconds: float) -> Sample:
     if calls_for.steady_start(job).on:
         steadystart.begin(march)
     building = time.perf_counter() - began
-    return Sample(job, slab.comm.size, building, tuple(_try(march, tuple(calls_for.timeline(job)), seconds)))
+    return Sample(job, slab.comm.size, building, tuple(_try(march, calls_for.timeline(job), seconds)))
 
 
-def _try(march: March, timeline: Sequence[Step], seconds: float) -> list[Stage]:
+def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
     """The first steps tell how many can be afforded; root's clock decides for all ranks."""
     slab, began = march.scene.slab, time.perf_counter()
-    groups = [list(group) for _, group in groupby(timeline, key=lambda step: step.stage)]
-    stages = [Stage(len(group)) for group in groups]
+    stages = [Stage(span.jumps + span.count) for span in timeline.spans]
     per_call = float("inf")
-    for step in groups[0][:FIRST]:
+    for step in islice(timeline, FIRST):
         cost = _made(march, step)
-        stages[0].add(1.0, cost)
+        stages[step.stage].add(1.0, cost)
         per_call = min(per_call, cost["seconds"] / max(cost["operator"], 1.0))
-    del groups[0][:FIRST]
     left = max(seconds - (time.perf_counter() - began), 0.0)
-    affordable = slab.agree(left / (CALLS * per_call)) / max(sum(map(len, groups)), 1)
-    for stage, group in zip(stages, groups, strict=True):
-        for step, weight in chosen(group, affordable):
+    affordable = slab.agree(left / (CALLS * per_call)) / len(timeline)
+    for span, stage in zip(timeline.spans, stages, strict=True):
+        for step, weight in chosen(timeline, range(max(span.before, FIRST) + 1, span.last + 1), affordable):
             if slab.agree(time.perf_counter() - began > LATE * seconds):
                 return stages
             cost = _made(march, step)
@@ -116,27 +113,28 @@ def _made(march: March, step: Step) -> dict[str, float]:
     return {**counts, "seconds": time.perf_counter() - began}
 
 
-def chosen(steps: Sequence[Step], share: float) -> Iterator[tuple[Step, float]]:
+def chosen(timeline: Timeline, numbers: range, share: float) -> Iterator[tuple[Step, float]]:
     """The steps to make in place of those of a stage, and for how many each stands; about a `share` of them."""
-    jumps = [step for step in steps if step.jump]
-    lasting = [step for step in steps if not step.jump]
-    yield from ((step, 1.0) for step in jumps)
-    count = max(1, int(share * len(lasting) / (BLOCK + LONG)))
-    if count * (BLOCK + LONG) >= len(lasting):
-        yield from ((step, 1.0) for step in lasting)
+    if numbers and timeline[numbers[0]].jump:
+        yield timeline[numbers[0]], 1.0
+        numbers = numbers[1:]
+    count = max(1, int(share * len(numbers) / (BLOCK + LONG)))
+    if count * (BLOCK + LONG) >= len(numbers):
+        yield from ((timeline[number], 1.0) for number in numbers)
         return
     done = 0
-    for part in deal(len(lasting), count):
+    for part in deal(len(numbers), count):
         first = part.start + (part.stop - part.start - BLOCK) // 2
-        yield _leap(lasting, done, first), 0.0
-        yield lasting[first], 0.0
+        yield _leap(timeline, numbers[done:first]), 0.0
+        yield timeline[numbers[first]], 0.0
         done = first + BLOCK
-        yield from ((step, (part.stop - part.start) / (BLOCK - 1)) for step in lasting[first + 1 : done])
-    if done < len(lasting):
-        yield _leap(lasting, done, len(lasting)), 0.0
+        weight = (part.stop - part.start) / (BLOCK - 1)
+        yield from ((timeline[number], weight) for number in numbers[first + 1 : done])
+    if numbers[done:]:
+        yield _leap(timeline, numbers[done:]), 0.0
 
 
-def _leap(steps: Sequence[Step], first: int, stop: int) -> Step:
+def _leap(timeline: Timeline, numbers: range) -> Step:
     """Some steps in one."""
-    start = steps[first].time - steps[first].dt
-    return steps[stop - 1]._replace(dt=steps[stop - 1].time - start, growth=0.0)
+    first, last = timeline[numbers[0]], timeline[numbers[-1]]
+    return last._replace(dt=last.time - (first.time - first.dt), growth=0.0)
