@@ -115,7 +115,7 @@ def closed_by_load(bench: Bench) -> None:
         {"shape": "wave", "amplitude": share * HEIGHT, "waves": [x, y], "phase": 1.0 * x} for x, y, share in WAVES
     ]
     start = {"state": "steady", "velocity": velocity, "pressure": 1e6}
-    stage = {"pressure": 1e6, "velocity": velocity, "distance": 6 * WAVELENGTH, "cells_per_step": 1}
+    stage = {"pressure": 1e6, "velocity": velocity, "distance": 5 * WAVELENGTH, "cells_per_step": 1}
     _, rows = bench.march(wave([stage], points=(points, points), surface=surface, initial=start))
     x, y, share = np.array(WAVES).T
     exact = viscoelastic.complex_modulus(K * x * velocity, *PRONY)
