@@ -138,6 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--cores", metavar="N", type=_count, help="cores of a node of the machine that it is for")
     text = "of that machine's network: seconds of a message, bytes per second of a node (default: 2e-6,12.5e9)"
     plan.add_argument("--network", metavar="ALPHA,BETA", type=_network, help=text)
+    plan.add_argument("--sample", type=Path, help=argparse.SUPPRESS)  # by which a plan starts others
     plan.set_defaults(act=_plan)
 
     info = verbs.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
@@ -252,9 +253,13 @@ def _plan(options: argparse.Namespace, world: MPI.Intracomm) -> int:
 
     loaded = _load(options, world)
     ranks = options.ranks or tuple(sorted({1, world.size, *({machine.cores()} if world.size == 1 else ())}))
-    alone = Slab(MPI.COMM_SELF, 1, 1)
-    wanted = making.Wanted(ranks, options.seconds, options.cores, options.network)
-    for line in making.plan(loaded, Slab(world, *loaded.grid.points), alone, wanted, started):
+    words = [options.job, *(word for change in options.set for word in ("--set", change))]
+    wanted = making.Wanted(ranks, words, options.seconds, options.cores, options.network)
+    slab = Slab(world, *loaded.grid.points)
+    if options.sample:
+        making.leave_sample(loaded, slab, wanted, options.sample)
+        return DONE
+    for line in making.plan(loaded, slab, Slab(MPI.COMM_SELF, 1, 1), wanted, started):
         if world.rank == 0:
             print(line, flush=True)
     return DONE

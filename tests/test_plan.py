@@ -14,7 +14,7 @@ from parcontact.clock import Timeline
 from parcontact.effects import decisions as calls_for
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.plan import memory, trial
+from parcontact.plan import elsewhere, machine, memory, trial
 from parcontact.plan.sample import Sample, Stage, chosen, sample
 from parcontact.plan.scaling import Machine, Scaling
 
@@ -119,7 +119,7 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
 
 def test_stages_not_tried_are_like_the_others() -> None:
     stages = (Stage(4, 4, 4.0, {"fft": 40.0}), Stage(6))
-    seen = Sample(job(), 1, 0.0, stages)
+    seen = Sample(job(), 1, 0.0, 0.0, 0.0, stages)
     assert seen.total("fft") == 100.0
     assert seen.total("never counted") == 0.0
 
@@ -130,7 +130,7 @@ MACHINE = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10)
 def scaling(points: int, machine: Machine = MACHINE, **counts: float) -> Scaling:
     planned = job(grid={"points": points})
     sums = {"seconds": 1.0, "operator": 10.0, f"fft {points}x{points} float64": 20.0, "allreduce": 20.0, **counts}
-    return Scaling.of(planned, Sample(planned, 1, 1.0, (Stage(1, 1, 1.0, sums),)), machine)
+    return Scaling.of(planned, [Sample(planned, 1, 0.0, 1.0, 0.0, (Stage(1, 1, 1.0, sums),))], machine)
 
 
 def test_one_rank_is_what_was_seen() -> None:
@@ -155,16 +155,32 @@ def test_messages_grow_with_ranks_and_scaling_ends() -> None:
     assert scaling(1024, slow).end < few.end
 
 
+def test_a_sample_on_some_ranks_is_gone_by_there(tmp_path: Path) -> None:
+    """It comes from another process; others start from it, or from the one on fewer ranks."""
+    planned = job()
+    stages = [(Stage(1, 1, 1.0, {"seconds": seconds, "operator": 10.0}),) for seconds in (1.0, 0.7)]
+    one, two = (Sample(planned, 1 + n, 0.5, 1.0, 2.0, each) for n, each in enumerate(stages))
+    elsewhere.save(tmp_path / "sample", two)
+    again = elsewhere.load(tmp_path / "sample", planned, 2.5)
+    assert again == two
+    both = Scaling.of(planned, [one, again], MACHINE)
+    assert both.step(1) == pytest.approx(1.0)
+    assert both.step(2) == pytest.approx(0.7)
+    assert both.sample(64).ranks == 2
+    ideal = both.messages(4) + 1e-4 + (0.7 - both.messages(2) - 1e-4) / 2 * MACHINE.slowed(4) / MACHINE.slowed(2)
+    assert both.step(4) == pytest.approx(ideal)
+
+
 def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     large = job(grid={"points": 2**14}, history=[CELLS])
     tried = trial.grid_for(large, 1, 1.0)
     assert tried is not None
     assert max(tried.grid.points) <= 512
     assert tried.grid.size == large.grid.size
-    assert sum(1 for _ in calls_for.timeline(tried)) < sum(1 for _ in calls_for.timeline(large))
-    seen = Sample(tried, 1, 1.0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
-    assert Scaling.of(large, seen, MACHINE).sample.steps == sum(1 for _ in calls_for.timeline(large))
-    ratio = Scaling.of(large, seen, MACHINE).step(1) / Scaling.of(tried, seen, MACHINE).step(1)
+    assert len(calls_for.timeline(tried)) < len(calls_for.timeline(large))
+    seen = Sample(tried, 1, 0.0, 1.0, 0.0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
+    assert Scaling.of(large, [seen], MACHINE).steps == len(calls_for.timeline(large))
+    ratio = Scaling.of(large, [seen], MACHINE).step(1) / Scaling.of(tried, [seen], MACHINE).step(1)
     assert ratio > large.grid.nx**2 / tried.grid.nx**2
     assert trial.grid_for(job(), 1, 10.0) == job()
 
@@ -182,6 +198,8 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     assert "off  viscoelasticity" in said
     assert "1 steps: stage 1 1" in said
     assert "scaling ends at" in said
+    assert "tried: 1 steps on 1 rank in" in said
+    assert ("tried: 1 steps on 2 ranks in" in said) == (machine.cores() > 1)  # by two processes started for it
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "job.yaml"]
 
 

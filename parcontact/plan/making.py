@@ -1,13 +1,13 @@
-"""A plan is made: the job is tried for a moment on the ranks at hand, and the machine too."""
+"""A plan is made: the job is tried for a moment, and the machine too."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from ..job import Job
 from ..parallel.slab import Slab
 from ..record import plans
-from . import machine, report, trial
+from . import elsewhere, machine, report, trial
 from .report import Costs
 from .sample import Sample, sample
 from .scaling import Machine, Scaling
@@ -15,13 +15,14 @@ from .scaling import Machine, Scaling
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked of a plan: for how many `ranks`, tried for how many `seconds`.
+    """What is asked of a plan: for how many `ranks`, tried for how many `seconds` by each number that this machine has.
 
     Of the machine that the job is for, as far as it is not this one: `cores` of a node, and the `latency` [s] and
-    `bandwidth` [byte/s] of its network.
+    `bandwidth` [byte/s] of its network. `words` name the job for another process.
     """
 
     ranks: tuple[int, ...]
+    words: Sequence[str] = ()
     seconds: float = 10.0
     cores: int | None = None
     network: tuple[float, float] | None = None
@@ -32,36 +33,43 @@ def plan(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) -> I
 
     `alone` is a slab of one rank; `started` the seconds of the program so far.
     """
-    ranks = wanted.ranks
     yield from report.effects(job)
     yield ""
-    yield from report.maps(job, ranks)
+    yield from report.maps(job, wanted.ranks)
     yield ""
     if not job.history:
         yield "there is no history, and steady states are not planned"
         return
-    tried = slab.agree(trial.grid_for(job, slab.comm.size, wanted.seconds) if slab.root else None)
-    if tried is None:
+    seen = attempt(job, slab, wanted.seconds, started)
+    if seen is None:
         yield "too large to be tried here: no time can be told"
         return
-    began = time.perf_counter()
-    seen = attempt(tried, slab, wanted.seconds)
-    took = time.perf_counter() - began
-    costs = Costs(
-        Scaling.of(job, seen, describe(tried, alone, wanted)), started, machine.write_rate(job.output.directory)
-    )
-    yield from report.steps(costs, took)
+    others = [count for count in wanted.ranks if 1 < count <= machine.cores()] if slab.comm.size == 1 else []
+    more = elsewhere.samples(seen.job, wanted.words, sorted(others), wanted.seconds)
+    scaling = Scaling.of(job, [seen, *more], describe(seen.job, alone, wanted))
+    costs = Costs(scaling, machine.write_rate(job.output.directory))
+    yield from report.steps(costs)
     yield ""
-    yield from report.times(costs, ranks)
+    yield from report.times(costs, wanted.ranks)
 
 
-def attempt(job: Job, slab: Slab, seconds: float) -> Sample:
-    """Try a job with the transform plans that its run will have; collective."""
-    own = slab.resized(*job.grid.points)
-    plans.recall(job, own, None)
-    found = sample(job, own, seconds)
-    plans.keep(job, own)
+def attempt(job: Job, slab: Slab, seconds: float, started: float) -> Sample | None:
+    """Try a job, or the same on a grid that is coarse enough, with the transforms its run will have; collective."""
+    tried = slab.agree(trial.grid_for(job, slab.comm.size, seconds) if slab.root else None)
+    if tried is None:
+        return None
+    own = slab.resized(*tried.grid.points)
+    plans.recall(tried, own, None)
+    found = sample(tried, own, seconds, started)
+    plans.keep(tried, own)
     return found
+
+
+def leave_sample(job: Job, slab: Slab, wanted: Wanted, path: Path) -> None:
+    """Try a job for a program that has started this one; collective."""
+    found = attempt(job, slab, wanted.seconds, 0.0)
+    if slab.root and found:
+        elsewhere.save(path, found)
 
 
 def describe(job: Job, alone: Slab, wanted: Wanted) -> Machine:

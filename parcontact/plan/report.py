@@ -15,10 +15,9 @@ MEGA = 1e6
 
 @dataclass(frozen=True)
 class Costs:
-    """What a job costs: `scaling` of its steps, `starting` [s] of the program, `write_rate` [byte/s] of the disk."""
+    """What a job costs: `scaling` of its steps, `write_rate` [byte/s] of the disk."""
 
     scaling: Scaling
-    starting: float
     write_rate: float
 
     @property
@@ -27,7 +26,7 @@ class Costs:
 
     def marching(self, ranks: int) -> float:
         """Seconds of all steps."""
-        return self.scaling.sample.steps * self.scaling.step(ranks)
+        return self.scaling.steps * self.scaling.step(ranks)
 
     def writing(self, ranks: int) -> float:
         """Seconds of all checkpoints and fields."""
@@ -36,10 +35,15 @@ class Costs:
 
     def whole(self, ranks: int) -> float:
         """Seconds of the whole run."""
-        return self.starting + self.scaling.building(ranks) + self.marching(ranks) + self.writing(ranks)
+        return (
+            self.scaling.sample(ranks).starting
+            + self.scaling.building(ranks)
+            + self.marching(ranks)
+            + self.writing(ranks)
+        )
 
     def checkpoints(self, ranks: int) -> int:
-        rules, count = self.job.checkpoint, self.scaling.sample.steps
+        rules, count = self.job.checkpoint, self.scaling.steps
         if rules.every is not None:
             return -(-count // rules.every)
         return int(self.marching(ranks) / (60.0 * (rules.minutes or float("inf")))) + 1
@@ -47,7 +51,7 @@ class Costs:
     @property
     def instants(self) -> int:
         """How often fields are saved."""
-        return -(-self.scaling.sample.steps // self.job.output.every) if calls_for.fields(self.job).on else 0
+        return -(-self.scaling.steps // self.job.output.every) if calls_for.fields(self.job).on else 0
 
     @property
     def instant_bytes(self) -> int:
@@ -75,22 +79,23 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     yield f"a checkpoint has {memory.saved(job) / MEGA:.4g} MB"
 
 
-def steps(costs: Costs, took: float) -> Iterator[str]:
+def steps(costs: Costs) -> Iterator[str]:
     """How many steps, and what is in one."""
-    sample = costs.scaling.sample
-    names = (f"{stage.name} {seen.steps}" for stage, seen in zip(costs.job.history, sample.stages, strict=False))
-    yield f"{sample.steps} steps: {', '.join(names)}"
-    per_step = {name: sample.total(name) / sample.steps for name in ("operator", "fft", "allreduce")}
-    yield (
-        f"a step has {per_step['operator']:.3g} operator calls, {per_step['fft']:.3g} transforms and "
-        f"{per_step['allreduce'] + SUMS_PER_STEP:.3g} sums over all ranks"
+    samples = costs.scaling.samples
+    names = (f"{stage.name} {seen.steps}" for stage, seen in zip(costs.job.history, samples[0].stages, strict=True))
+    yield f"{costs.scaling.steps} steps: {', '.join(names)}"
+    calls, transforms, sums = (
+        samples[0].total(name) / costs.scaling.steps for name in ("operator", "fft", "allreduce")
     )
+    sums += SUMS_PER_STEP
+    yield f"a step has {calls:.3g} operator calls, {transforms:.3g} transforms and {sums:.3g} sums over all ranks"
     if costs.instants:
         yield f"fields are saved {costs.instants} times, {costs.instant_bytes / MEGA:.4g} MB each"
-    tried = sample.job.grid.points
-    grid = "" if tried == costs.job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
-    where = f"on {_ranks(sample.ranks)}{grid}"
-    yield f"tried: {sample.tried} steps {where} in {took:.3g} s; the others are taken to be like them"
+    for sample in samples:
+        tried = sample.job.grid.points
+        grid = "" if tried == costs.job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
+        where = f"on {_ranks(sample.ranks)}{grid}"
+        yield f"tried: {sample.tried} steps {where} in {sample.took:.3g} s; the others are taken to be like them"
 
 
 def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
@@ -106,7 +111,8 @@ def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     yield f"scaling ends at {_ranks(scaling.end)}: with twice as many they would work for less than half of the time"
     many = max(ranks)
     yield (
-        f"assumed: {costs.starting:.2g} s to start, {scaling.building(many):.2g} s for the scene on {_ranks(many)}, "
+        f"assumed: {scaling.sample(many).starting:.2g} s to start and {scaling.building(many):.2g} s for the scene on "
+        f"{_ranks(many)}, "
         f"{costs.write_rate / MEGA:.3g} MB/s to disk; nodes of {machine.cores} cores, {machine.crowding:.2f} times "
         f"slower when all work; {1e6 * machine.per_call:.2g} us per operator call on any number of ranks"
     )

@@ -42,11 +42,16 @@ class Stage:
 
 @dataclass(frozen=True)
 class Sample:
-    """What was seen of a job on some ranks: how long its scene took to make [s], and its stages."""
+    """What was seen of a job on some ranks: its stages, and how long all of it took [s].
+
+    `starting` the program, `building` the scene.
+    """
 
     job: Job
     ranks: int
+    starting: float
     building: float
+    took: float
     stages: tuple[Stage, ...]
 
     @property
@@ -72,15 +77,19 @@ class Sample:
         return replace(self, stages=tuple(stages))
 
 
-def sample(job: Job, slab: Slab, seconds: float) -> Sample:
-    """Try a job for about so long; collective. Raises InputError for files that do not fit."""
+def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sample:
+    """Try a job for about so long; `starting` [s] has passed before. Collective.
+
+    Raises InputError for files that do not fit.
+    """
     began = time.perf_counter()
     numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
     march = March(scene.build(job.model_copy(update={"numerics": numerics}), slab))
     if calls_for.steady_start(job).on:
         steadystart.begin(march)
     building = time.perf_counter() - began
-    return Sample(job, slab.comm.size, building, tuple(_try(march, calls_for.timeline(job), seconds)))
+    stages = tuple(_try(march, calls_for.timeline(job), seconds))
+    return Sample(job, slab.comm.size, starting, building, time.perf_counter() - began, stages)
 
 
 def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:

@@ -12,6 +12,7 @@ rate of memory. A sum over ranks takes ceil(log2 P) messages.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..job import Job
@@ -60,28 +61,43 @@ class Machine:
 
 @dataclass(frozen=True)
 class Scaling:
-    """The time of a job's step on any number of ranks, from a sample of it on some, be it on a coarser grid."""
+    """The time of a job's step on any number of ranks, from samples of it on some, be it on a coarser grid."""
 
     job: Job
-    sample: Sample
+    samples: tuple[Sample, ...]
     machine: Machine
 
     @classmethod
-    def of(cls, job: Job, sample: Sample, machine: Machine) -> "Scaling":
+    def of(cls, job: Job, samples: Iterable[Sample], machine: Machine) -> "Scaling":
         """For a job, from what was seen of it."""
-        return cls(job, sample.of(job), machine)
+        return cls(job, tuple(sample.of(job) for sample in samples), machine)
+
+    def sample(self, ranks: int) -> Sample:
+        """The one to go by: on as many ranks, or the most that are fewer."""
+        fewer = [sample for sample in self.samples if sample.ranks <= ranks]
+        return max(fewer, key=lambda sample: sample.ranks) if fewer else self.samples[0]
+
+    @property
+    def steps(self) -> int:
+        """Of the job."""
+        return self.samples[0].steps
 
     def step(self, ranks: int) -> float:
         """Seconds of a step, on average over the job."""
-        return self._work * self._share(ranks) + self._calls + self.messages(ranks)
+        sample = self.sample(ranks)
+        calls = self.machine.per_call * _per_step(sample, "operator")
+        seen = _per_step(sample, "seconds") - self._messages(sample.job, sample, sample.ranks) - calls
+        shared = max(0.0, seen) * self._finer(sample) * self._share(ranks) / self._share(sample.ranks)
+        return shared + calls + self.messages(ranks)
 
     def messages(self, ranks: int) -> float:
         """Seconds of a step in which data moves between ranks."""
-        return self._messages(self.job, ranks)
+        return self._messages(self.job, self.sample(ranks), ranks)
 
     def building(self, ranks: int) -> float:
         """Seconds in which the scene is made."""
-        return self.sample.building * self._finer * self._share(ranks) / self._share(self.sample.ranks)
+        sample = self.sample(ranks)
+        return sample.building * self._finer(sample) * self._share(ranks) / self._share(sample.ranks)
 
     def efficiency(self, ranks: int) -> float:
         """Time on one rank over that of all ranks together."""
@@ -95,34 +111,24 @@ class Scaling:
             ranks *= 2
         return ranks
 
-    @property
-    def _calls(self) -> float:
-        return self.machine.per_call * self._per_step("operator")
-
-    @property
-    def _work(self) -> float:
-        """Seconds of a step on one rank that others can share."""
-        ranks = self.sample.ranks
-        seen = self._per_step("seconds") - self._messages(self.sample.job, ranks) - self._calls
-        return max(0.0, seen) / self._share(ranks) * self._finer
-
-    @property
-    def _finer(self) -> float:
+    def _finer(self, sample: Sample) -> float:
         """How much more work the grid of the job is than that of the sample."""
-        points, tried = (job.grid.nx * job.grid.ny for job in (self.job, self.sample.job))
+        points, tried = (job.grid.nx * job.grid.ny for job in (self.job, sample.job))
         return points * math.log(points + 1) / (tried * math.log(tried + 1))
 
     def _share(self, ranks: int) -> float:
         return self.machine.slowed(ranks) / ranks
 
-    def _per_step(self, name: str) -> float:
-        return self.sample.total(name) / max(self.sample.steps, 1)
-
-    def _messages(self, job: Job, ranks: int) -> float:
+    def _messages(self, job: Job, sample: Sample, ranks: int) -> float:
         """On the grid of some job; counts are those of the sample's."""
-        names = [holding.transform for holding in memory.holdings(self.sample.job) if holding.transform]
+        names = [holding.transform for holding in memory.holdings(sample.job) if holding.transform]
         sent = [holding.sent for holding in memory.holdings(job, ranks) if holding.transform]
         exchanges = sum(
-            self._per_step(name) * self.machine.transpose(size, ranks) for name, size in zip(names, sent, strict=True)
+            _per_step(sample, name) * self.machine.transpose(size, ranks)
+            for name, size in zip(names, sent, strict=True)
         )
-        return exchanges + (self._per_step("allreduce") + SUMS_PER_STEP) * self.machine.sum(ranks)
+        return exchanges + (_per_step(sample, "allreduce") + SUMS_PER_STEP) * self.machine.sum(ranks)
+
+
+def _per_step(sample: Sample, name: str) -> float:
+    return sample.total(name) / max(sample.steps, 1)

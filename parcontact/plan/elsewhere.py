@@ -1,0 +1,55 @@
+"""A job tried by other numbers of ranks of this machine, which are started for it."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..job import Job
+from .sample import Sample, Stage
+
+MPIRUN = Path(sys.executable).with_name("mpirun")
+MARKS = ("OMPI_", "PMIX_", "PRTE_", "PMI_")  # what MPI has left in the environment would confuse another mpirun
+PATIENCE = 60.0  # seconds beyond three times those that a trial is given
+
+
+def samples(job: Job, words: Sequence[str], ranks: Iterable[int], seconds: float) -> Iterator[Sample]:
+    """Samples on some numbers of ranks, as far as they can be had; `words` name the job and change it."""
+    for count in ranks:
+        with TemporaryDirectory() as directory:
+            found = _attempt(job, [*words, "--seconds", repr(seconds)], count, Path(directory, "sample"), seconds)
+        if found:
+            yield found
+
+
+def _attempt(job: Job, words: Sequence[str], ranks: int, path: Path, seconds: float) -> Sample | None:
+    program = [sys.executable, "-m", "parcontact", "plan", *words, "--sample", str(path)]
+    clean = {key: value for key, value in os.environ.items() if not key.startswith(MARKS)}
+    began = time.perf_counter()
+    try:
+        command = [str(MPIRUN), "-n", str(ranks), *program]
+        subprocess.run(command, env=clean, capture_output=True, timeout=3 * seconds + PATIENCE, check=True)
+        whole = time.perf_counter() - began
+        return load(path, job, whole)
+    except (OSError, subprocess.SubprocessError, ValueError, KeyError, TypeError):
+        return None
+
+
+def save(path: Path, sample: Sample) -> None:
+    """Leave a sample where `load` finds it."""
+    stages = [asdict(stage) for stage in sample.stages]
+    path.write_text(
+        json.dumps({"building": sample.building, "took": sample.took, "stages": stages, "ranks": sample.ranks})
+    )
+
+
+def load(path: Path, job: Job, whole: float) -> Sample:
+    """The sample of a job that a program left which took so many seconds; what it did not try for was its start."""
+    facts = json.loads(path.read_text())
+    stages = tuple(Stage(**stage) for stage in facts["stages"])
+    return Sample(job, facts["ranks"], whole - facts["took"], facts["building"], facts["took"], stages)
