@@ -116,6 +116,17 @@ class Span:
     def moves(self) -> bool:
         return self.count > 0 and any(self.stage.velocity)
 
+    @property
+    def rests(self) -> bool:
+        """Whether it stands under a constant load, and its steps may be as long as what happens allows."""
+        stage = self.stage
+        return not any(stage.velocity) and stage.load.constant and isinstance(stage.time_step, GeometricStep)
+
+    @property
+    def end(self) -> float:
+        """When its last step ends [s]."""
+        return self.time(self.count)
+
     def time(self, index: int) -> float:
         """When the step `index` of those that last ends [s]."""
         return self.start + self.ends[index] * self.stage.seconds if index else self.start

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from . import failure
-from .clock import Step, steps
+from .clock import Step, Timeline
 from .failure import StepError
 from .parallel import rows
 from .parallel.slab import Array
@@ -19,6 +19,7 @@ from .record.row import Row
 from .scene import Scene, solver_on
 from .solve import retry
 from .solve.contact import Approach, Contact, MeanPressure
+from .stationary import steps_to_make
 
 Task = Callable[["March"], bool | None]
 ROUND_OFF = 1e-14  # relative to lengths whose sum is compared with 0
@@ -53,6 +54,8 @@ class March:
         contact, remark = self.scene.solver.solve(effective, control), ""
         if contact.failure and not self._accepts(contact):
             contact, remark = self._again(step, effective, control, contact)
+        if step.passed:
+            remark = "; ".join(filter(None, (remark, self._passed(step))))
         measures = self.scene.ledger.measures(contact.p, alpha, contact.u, effective, contact.d, step.position)
         self.scene.material.commit(contact.u, heights)
         self.alpha_old, self.alpha = self.alpha, alpha
@@ -135,6 +138,10 @@ class March:
         what = f"{failure.where(scene, step)}: the contact solve {failed.failure}"
         return contact, f"{what}; solved when retried with {', with '.join(tried)}"
 
+    def _passed(self, step: Step) -> str:
+        what = f"{failure.where(self.scene, step)} stands for the {step.passed} before it"
+        return f"{what}: at rest under a constant load nothing changes by more than the tolerance"
+
     def _cells(self, step: Step) -> float:
         """By how many cells the surface moves in a step."""
         grid, (x, y), (new_x, new_y) = self.scene.job.grid, self.position, step.position
@@ -194,7 +201,7 @@ def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = N
     if timeline is None:
         if done(march, tasks):
             return True
-        timeline = steps(job.history, job.grid, pressure=job.initial.pressure)
+        timeline = steps_to_make(march, Timeline(job.history, job.grid, pressure=job.initial.pressure))
     for step in timeline:
         march.advance(step)
         if done(march, tasks):

@@ -18,6 +18,7 @@ from .record.provenance import Link, Provenance, extended
 from .record.recorder import Recorder
 from .restart import Origin
 from .scene import Scene
+from .stationary import steps_to_make
 from .watch import Signals, Watch
 
 DONE, AGAIN = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again
@@ -142,8 +143,9 @@ class _Journey:
         return self._farewell()
 
     def _march(self) -> None:
+        steps = steps_to_make(self.march, self.timeline, self.until)
         try:
-            march.run(self.march, [self.record, self.decide], self.timeline.after(self.first))
+            march.run(self.march, [self.record, self.decide], steps)
         except StepError as error:
             raise RunError(f"{error}{self._left()}") from error
 

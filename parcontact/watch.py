@@ -68,6 +68,7 @@ class Watch:
     state_bytes: int = 0
     _saved: float = field(default_factory=time.monotonic)
     _looked: float = 0.0
+    _made: int = 0
     _last: float = 0.0
     _write: float = -1.0
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
@@ -81,6 +82,7 @@ class Watch:
         codes = [SIGNAL * self.signals.come, 0, 0]
         if self.slab.root:
             codes = [max(codes[0], self._stop(now, began)), self._due(step, now, began), bool(problem)]
+        self._made = step
         stop, save, failed = self.slab.reduce((), codes)
         if failed:
             return Verdict(problem=self.slab.agree(problem))
@@ -105,7 +107,7 @@ class Watch:
         if not began:
             return False
         if self.rules.every is not None:
-            return step % self.rules.every == 0
+            return step // self.rules.every > self._made // self.rules.every  # a step may stand for several
         return self.rules.minutes is not None and now - self._saved >= 60.0 * self.rules.minutes
 
     @property

@@ -19,7 +19,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"effects"},
     {"record"},
     {"scene"},
-    {"steadystate", "failure"},
+    {"steadystate", "failure", "stationary"},
     {"march"},
     {"state", "restart", "watch", "steadystart"},
     {"runner", "curve", "plan"},

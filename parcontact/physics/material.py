@@ -150,6 +150,11 @@ class Zener:
         loops.begin(self.branches, *self._pending, self._work, self._still[0], 0.0, self.u, self.u, 0)
         self._pending = self._still
 
+    def relaxing(self, seconds: float) -> tuple[Array, float]:
+        """What share each of `branches` loses within a time if u is kept, and the modulus G that is left then."""
+        share = -np.expm1(-self.elapsed(seconds)[self.kept])
+        return share, self._spring + float(self.prony.moduli[self.kept] @ (1.0 - share))
+
     def state(self) -> dict[str, Array]:
         """What a restart needs."""
         self.settle()

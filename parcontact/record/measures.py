@@ -68,19 +68,18 @@ def cut_back(path: Path, step: int, branches: int) -> str:
     """
     if not path.exists():
         return f"{path} is missing: the rows up to step {step} are lost"
-    with path.open(newline="") as file:
-        complete = (line for line in file if line.endswith("\n"))
-        table = csv.DictReader(complete, restval="")
-        kept = [row for row in table if int(row["step"]) <= step]
-    with hdf5.replaced(path) as part, part.open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns(branches), restval="", extrasaction="ignore", lineterminator="\n")
+    last = -1
+    with path.open(newline="") as file, hdf5.replaced(path) as part, part.open("w", newline="") as new:
+        table = csv.DictReader((line for line in file if line.endswith("\n")), restval="")
+        writer = csv.DictWriter(new, columns(branches), restval="", extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
-        writer.writerows(kept)
-        file.flush()
-        os.fsync(file.fileno())
-    if len(kept) != step + 1:
-        return f"{path} has {len(kept)} of the {step + 1} rows up to step {step}: the others are lost"
-    return ""
+        for row in table:
+            if int(row["step"]) <= step:
+                last = int(row["step"])
+                writer.writerow(row)
+        new.flush()
+        os.fsync(new.fileno())
+    return "" if last == step else f"{path} ends with step {last}: the rows up to step {step} are lost"
 
 
 def read(path: Path) -> dict[str, list[float]]:

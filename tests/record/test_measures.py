@@ -50,7 +50,7 @@ def test_what_is_lost_is_said(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     assert "is missing" in measures.cut_back(path, 3, 0)
     written(path, 3)
-    assert "has 3 of the 6 rows up to step 5" in measures.cut_back(path, 5, 0)
+    assert "ends with step 2: the rows up to step 5 are lost" in measures.cut_back(path, 5, 0)
 
 
 def test_other_columns(tmp_path: Path) -> None:

@@ -1,0 +1,79 @@
+"""At rest under a constant load: once the body has relaxed, or at once if it has no memory, one step ends the stage.
+
+Were the displacement u kept from now on, the branches would after the time t lack
+
+    sum_k (1 - exp(-t/tau_k)) h_k     out of     A p = G_inf u + sum_k h_k.
+
+Over the modulus that is left then, `G(t) = G_inf + sum_k G_k exp(-t/tau_k)`, this is a displacement; it grows with t.
+Where it is below the tolerance, the contact of now also meets the conditions of every instant up to t, and neither
+displacements nor `A p/G` change by much more: in the norm of the elastic energy a contact follows its heights without
+enlarging their differences, of which the past weighs `1 - G(t)/alpha` at most.
+
+Only stages whose time steps grow are ended so: who gives one time step asks for a row at each.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from .clock import Span, Step, Timeline
+from .parallel.slab import Array
+from .physics.material import Zener
+
+if TYPE_CHECKING:
+    from .march import March
+
+
+def steps_to_make(march: "March", timeline: Timeline, until: float | None = None) -> Iterator[Step]:
+    """The steps after the last one made, each decided on when it is asked for; collective.
+
+    A step that stands for several does not pass one after which fields are due, nor the first that reaches `until` [s].
+    What is decided follows from the state of the march, and so is the same after a restart.
+    """
+    stop = len(timeline) if until is None else timeline.first_reaching(until)
+    while (number := march.row.step + 1) <= len(timeline):
+        span = timeline.span(number)
+        target = min([span.last, *_due(march, number), *([stop] if stop >= number else [])])
+        yield _leap(march, timeline[target], number) if _at_rest(march, span, number, target) else timeline[number]
+
+
+def _due(march: "March", number: int) -> list[int]:
+    """The next step after which fields are saved, if they are."""
+    output = march.scene.job.output
+    return [-(-number // output.every) * output.every] if output.fields else []
+
+
+def _leap(march: "March", step: Step, number: int) -> Step:
+    return step._replace(dt=step.time - march.row.time, growth=0.0, passed=step.number - number)
+
+
+def _at_rest(march: "March", span: Span, number: int, target: int) -> bool:
+    """Whether from a step on nothing changes until the end of its stage, and there is a step to spare; collective."""
+    first = span.before + span.jumps + 1
+    if target <= number or number < first or not span.rests:
+        return False
+    material = march.scene.material
+    if not isinstance(material, Zener):
+        return True
+    if number == first:  # a jump of the load has just been: branches that have no map have not relaxed yet
+        return False
+    return remaining(march, material, span.end - march.row.time) <= march.scene.job.numerics.tolerance
+
+
+def remaining(march: "March", material: Zener, seconds: float) -> float:
+    """By how much displacements at most change within some time, over the smaller of the largest displacement and the
+    surface's height; over the latter where nothing is pressed; collective."""
+    scene = march.scene
+    material.settle()
+    share, modulus = material.relaxing(seconds)
+    sizes = [_largest(field) for field in (*material.branches, material.u, march.p)]
+    *branches, u, p = scene.slab.reduce((), sizes)
+    lacking, height = float(share @ branches), scene.solver.height
+    if lacking == 0.0:
+        return 0.0
+    scale = modulus * (min(u, height) if p > 0.0 else height)
+    return lacking / scale if scale > 0.0 else math.inf
+
+
+def _largest(field: Array) -> float:
+    return max(float(field.max(initial=0.0)), -float(field.min(initial=0.0)))
