@@ -29,7 +29,7 @@ from parcontact.record.row import Row
 
 JOB = Path(__file__).parents[1] / "jobs" / "velocity_step.yaml"
 SLIDE = "history=[{pressure: 1.0e5, velocity: 3.0, distance: 5.0e-4, cells_per_step: 1}]"
-ACCURACIES = (0.0, 1e-5, 1e-4, 1e-3)
+ACCURACIES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2)
 PASSES = 20
 
 
