@@ -1,0 +1,124 @@
+"""Random scenes, as hard as they come: bodies, surfaces, grids, histories.
+
+All choices are made by an object like `random.Random`: seeded in a campaign, Hypothesis's own in a test.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+from parcontact.job import Job
+
+from .stories import Json, Map, Storyteller, decades
+
+SIDES = (1, 2, 3, 5, 8, 12, 13, 16, 17, 24, 31, 64)  # points; primes among them
+MOST_POINTS = 576
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A job whose surface is a map of heights [m]; `offset` [m] is added to all of them."""
+
+    heights: Map
+    size: tuple[float, float]
+    boundary: str
+    material: Json
+    history: tuple[Json, ...]
+    numerics: Json = field(default_factory=dict)
+    offset: float = 0.0
+
+    def job(self, directory: Path) -> Job:
+        """The job, its heights in a file of this directory."""
+        path = directory / "heights.npy"
+        np.save(path, self.heights)
+        ny, nx = self.heights.shape
+        constant = {"shape": "wave", "amplitude": self.offset, "waves": [0, 0]}
+        return Job.model_validate(
+            {
+                "grid": {"points": [nx, ny], "size": list(self.size), "boundary": self.boundary},
+                "surface": [{"shape": "file", "path": str(path)}, *([constant] if self.offset else [])],
+                "material": self.material,
+                "history": list(self.history),
+                "numerics": self.numerics,
+                "output": {"energy": True},
+            }
+        )
+
+
+# -- bodies and surfaces ----------------------------------------------------------------------------------------------
+
+
+def material(dice: Random) -> Json:
+    """1 to 15 branches over 20 decades of time and 12 of modulus, or none, around a modulus of any size."""
+    scale = decades(dice, -3, 9)
+    poisson = dice.choice([0.5, 0.5, 0.0, -0.5, 0.3])
+    if dice.random() < 0.1:
+        return {"model": "elastic", "poisson": poisson, "shear_modulus": scale}
+    branches = [branch(dice, scale) for _ in range(dice.randint(1, 15))]
+    long_term = dice.choice([0.0, scale * decades(dice, -6, 6)])
+    return {"model": "zener", "poisson": poisson, "modulus_inf": long_term, "branches": branches}
+
+
+def branch(dice: Random, scale: float) -> Json:
+    """In one of the two forms."""
+    modulus, time = scale * decades(dice, -6, 6), decades(dice, -10, 10)
+    if dice.random() < 0.8:
+        return {"modulus": modulus, "relaxation_time": time}
+    kelvin = dice.choice([0.0, modulus * decades(dice, -3, 3)])
+    return {"G0": modulus, "G1": kelvin, "eta1": time * (modulus + kelvin)}
+
+
+def shape(dice: Random) -> tuple[int, int]:
+    """Rows and columns of a grid: one row, one column, primes, squares."""
+    nx = dice.choice(SIDES)
+    ny = dice.choice([side for side in SIDES if side * nx <= MOST_POINTS and side + nx > 2])
+    return ny, nx
+
+
+def heights(dice: Random, ny: int, nx: int) -> Map:
+    """A surface of height about 1."""
+    random = np.random.default_rng(dice.getrandbits(32))
+    y, x = np.meshgrid((np.arange(ny) + 0.5) / ny - 0.5, (np.arange(nx) + 0.5) / nx - 0.5, indexing="ij")
+    kind = dice.choice(["noise", "rough", "spike", "pit", "waves", "sphere", "cylinder", "flat"])
+    if kind == "noise":  # everything up to the Nyquist wavenumber
+        return random.standard_normal((ny, nx))
+    if kind == "rough":
+        wave_number = np.hypot(np.fft.fftfreq(ny, 1 / ny)[:, None], np.fft.rfftfreq(nx, 1 / nx)[None, :])
+        spectrum = np.fft.rfft2(random.standard_normal((ny, nx))) / np.maximum(wave_number, 1.0) ** 1.8
+        return np.fft.irfft2(spectrum, s=(ny, nx))
+    if kind in ("spike", "pit"):
+        result = np.zeros((ny, nx))
+        result[random.integers(ny), random.integers(nx)] = 1.0 if kind == "spike" else -1.0
+        return result
+    if kind == "waves":
+        along_x, along_y = random.integers(0, max(nx // 2, 1)), random.integers(0, max(ny // 2, 1))
+        return np.cos(2 * np.pi * along_x * x) * np.cos(2 * np.pi * along_y * y + 0.3)
+    if kind == "sphere":
+        return -(x**2) - y**2
+    if kind == "cylinder":
+        return -(x**2) if nx > 1 else -(y**2)
+    return np.zeros((ny, nx))
+
+
+def box(dice: Random) -> tuple[float, float]:
+    """Sides [m] from nanometres to kilometres, up to 10 000 : 1."""
+    length, stretch = decades(dice, -7, 3), dice.choice([0.0, dice.uniform(-4, 4)])
+    return length, length * 10.0**stretch
+
+
+def sketch(dice: Random, stages: int = 6) -> Sketch:
+    """A scene of at most so many stages."""
+    body, (ny, nx), size = material(dice), shape(dice), box(dice)
+    surface = heights(dice, ny, nx) * min(size) * decades(dice, -6, 0)
+    boundary = dice.choice(["periodic", "periodic", "free"])
+    history = Storyteller(dice, surface, size, boundary == "periodic", body).history(stages)
+    numerics = {
+        "tolerance": dice.choice([1e-4, 1e-4, 1e-6, 1e-8]),
+        "integrator": dice.choice(["exponential", "exponential", "backward-euler"]),
+        "kernel": "love" if boundary == "free" else dice.choice(["spectral", "spectral", "love"]),
+        "precision": dice.choice(["double"] * 9 + ["mixed"]),
+        "accuracy": dice.choice([0.0, 1e-3]),
+    }
+    return Sketch(surface, size, boundary, body, history, numerics)
