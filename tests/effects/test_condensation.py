@@ -196,6 +196,22 @@ def test_a_longer_run_wakes_frozen_branches(place: Place) -> None:
     assert 0.0 < np.max(np.abs(found - expected)) / expected[-1] < 1.5e-3
 
 
+def test_a_body_that_had_no_time_wakes_when_it_gets_some(place: Place) -> None:
+    """After one solve without any branch map, a stage that lasts: it goes on as a run that always had them.
+
+    To 1e-9, the tolerance: h = G u is what the jump leaves.
+    """
+    touch, hold = {"pressure": 1e5}, {"pressure": 1e5, "duration": 1e-3, "time_step": 1e-4}
+    place.run(data(touch))
+    before = place.maps(1)
+    place.run(data(touch, hold))
+    place.run(data(touch, hold), "whole")
+    assert not [name for name in before if "branch" in name]
+    assert [name for name in place.maps(11) if "branch" in name] == ["material/branch 1"]
+    found, expected = (np.frombuffer(place.maps(11, name)["material/displacement"]) for name in ("out", "whole"))
+    assert_allclose(found, expected, atol=1e-9 * np.max(np.abs(expected)))
+
+
 def test_a_lower_accuracy_wakes_all_and_a_higher_one_folds(place: Place) -> None:
     """Either way the run goes on; the branch that had no memory starts again with none."""
     place.run(data(numerics={"accuracy": 1e-2}), until=1e-3)
