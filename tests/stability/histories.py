@@ -22,7 +22,7 @@ POINTS, WAY, DT = 8, 8, 2.5e-4  # points along each side; steps of a way, of a c
 BRANCHES = [(2e6, 1e-4), (1e6, 1e-3), (0.5e6, 4e-3)]  # modulus [Pa] and relaxation time [s]
 PERIOD = 2 * WAY  # steps; it takes 4 ms
 SETTLED = 60  # periods after which exp(-t/tau), or the creep of a contact, is below rounding
-PRESSURES = {"full": 4e5, "partial": 2e4}  # [Pa]
+PRESSURES = {"full": 1e6, "partial": 1e5}  # [Pa]
 
 
 def back_and_forth(periods: int, contact: str, modulus_inf: float = 1e6) -> Job:
@@ -52,7 +52,7 @@ def back_and_forth(periods: int, contact: str, modulus_inf: float = 1e6) -> Job:
 
 @dataclass
 class Periods:
-    """A task of a march that keeps the body's maps and the row at the end of each period; on one rank."""
+    """A task of a march that keeps of each period's end the displacement [m], the branches [Pa m] and the row."""
 
     states: list[Array] = field(default_factory=list)
     rows: list[Row] = field(default_factory=list)
@@ -61,7 +61,9 @@ class Periods:
         if march.row.step > 1 and (march.row.step - 1) % PERIOD == 0:
             material = march.scene.material
             assert isinstance(material, Zener)
-            maps = [value for name, value in material.state().items() if name != "frozen"]
+            branches = [value for name, value in material.state().items() if name.startswith("branch")]
+            units = march.scene.units
+            maps = [march.field("displacement"), *(units.modulus * units.height * value for value in branches)]
             self.states.append(np.array(maps))
             self.rows.append(march.row)
 
@@ -85,8 +87,8 @@ class Drift:
 
     def __str__(self) -> str:
         return (
-            f"{self.periods * PERIOD} steps, {self.periods} periods: the body changes within one by {self.step:.1e}, in "
-            f"all by {self.total:.1e}; mean displacement {self.mean:.1e}; the loss changes by {self.loss:.1e}; work "
+            f"{self.periods * PERIOD} steps, {self.periods} periods: the body changes within one by {self.step:.1e}, "
+            f"in all by {self.total:.1e}; mean displacement {self.mean:.1e}; the loss changes by {self.loss:.1e}; work "
             f"neither stored nor dissipated {self.balance:.1e}; off the closed form {self.error:.1e}"
         )
 
