@@ -7,12 +7,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..effects import decisions as calls_for
 from ..job import Job
 from ..jobfile.table import plain
 from . import memory
 
-PER_POINT = 2e-8  # seconds of an operator call per point, and of what belongs to it: enough to choose a grid by
-CALLS = 200  # operator calls that a trial makes at least
+PER_POINT = 1.2e-8  # seconds of an operator call per point, and of what belongs to it: enough to choose a grid by
+PADDED = 3.0  # times that in an isolated contact
+CALLS = 100  # operator calls that a trial makes at least
 SHARE = 0.7  # of the memory that is free
 MEMINFO = Path("/proc/meminfo")
 WAVE = 2.0  # cells that the shortest wave needs
@@ -25,7 +27,8 @@ def grid_for(job: Job, ranks: int, seconds: float) -> Job | None:
 
 def _feasible(job: Job, ranks: int, seconds: float) -> bool:
     points = job.grid.nx * job.grid.ny
-    quick = CALLS * PER_POINT * points / ranks <= seconds
+    per_point = PER_POINT * (PADDED if calls_for.isolated(job).on else 1.0)
+    quick = CALLS * per_point * points / ranks <= seconds
     return quick and memory.total(job, ranks) * ranks <= SHARE * _free()
 
 
