@@ -233,6 +233,14 @@ def test_extrapolated_starts() -> None:
     assert [row(planned, "extrapolated starts").on for planned in (single, lasts)] == [False, True]
 
 
+def test_rest_cut_short() -> None:
+    """Off: every step of the history is made; on: an elastic body at rest needs its jump and one more."""
+    dwell = {"pressure": 2e3, "duration": 1e-3}
+    off, on = (job(history=[{**dwell, "time_step": step}]) for step in (2.5e-4, {"first": 1e-4, "growth": 1.1}))
+    assert [len(marched(planned)[1]) - 1 for planned in (off, on)] == [5, 2]
+    assert [row(planned, "rest cut short").on for planned in (off, on)] == [False, True]
+
+
 def test_steady_start() -> None:
     """Off: nothing is solved before the first step."""
     start = {"state": "steady", "velocity": 0.1, "pressure": 2e3}
@@ -352,6 +360,13 @@ def test_counts_are_in_the_log(run: Callable[..., Path]) -> None:
 
 
 TESTED = {
-    *("isolated contact", "extrapolated starts", "steady start", "displacement control", "dissipation per branch"),
+    *(
+        "isolated contact",
+        "extrapolated starts",
+        "rest cut short",
+        "steady start",
+        "displacement control",
+        "dissipation per branch",
+    ),
     *("fields", "checkpoints"),
 }

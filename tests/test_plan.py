@@ -96,6 +96,16 @@ def test_a_short_job_is_tried_whole(comm: MPI.Intracomm, name: str) -> None:
         assert seen.total(count) == spent.get(count, 0)
 
 
+@pytest.mark.parametrize("material", [{"model": "elastic", "shear_modulus": 1e6}, TWO])
+def test_rest_that_is_cut_short_is_known(material: Json) -> None:
+    """Where all steps can be tried."""
+    dwell = {"pressure": 1e4, "duration": 1.0, "time_step": {"first": 1e-5, "growth": 1.2}}
+    planned = job(material=material, history=[dwell, CELLS])
+    _, rows = marched(planned)
+    assert len(rows) < len(calls_for.timeline(planned))
+    assert sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6).steps == len(rows) - 1
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.7, 1.0])
 @pytest.mark.parametrize("stage", [SLIDE, {**SLIDE, "time_step": {"first": 1e-6, "growth": 1.02}}, CELLS])
 def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:

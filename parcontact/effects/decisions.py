@@ -79,6 +79,15 @@ def lasting(job: Job) -> Effect:
     return Effect("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
 
 
+def short_rest(job: Job) -> Effect:
+    """Once nothing changes any more at rest, one step ends the stage (`stationary.py`)."""
+    stage = next((span.stage.name for span in timeline(job).spans if span.rests), None)
+    why = "no stage stands under a constant load with growing time steps"
+    return Effect(
+        "rest cut short", stage is not None, f"stage {stage!r} stands under a constant load" if stage else why
+    )
+
+
 def steady_start(job: Job) -> Effect:
     """A steady solve before the first step."""
     steady = job.initial.state == "steady"
@@ -148,8 +157,8 @@ def mixed_precision(job: Job) -> Effect:
 
 
 TABLE: tuple[Decision, ...] = (
-    *(viscoelasticity, condensation, isolated, sliding, part_cells, lasting, steady_start, approach, mixed_precision),
-    *(spectrum, energies, energy_memory, branch_dissipation, fields, checkpoints),
+    *(viscoelasticity, condensation, isolated, sliding, part_cells, lasting, short_rest, steady_start, approach),
+    *(mixed_precision, spectrum, energies, energy_memory, branch_dissipation, fields, checkpoints),
 )
 
 

@@ -83,7 +83,8 @@ def steps(costs: Costs) -> Iterator[str]:
     """How many steps, and what is in one."""
     samples = costs.scaling.samples
     names = (f"{stage.name} {seen.steps}" for stage, seen in zip(costs.job.history, samples[0].stages, strict=True))
-    yield f"{costs.scaling.steps} steps: {', '.join(names)}"
+    most = "at most " if calls_for.short_rest(costs.job).on and samples[0].tried < samples[0].steps else ""
+    yield f"{most}{costs.scaling.steps} steps: {', '.join(names)}"
     calls, transforms, sums = (
         samples[0].total(name) / costs.scaling.steps for name in ("operator", "fft", "allreduce")
     )

@@ -16,6 +16,7 @@ from ..effects import decisions as calls_for
 from ..job import Job
 from ..march import March
 from ..parallel.slab import Slab, deal
+from ..stationary import steps_to_make
 
 BLOCK = 3  # steps of a block, of which the first settles
 CALLS = 12  # operator calls expected of a step that starts from the one before
@@ -72,6 +73,8 @@ class Sample:
 
     def of(self, job: Job) -> "Sample":
         """What this says of the same job on another grid: its number of steps may be another one in each stage."""
+        if job.grid == self.job.grid:
+            return self
         spans = calls_for.timeline(job).spans
         stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(self.stages, spans, strict=True))
         return replace(self, stages=tuple(stages))
@@ -97,20 +100,32 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
     slab, began = march.scene.slab, time.perf_counter()
     stages = [Stage(span.jumps + span.count) for span in timeline.spans]
     per_call = float("inf")
-    for step in islice(timeline, FIRST):
-        cost = _made(march, step)
-        stages[step.stage].add(1.0, cost)
+    as_run = steps_to_make(march, timeline)
+    for step in islice(as_run, FIRST):
+        cost = _as_run(march, step, stages)
         per_call = min(per_call, cost["seconds"] / max(cost["operator"], 1.0))
     left = max(seconds - (time.perf_counter() - began), 0.0)
     affordable = slab.agree(left / (CALLS * per_call)) / len(timeline)
+    if affordable >= 1.0:
+        for step in as_run:
+            _as_run(march, step, stages)
+        return stages
     for span, stage in zip(timeline.spans, stages, strict=True):
-        for step, weight in chosen(timeline, range(max(span.before, FIRST) + 1, span.last + 1), affordable):
+        for step, weight in chosen(timeline, range(max(span.before, march.row.step) + 1, span.last + 1), affordable):
             if slab.agree(time.perf_counter() - began > LATE * seconds):
                 return stages
             cost = _made(march, step)
             if weight:
                 stage.add(weight, cost)
     return stages
+
+
+def _as_run(march: March, step: Step, stages: list[Stage]) -> dict[str, float]:
+    """Make a step of the run, which stands for itself, and for others that the run does not make."""
+    cost = _made(march, step)
+    stages[step.stage].steps -= step.passed
+    stages[step.stage].add(1.0, cost)
+    return cost
 
 
 def _made(march: March, step: Step) -> dict[str, float]:
