@@ -175,7 +175,7 @@ def _errors(
         for band in bands or [Band(1.0, 1.0, 1.0, (0.0, 0.0))]  # a flat surface: every phase is one of rest
         for errors in _Passing(prony, integrator, band, start).errors(phases)
     ]
-    fast, slow = np.max(found, axis=0, initial=0.0)
+    fast, slow = np.max(found or np.zeros((1, 2, prony.moduli.size)), axis=0, initial=0.0)
     return fast, slow
 
 
@@ -212,12 +212,12 @@ class _Passing:
         return np.asarray(self.prony.moduli * np.minimum(self.omega[..., None] * self.prony.relaxation_times, 1.0))
 
     def fast(self, phase: Phase) -> Array:
-        prony = self.prony
-        resting = prony.moduli * np.minimum(prony.relaxation_times / phase.first, 1.0)
-        before = np.maximum(self.held, self.moving if self.omega.any() else resting)
+        passing = self.omega[..., None] > 0.0
+        resting = self.prony.moduli * np.minimum(self.prony.relaxation_times / phase.first, 1.0)
+        before = np.maximum(self.held, np.where(passing, self.moving, resting))
         dropped = self.step(phase.first)[0] * before
         decay, gain = self.step(phase.last)
-        self.held = decay * before + (self.moving if self.omega.any() else gain)
+        self.held = decay * before + np.where(passing, self.moving, gain)
         return self.share(dropped, self.modulus(phase.first))
 
     @np.errstate(over="ignore")  # infinitely many relaxation times are all right

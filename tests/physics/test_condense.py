@@ -180,8 +180,9 @@ def test_no_accuracy_no_folding() -> None:
     assert nothing(TYRE, "why").kept == found.kept
 
 
-def test_a_body_that_has_no_time_is_elastic() -> None:
-    instants = [Phase(0.0, 0.0, 0.0, (0.0, 0.0), jump=True)] * 3
+@pytest.mark.parametrize("count", [0, 3])
+def test_a_body_that_has_no_time_is_elastic(count: int) -> None:
+    instants = [Phase(0.0, 0.0, 0.0, (0.0, 0.0), jump=True)] * count
     found = condense(TYRE, instants, [ROAD], "exponential", 1e-3)
     assert found.frozen == tuple(range(12))
     assert found.bound == 0.0
