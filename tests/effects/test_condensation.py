@@ -14,6 +14,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 
 from parcontact import job, runner, scene
+from parcontact.clock import steps
 from parcontact.effects.condensation import bands, condensed, phases
 from parcontact.errors import InputError
 from parcontact.job import Job
@@ -95,6 +96,23 @@ def test_folded_branches_have_no_map_and_friction_is_within_the_bound() -> None:
     assert 0.2 < fewer.row.measures.contact_area < 0.9
     wrong = np.max(np.abs(friction[0] - friction[1])) / friction[1][-1]
     assert 0.01 * found.bound < wrong < found.bound <= 1e-2
+
+
+@pytest.mark.parametrize("pressure", [5e3, 3e5])
+def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: float) -> None:
+    """Five times through a periodic box, of which 6 or 72 % touch: the same tracks yield for longer and longer.
+
+    A wave that passes misses 2/(w tau) < 2 % of the branch at most, one along the tracks 22 %.
+    """
+    slide = {**SLIDE, "pressure": pressure, "distance": 5e-3}
+    numerics = {"accuracy": 0.0, "tolerance": 1e-7}
+    marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
+    base = marches[1].scene.frame
+    marches[1].scene.material = Zener(base.slab, base.prony, "exponential", base.dtype, frozen=[1])
+    timeline = list(steps(base.job.history, base.job.grid))
+    friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
+    wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]
+    assert 0.05 < wrong / marches[0].scene.condensed.frozen_errors[1] < 1.0
 
 
 def test_nothing_to_fold_costs_nothing() -> None:
