@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from . import march, restart, scene, state, steadystart, watch
 from .clock import Timeline, reached
+from .effects import decisions as calls_for
 from .errors import InputError, RunError
 from .failure import StepError
 from .job import Job, Rough
 from .march import March
 from .parallel.slab import Slab
-from .physics.energy import ZenerEnergy
 from .record import checkpoint, plans
 from .record.checkpoint import Entry, Facts
 from .record.directory import Directory
@@ -50,7 +50,7 @@ def run(job: Job, slab: Slab, options: Options) -> int:
         marching = March(built)
         if origin:
             state.restore(marching, origin.contents, slab)
-        elif job.initial.state == "steady":
+        elif calls_for.steady_start(job).on:
             steadystart.begin(marching)
         plans.keep(job, slab)
         provenance = _provenance(job, slab, origin)
@@ -98,7 +98,7 @@ def _begin(
         directory.go_back(origin.contents.step)
     else:
         directory.clear()
-    split = job.output.branch_dissipation and isinstance(built.energy, ZenerEnergy)
+    split = calls_for.branch_dissipation(job).on
     dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
     after = origin.contents.step if origin else None
     return Recorder(job, built.slab, directory, provenance, total, after, dissipated, quiet)

@@ -108,6 +108,8 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
     affordable = slab.agree(left / (CALLS * per_call)) / len(timeline)
     if affordable >= 1.0:
         for step in as_run:
+            if slab.agree(time.perf_counter() - began > LATE * seconds):
+                break
             _as_run(march, step, stages)
         return stages
     for span, stage in zip(timeline.spans, stages, strict=True):

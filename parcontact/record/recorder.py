@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
+from ..effects import decisions as calls_for
 from ..errors import InputError
 from ..job import Job
 from ..parallel.slab import Array, Slab
@@ -55,7 +56,7 @@ class Recorder:
     def _begin_fields(self, job: Job, provenance: Provenance, total: int, after: int | None) -> FieldsFile | None:
         path, output = self.path / "fields.h5", job.output
         steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), *([total] if total else [])})
-        if not output.fields or not steps:
+        if not calls_for.fields(job).on or not steps:
             if after is not None:
                 fields.cut_back(path, self.slab, after)
             return None
