@@ -4,10 +4,11 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
-from .job import GeometricStep, Grid, Stage
+from .job import GeometricStep, Grid, Ramp, Stage
 
 ROUND_OFF = 1e-9  # relative: a duration this close to a whole number of steps is one
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
@@ -116,24 +117,22 @@ class Span:
     def moves(self) -> bool:
         return self.count > 0 and any(self.stage.velocity)
 
-    @property
+    @cached_property
     def rests(self) -> bool:
         """Whether it stands under a constant load, and its steps may be as long as what happens allows."""
         stage = self.stage
         return not any(stage.velocity) and stage.load.constant and isinstance(stage.time_step, GeometricStep)
 
-    @property
-    def end(self) -> float:
-        """When its last step ends [s]."""
-        return self.time(self.count)
-
     def time(self, index: int) -> float:
         """When the step `index` of those that last ends [s]."""
         return self.start + self.ends[index] * self.stage.seconds if index else self.start
 
-    def interval(self, index: int) -> float:
-        """How long the step `index` takes [s]: from the stage alone, as late instants may have no digits for it."""
-        return (self.ends[index] - self.ends[index - 1]) * self.stage.seconds
+    def interval(self, index: int, since: int | None = None) -> float:
+        """How long the step `index` takes, or all steps `since` another one have taken with it [s].
+
+        From the stage alone, as late instants may have no digits for it.
+        """
+        return (self.ends[index] - self.ends[index - 1 if since is None else since]) * self.stage.seconds
 
     def position(self, index: int) -> tuple[float, float]:
         """Where the surface then is [m]."""
@@ -141,16 +140,33 @@ class Span:
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
+    @cached_property
+    def load(self) -> Ramp:
+        return self.stage.load
+
+    @cached_property
+    def facts(self) -> tuple[tuple[float, float], str]:
+        """Of all steps: velocity and control."""
+        return self.stage.velocity, self.stage.control
+
+    def place(self, number: int) -> int:
+        """Which of those that last the step of this number is; 0 is the jump."""
+        return number - self.before - self.jumps
+
+    def leap(self, number: int, target: int) -> Step:
+        """The steps from one number to another in one."""
+        dt = self.interval(self.place(target), since=self.place(number) - 1)
+        return self.step(target)._replace(dt=dt, growth=0.0, passed=target - number)
+
     def step(self, number: int) -> Step:
         """The step of this number of the history."""
-        index, stage = number - self.before - self.jumps, self.stage
-        facts = (stage.velocity, stage.control)
+        index = self.place(number)
         if index == 0:
-            return Step(number, self.index, self.start, 0.0, self.origin, *facts, stage.load.start, 0.0)
+            return Step(number, self.index, self.start, 0.0, self.origin, *self.facts, self.load.start, 0.0)
         dt = self.interval(index)
         growth = dt / self.interval(index - 1) if index > 1 else 0.0
-        load = stage.load.at(min(self.ends[index], 1.0))
-        return Step(number, self.index, self.time(index), dt, self.position(index), *facts, load, growth)
+        load = self.load.at(min(self.ends[index], 1.0))
+        return Step(number, self.index, self.time(index), dt, self.position(index), *self.facts, load, growth)
 
 
 class Timeline:

@@ -33,8 +33,8 @@ def steps_to_make(march: "March", timeline: Timeline, until: float | None = None
     stop = len(timeline) if until is None else timeline.first_reaching(until)
     while (number := march.row.step + 1) <= len(timeline):
         span = timeline.span(number)
-        target = min([span.last, *_due(march, number), *([stop] if stop >= number else [])])
-        yield _leap(march, timeline[target], number) if _at_rest(march, span, number, target) else timeline[number]
+        target = min([span.last, *_due(march, number), *([stop] if stop >= number else [])]) if span.rests else number
+        yield span.leap(number, target) if _at_rest(march, span, number, target) else span.step(number)
 
 
 def _due(march: "March", number: int) -> list[int]:
@@ -43,21 +43,17 @@ def _due(march: "March", number: int) -> list[int]:
     return [-(-number // output.every) * output.every] if output.fields else []
 
 
-def _leap(march: "March", step: Step, number: int) -> Step:
-    return step._replace(dt=step.time - march.row.time, growth=0.0, passed=step.number - number)
-
-
 def _at_rest(march: "March", span: Span, number: int, target: int) -> bool:
     """Whether from a step on nothing changes until the end of its stage, and there is a step to spare; collective."""
-    first = span.before + span.jumps + 1
-    if target <= number or number < first or not span.rests:
+    index = span.place(number)
+    if target <= number or index < 1:
         return False
     material = march.scene.material
     if not isinstance(material, Zener):
         return True
-    if number == first:  # a jump of the load has just been: branches that have no map have not relaxed yet
+    if index == 1:  # a jump of the load has just been: branches that have no map have not relaxed yet
         return False
-    return remaining(march, material, span.end - march.row.time) <= march.scene.job.numerics.tolerance
+    return remaining(march, material, span.interval(span.count, since=index - 1)) <= march.scene.job.numerics.tolerance
 
 
 def remaining(march: "March", material: Zener, seconds: float) -> float:

@@ -10,6 +10,8 @@ along x, of another precision, not aligned) pass through a block too. Besides it
 on several ranks what it sends, which is less than another one.
 """
 
+from functools import cached_property
+
 import numpy as np
 import pyfftw
 from mpi4py import MPI
@@ -93,14 +95,14 @@ class FFT:
         self._make_blocks()
         self._make_plans()
 
-    @property
+    @cached_property
     def modes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Signed wave numbers along x and y, shapes (1, nkx_loc) and (my, 1), which broadcast to a spectrum."""
         along_y = np.arange(self.my)
         signed_y = np.where(2 * along_y <= self.my, along_y, along_y - self.my)
         return np.arange(self.columns.start, self.columns.stop)[None, :], signed_y[:, None]
 
-    @property
+    @cached_property
     def multiplicity(self) -> Array:
         """How often each x-wavenumber of this half spectrum stands in the full one (1 or 2), shape (1, nkx_loc)."""
         along_x = self.modes[0]

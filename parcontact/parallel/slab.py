@@ -71,9 +71,9 @@ class Slab:
         maximum in one would need an operator of our own, which MPI may apply to any part of the numbers.
         """
         self.tally["allreduce"] += 1
-        own = np.array([*sums, *maxima], dtype=np.float64)
         if self.comm.size == 1:
-            return own.tolist()
+            return [*map(float, sums), *map(float, maxima)]
+        own = np.array([*sums, *maxima], dtype=np.float64)
         everyone = np.empty((self.comm.size, own.size))
         self.comm.Allgather(own, everyone)
         summed, largest = everyone[:, : len(sums)].sum(axis=0), everyone[:, len(sums) :].max(axis=0)

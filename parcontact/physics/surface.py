@@ -8,6 +8,7 @@ which is taken as a standing wave. Shapes in closed form are evaluated anew. Eve
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +84,7 @@ class Surface:
             transform = self.fft.forward(pressure)
             phase_x, phase_y = self._phases(shift)
             loops.displace(transform, phase_x.conj(), phase_y.conj(), transform)
-            slopes, weight = self._slope_symbols(), self.fft.multiplicity.ravel()
-            sums = loops.tangential(transform, self.waves, *slopes, weight)
+            sums = loops.tangential(transform, self.waves, *self._slope_symbols, self.fft.multiplicity.ravel())
             along_x, along_y = (value / (self.fft.mx * self.fft.my) for value in sums)
         if self.shapes:
             points = np.nonzero(pressure)
@@ -100,24 +100,28 @@ class Surface:
     def _phases(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
         """Factors along x and y that move a transform by `shift`; at the Nyquist wavenumber their real part."""
         factors = []
-        counts = self.fft.mx, self.fft.my
-        for q, mode, count, length, s in zip(
-            wavenumbers(self.fft, self.size), self.fft.modes, counts, self.size, shift, strict=True
-        ):
-            phase = np.exp(-1j * q.ravel() * math.fmod(s, length))
-            nyquist = 2 * np.abs(mode.ravel()) == count
+        for (q, nyquist), length, s in zip(self._wavenumbers, self.size, shift, strict=True):
+            phase = np.exp(-1j * q * math.fmod(s, length))
             phase[nyquist] = phase[nyquist].real
             factors.append(phase)
         return factors[0], factors[1]
 
+    @cached_property
+    def _wavenumbers(self) -> list[tuple[Array, Indices]]:
+        """Along x and y: this rank's wavenumbers, and where that of Nyquist is among them."""
+        counts = self.fft.mx, self.fft.my
+        return [
+            (q.ravel(), np.flatnonzero(2 * np.abs(mode) == count))
+            for q, mode, count in zip(wavenumbers(self.fft, self.size), self.fft.modes, counts, strict=True)
+        ]
+
+    @cached_property
     def _slope_symbols(self) -> tuple[Array, Array]:
         """What stands for the wavenumber in a slope; 0 at the Nyquist wavenumber, whose slope vanishes on the grid."""
         symbols = []
-        for q, mode, count, step in zip(
-            wavenumbers(self.fft, self.size), self.fft.modes, (self.fft.mx, self.fft.my), self.cell, strict=True
-        ):
-            symbol = np.sin(q.ravel() * step) / step if self.differences else q.ravel().copy()
-            symbol[2 * np.abs(mode.ravel()) == count] = 0.0
+        for (q, nyquist), step in zip(self._wavenumbers, self.cell, strict=True):
+            symbol = np.sin(q * step) / step if self.differences else q.copy()
+            symbol[nyquist] = 0.0
             symbols.append(symbol)
         return symbols[0], symbols[1]
 

@@ -1,7 +1,8 @@
 """What a run says: one line per step on root, a progress bar on a terminal, the same lines in run.log."""
 
-import logging
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
@@ -25,34 +26,35 @@ class Console:
     """Root's voice; the other ranks have `Silence` instead, so that no caller asks who it is."""
 
     def __init__(self, log: Path | None, quiet: bool, total: int) -> None:
-        self._log = logging.Logger("parcontact")
-        if log is not None:
-            handler = logging.FileHandler(log)
-            handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
-            self._log.addHandler(handler)
+        self._file = log.open("a") if log is not None else None
         self._quiet, self._total = quiet, total
         self._bar: tqdm[None] | None = None
         self._headed = False
 
     def say(self, text: str) -> None:
         """A message for the user and the log."""
-        self._log.info(text)
+        self.log(text)
         if not self._quiet:
             self._write(text)
 
     def log(self, text: str) -> None:
-        """For run.log only."""
-        self._log.info(text)
+        """For run.log only, which no run ends for."""
+        if self._file is not None:
+            now = time.time()
+            stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now))
+            with suppress(OSError):
+                self._file.write(f"{stamp},{int(now % 1.0 * 1000):03d} {text}\n")
+                self._file.flush()
 
     def warn(self, text: str) -> None:
         """A message that is shown even to those who asked for quiet."""
-        self._log.warning("warning: %s", text)
+        self.log(f"warning: {text}")
         self._write(f"warning: {text}", sys.stderr)
 
     def step(self, row: Row) -> None:
         """One line per step."""
         text = line(row)
-        self._log.info(text)
+        self.log(text)
         if self._quiet:
             return
         if not self._headed:
@@ -69,8 +71,9 @@ class Console:
     def close(self) -> None:
         if self._bar is not None:
             self._bar.close()
-        for handler in self._log.handlers:
-            handler.close()
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.close()
 
     def _write(self, text: str, file: TextIO | None = None) -> None:
         if self._bar is not None:

@@ -20,6 +20,7 @@ where g < 0, only helps. Thus f falls for every step that is small enough (D. P.
 the number of iterations nearly independent of the grid. Everything here is dimensionless.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -69,7 +70,8 @@ class Certificate:
 
     @property
     def worst(self) -> float:
-        return float(np.max((self.complementarity, self.penetration, self.load)))  # NaN if one is
+        total = self.complementarity + self.penetration + self.load
+        return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)
 
 
 @dataclass(frozen=True)
