@@ -5,8 +5,10 @@ At 512 x 512 points `scripts/load_sweep.py` finds at most 34.
 
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from marching import load_script
+from numpy.testing import assert_allclose
 
 LIMIT = 60  # iterations to 1e-6
 load_sweep = load_script("load_sweep")
@@ -36,3 +38,24 @@ def test_last_gap(two_ways: bool, share: float) -> None:
     assert load_sweep.reversals(count) == 0
     assert len(count) < 20
     assert (count[-1] == 0) == (share >= 1.0)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_last_gap_between_points(side: float) -> None:
+    """On 37 x 31 points with the deepest point between them, at 1e-1 to 1e-16 from full contact: no pressure pulls,
+    and above it is p + K h to 1e-9; the nearer, the fewer iterations."""
+    x, y = (np.cos(2 * np.pi * (np.arange(points) + 0.3) / points) for points in (37, 31))
+    heights = x[None, :] * y[:, None]
+    solving = load_sweep.solver(heights, 1e-10)
+    waves = solving.preconditioner.apply(heights - heights.mean(), np.empty_like(heights))
+    counts = []
+    for exponent in range(-1, -17, -1):
+        mean = -waves.min() * (1.0 + side * 10.0**exponent)
+        found = load_sweep.cold(solving, heights, mean)
+        assert found.converged
+        assert found.p.min() >= 0.0
+        counts.append(found.iterations)
+        if side > 0.0:
+            assert_allclose(found.p, mean + waves, rtol=0, atol=1e-9 * float(waves.max()))
+    assert max(counts) < 20
+    assert all(before >= after for before, after in pairwise(counts))
