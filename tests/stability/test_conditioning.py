@@ -1,17 +1,24 @@
 """Any units, any datum of heights: everything inside a run is dimensionless and counted from the surface's mean."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from marching import column, marched
+from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from parcontact.march import March
-from parcontact.parallel.slab import Array
+from parcontact.parallel.slab import Array, Slab
 from parcontact.record.row import Row
+from parcontact.solve import kernels
+
+from . import twins
+from .scenes import Sketch
+from .trial import witness
 
 Json = dict[str, Any]
 NUMBERS = ("pressure", "force_x", "force_y", "friction", "contact_area", "mean_gap", "max_pressure")
@@ -55,6 +62,71 @@ def pressures(data: Json) -> tuple[list[Array], list[Row]]:
 
     _, rows = marched(data, [keep])
     return maps, rows
+
+
+# -- units -------------------------------------------------------------------------------------------------------------
+
+SCENE = Sketch(
+    heights=noise(2.0**-20),
+    size=(1e-3, 6e-4),
+    boundary="periodic",
+    material={
+        "model": "zener",
+        "modulus_inf": 1e6,
+        "branches": [{"G0": 3e6, "G1": 0.5e6, "eta1": 3e3}, {"modulus": 1e6, "relaxation_time": 10.0}],
+    },
+    history=(
+        {"pressure": 3e4},
+        {"pressure": {"from": 3e4, "to": 9e4}, "duration": 1e-2, "time_step": {"first": 1e-5, "growth": 5.0}},
+        {"force": 2e-2, "velocity": [2e-2, -7e-3], "duration": 1e-3, "time_step": 2.5e-4},
+        {"pressure": 0.0, "duration": 1.0, "time_step": 0.5},
+        {"approach": -1e-6},
+    ),
+    numerics={"tolerance": 1e-10, "accuracy": 0.0},
+)
+
+
+@pytest.mark.parametrize(
+    ("length", "modulus", "time"),
+    [
+        (1e-6, 1e3, 1e-12),  # nanometres, gigapascals, femtoseconds
+        (1e6, 1e-6, 1e12),  # kilometres, pascals, ages of the earth
+        (1e-6, 1e-6, 1.0),
+        (1e6, 1e3, 1e-9),
+        (3.0, 7.0, 1 / 3),  # no powers of two or ten
+    ],
+)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_extreme_units(length: float, modulus: float, time: float, boundary: str, tmp_path: Path) -> None:
+    """Nanometres and gigapascals, kilometres and pascals: as many iterations, and the same digits. The inner numbers
+    differ by less than a factor of two and by rounding; solves to 1e-10 make pressures agree to 1e-9 of the highest."""
+    plain = replace(SCENE, boundary=boundary)
+    other, told = twins.rescaled(plain, length, modulus, time)
+    one, two = witness(plain, tmp_path), witness(other, tmp_path)
+    assert one.violations == two.violations == []
+    assert one.failure == two.failure == ""
+    assert one.pressures.keys() == two.pressures.keys()
+    for step, p in one.pressures.items():
+        assert_allclose(told(two.pressures[step]), p, rtol=0, atol=1e-9 * max(p.max(), 1e-300))
+    energy = modulus * length**3
+    for name in ("work", "stored", "dissipated"):
+        assert_allclose(getattr(two.last, name) / energy, getattr(one.last, name), rtol=1e-9)
+    assert two.iterations == pytest.approx(one.iterations, abs=1)
+
+
+def test_units_of_powers_of_two_change_no_digit(tmp_path: Path) -> None:
+    """To the last bit, with everything that is multiplied by a unit on the way in and out."""
+    one = witness(SCENE, tmp_path)
+    for powers in ((-30, 30, -10), (10, -20, 40)):
+        other, told = twins.rescaled(SCENE, *(2.0**power for power in powers))
+        two = witness(other, tmp_path)
+        for step, p in one.pressures.items():
+            np.testing.assert_array_equal(told(two.pressures[step]), p)
+        length, modulus = 2.0 ** powers[0], 2.0 ** powers[1]
+        for name in NUMBERS:
+            unit = {"pressure": modulus, "max_pressure": modulus, "mean_gap": length}.get(name, 1.0)
+            unit = modulus * length**2 if name.startswith("force") else unit
+            assert getattr(two.last.measures, name) == getattr(one.last.measures, name) * unit
 
 
 # -- the datum of heights ----------------------------------------------------------------------------------------------
@@ -121,3 +193,22 @@ def test_a_short_stage_late_in_a_history(step: Any, tmp_path: Path) -> None:
         return column(rows, "work")[3:] - rows[2].work
 
     assert_allclose(work(1e10), work(1e5), rtol=1e-6)
+
+
+# -- sums over all points ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("nx", "ny"), [(2048, 512), (3, 400_000), (400_000, 3)])
+def test_sums_over_large_maps(communicators: list[MPI.Intracomm], nx: int, ny: int) -> None:
+    """Of a million positive numbers over 12 decades, against extended precision, on any number of ranks: to a rounding
+    for each number of a row and each row, at most, and to the last bit the same on all of them."""
+    whole = 10.0 ** np.random.default_rng(1).uniform(-12.0, 0.0, (ny, nx))
+    exact = float(np.sum(whole, dtype=np.longdouble))
+    squares = float(np.sum(whole.astype(np.longdouble) ** 2))
+    for comm in communicators:
+        slab = Slab(comm, nx, ny)
+        own = np.ascontiguousarray(whole[slab.rows])
+        found = slab.sum(kernels.total(own), kernels.dot(own, own), *kernels.weigh(own, own, own, -1.0))
+        assert_allclose(found, [exact, squares, exact, squares, exact], rtol=(nx + ny) * np.finfo(float).eps)
+        assert {tuple(other) for other in comm.allgather(found)} == {tuple(found)}
