@@ -129,7 +129,7 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
 
 def test_stages_not_tried_are_like_the_others() -> None:
     stages = (Stage(4, 4, 4.0, {"fft": 40.0}), Stage(6))
-    seen = Sample(job(), 1, 0.0, 0.0, 0.0, stages)
+    seen = Sample(job(), 1, 0.0, 0.0, 0.0, 0, stages)
     assert seen.total("fft") == 100.0
     assert seen.total("never counted") == 0.0
 
@@ -140,7 +140,7 @@ MACHINE = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10)
 def scaling(points: int, machine: Machine = MACHINE, **counts: float) -> Scaling:
     planned = job(grid={"points": points})
     sums = {"seconds": 1.0, "operator": 10.0, f"fft {points}x{points} float64": 20.0, "allreduce": 20.0, **counts}
-    return Scaling.of(planned, [Sample(planned, 1, 0.0, 1.0, 0.0, (Stage(1, 1, 1.0, sums),))], machine)
+    return Scaling.of(planned, [Sample(planned, 1, 0.0, 1.0, 0.0, 0, (Stage(1, 1, 1.0, sums),))], machine)
 
 
 def test_one_rank_is_what_was_seen() -> None:
@@ -169,7 +169,7 @@ def test_a_sample_on_some_ranks_is_gone_by_there(tmp_path: Path) -> None:
     """It comes from another process; others start from it, or from the one on fewer ranks."""
     planned = job()
     stages = [(Stage(1, 1, 1.0, {"seconds": seconds, "operator": 10.0}),) for seconds in (1.0, 0.7)]
-    one, two = (Sample(planned, 1 + n, 0.5, 1.0, 2.0, each) for n, each in enumerate(stages))
+    one, two = (Sample(planned, 1 + n, 0.5, 1.0, 2.0, 1000, each) for n, each in enumerate(stages))
     elsewhere.save(tmp_path / "sample", two)
     again = elsewhere.load(tmp_path / "sample", planned, 2.5)
     assert again == two
@@ -188,7 +188,7 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert max(tried.grid.points) <= 1024
     assert tried.grid.size == large.grid.size
     assert len(calls_for.timeline(tried)) < len(calls_for.timeline(large))
-    seen = Sample(tried, 1, 0.0, 1.0, 0.0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
+    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
     assert Scaling.of(large, [seen], MACHINE).steps == len(calls_for.timeline(large))
     ratio = Scaling.of(large, [seen], MACHINE).step(1) / Scaling.of(tried, [seen], MACHINE).step(1)
     assert ratio > large.grid.nx**2 / tried.grid.nx**2

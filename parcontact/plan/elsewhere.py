@@ -42,14 +42,12 @@ def _attempt(job: Job, words: Sequence[str], ranks: int, path: Path, seconds: fl
 
 def save(path: Path, sample: Sample) -> None:
     """Leave a sample where `load` finds it."""
-    stages = [asdict(stage) for stage in sample.stages]
-    path.write_text(
-        json.dumps({"building": sample.building, "took": sample.took, "stages": stages, "ranks": sample.ranks})
-    )
+    facts = {name: getattr(sample, name) for name in ("ranks", "building", "took", "resident")}
+    path.write_text(json.dumps({**facts, "stages": [asdict(stage) for stage in sample.stages]}))
 
 
 def load(path: Path, job: Job, whole: float) -> Sample:
     """The sample of a job that a program left which took so many seconds; what it did not try for was its start."""
     facts = json.loads(path.read_text())
-    stages = tuple(Stage(**stage) for stage in facts["stages"])
-    return Sample(job, facts["ranks"], whole - facts["took"], facts["building"], facts["took"], stages)
+    stages = tuple(Stage(**stage) for stage in facts.pop("stages"))
+    return Sample(job=job, starting=whole - facts["took"], stages=stages, **facts)

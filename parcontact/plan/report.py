@@ -102,13 +102,13 @@ def steps(costs: Costs) -> Iterator[str]:
 def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     """Seconds on some numbers of ranks, and where scaling ends."""
     scaling, machine = costs.scaling, costs.scaling.machine
-    yield "  ranks   memory [MB]     step [s]   messages   at work   whole run"
+    yield "  ranks     maps [MB]  resident [MB]     step [s]   messages   at work   whole run"
     for count in ranks:
-        step, held = scaling.step(count), memory.total(costs.job, count) / MEGA
-        yield (
-            f"{count:7d} {held:13.4g} {step:12.3g} {scaling.messages(count) / step:9.0%} "
-            f"{scaling.efficiency(count):9.0%} {_duration(costs.whole(count)):>11}"
-        )
+        step, held = scaling.step(count), memory.total(costs.job, count)
+        resident = held + scaling.sample(count).resident + costs.instant_bytes // count
+        shares = f"{scaling.messages(count) / step:9.0%} {scaling.efficiency(count):9.0%}"
+        memory_text = f"{held / MEGA:13.4g} {resident / MEGA:14.4g}"
+        yield f"{count:7d} {memory_text} {step:12.3g} {shares} {_duration(costs.whole(count)):>11}"
     yield f"scaling ends at {_ranks(scaling.end)}: with twice as many they would work for less than half of the time"
     many = max(ranks)
     yield (

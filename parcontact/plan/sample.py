@@ -5,6 +5,7 @@ cost is taken for all steps of the block's part of the stage. The jump of a stag
 short enough, is made as it is.
 """
 
+import resource
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -22,6 +23,7 @@ BLOCK = 3  # steps of a block, of which the first settles
 CALLS = 12  # operator calls expected of a step that starts from the one before
 LONG = 2  # steps that a long step costs
 FIRST = 2  # steps that are always made
+KILO = 1024  # bytes in what the system counts resident memory in
 LATE = 2.0  # times the time given: then no more steps are made
 
 
@@ -45,7 +47,7 @@ class Stage:
 class Sample:
     """What was seen of a job on some ranks: its stages, and how long all of it took [s].
 
-    `starting` the program, `building` the scene.
+    `starting` the program, `building` the scene; `resident` is the memory of root that is not in maps [bytes].
     """
 
     job: Job
@@ -53,6 +55,7 @@ class Sample:
     starting: float
     building: float
     took: float
+    resident: int
     stages: tuple[Stage, ...]
 
     @property
@@ -92,7 +95,9 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
         steadystart.begin(march)
     building = time.perf_counter() - began
     stages = tuple(_try(march, calls_for.timeline(job), seconds))
-    return Sample(job, slab.comm.size, starting, building, time.perf_counter() - began, stages)
+    took = time.perf_counter() - began
+    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO - slab.tally["map bytes at most"]
+    return Sample(job, slab.comm.size, starting, building, took, slab.agree(resident), stages)
 
 
 def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
