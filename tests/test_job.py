@@ -310,6 +310,19 @@ def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
     assert "cells_per_step up to 2)" in warning
 
 
+def test_warning_of_a_tolerance_below_rounding(tmp_path: Path) -> None:
+    """Of the precision that maps have: mixed is double there."""
+    for precision, low, other in (
+        ("single", 4e-7, "use precision: mixed or a larger"),
+        ("mixed", 8e-16, "use a larger"),
+    ):
+        chosen = f"numerics.precision={precision}"
+        (warning,) = job_of(tmp_path, SMALL, chosen, f"numerics.tolerance={low:e}").warnings
+        assert f"which {precision} precision reaches" in warning
+        assert warning.endswith(f"{other} tolerance")
+        assert job_of(tmp_path, SMALL, chosen, f"numerics.tolerance={1.3 * low:e}").warnings == ()
+
+
 def test_warning_of_velocity_without_duration(tmp_path: Path) -> None:
     (warning,) = job_of(tmp_path, SMALL, "history.0.velocity=3").warnings
     assert warning == "history.0: nothing slides in a stage without duration or distance; its velocity has no effect"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter of luck (paper, end of section 3)
 CELLS_PER_WAVE = 8  # fewer under-resolve the contact of the shortest waves (paper, end of section 3)
 STEPS_PER_WAVE = 4  # fewer skip over the shortest waves while sliding
+ROUNDINGS = 4.0  # of a number in a certificate
 ROUND_OFF = 1e-9
 
 
@@ -24,6 +25,7 @@ def warnings(job: Job) -> Iterator[str]:
     yield from _surface(job)
     for index, stage in enumerate(job.history):
         yield from _stage(job, index, stage)
+    yield from _precision(job)
 
 
 def _directions(grid: Grid) -> Iterator[tuple[str, float, float]]:
@@ -78,6 +80,18 @@ def _stage(job: Job, index: int, stage: Stage) -> Iterator[str]:
             f"history.{index}: the surface slides {slid:.3g} m in one step, {slid / short:.2g} of its shortest wave; "
             f"use time steps up to {short / STEPS_PER_WAVE / stage.speed:.3g} s "
             f"(cells_per_step up to {short / STEPS_PER_WAVE / job.grid.dx:.3g})"
+        )
+
+
+def _precision(job: Job) -> Iterator[str]:
+    numerics = job.numerics
+    reach = ROUNDINGS * (2.0**-23 if numerics.precision == "single" else 2.0**-52)
+    if numerics.tolerance < reach:
+        other = "precision: mixed or " if numerics.precision == "single" else ""
+        yield (
+            f"numerics.tolerance: {numerics.tolerance:g} is below {reach:.1g}, which {numerics.precision} precision "
+            "reaches where displacements are as large as the surface is high, in proportion more or less elsewhere; "
+            f"use {other}a larger tolerance"
         )
 
 
