@@ -64,7 +64,7 @@ def results(boundary: str, precision: str) -> Results:
     }
     march, found = marched(data)
     series = {name: column(found, name)[2:] for name in NAMES}
-    return series, march.field("pressure"), march.scene.slab.tally["operator"]
+    return series, march.field("pressure").astype(np.float64), march.scene.slab.tally["operator"]
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
