@@ -23,7 +23,13 @@ class Twin:
 
 def twin(dice: Random, of: Sketch) -> Twin:
     """One of them."""
-    return dice.choice([offset, scaled, mirrored, transposed])(dice, of)
+    return dice.choice([offset, scaled, mirrored, transposed, *([] if of.energy else [folded, folded])])(dice, of)
+
+
+def folded(dice: Random, of: Sketch) -> Twin:
+    """With a map for every branch, if it did without some; without some, if it had all."""
+    numerics = {**of.numerics, "accuracy": 0.0 if of.numerics["accuracy"] else 1e-3}
+    return Twin("accuracy", replace(of, numerics=numerics), lambda p: p)
 
 
 def offset(dice: Random, of: Sketch) -> Twin:

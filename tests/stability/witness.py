@@ -41,7 +41,7 @@ class Witness:
     march: March
     violations: list[str] = field(default_factory=list)
     pressures: dict[int, Array] = field(default_factory=dict)
-    blurs: dict[int, float] = field(default_factory=dict)
+    blurs: dict[int, tuple[float, float]] = field(default_factory=dict)
     failure: str = ""
     beyond: bool = False
     iterations: int = 0
@@ -71,10 +71,10 @@ class Witness:
             step = timeline[row.step]
             self.iterations = max(self.iterations, row.iterations)
             self.pressures[row.step] = self.march.field("pressure")
-            self.blurs[row.step] = self._blur()
             for broken, sentence in [*self._contact(step), *self._energy(), *self._numbers()]:
                 if broken:
                     self.violations.append(f"step {step.number} (dt = {step.dt:g} s): {sentence}")
+            self.blurs[row.step] = self._blur()
         self.last = row
 
     # -- what must hold ------------------------------------------------------------------------------------------------
@@ -111,6 +111,8 @@ class Witness:
         """Nothing is gained: energies are not negative and no branch gives back what it has dissipated. With the
         integrator that knows the motion within a step, work is what is stored and what is dissipated."""
         row, scene, scales = self.march.row, self.march.scene, self.scales
+        if scene.energy is None:
+            return
         lost = [b - a for a, b in zip(self.last.branch_dissipation, row.branch_dissipation, strict=True)]
         grid, prony = scene.job.grid, scene.frame.prony
         stiffest = prony.modulus_inf + float(prony.moduli.sum())
@@ -125,16 +127,18 @@ class Witness:
 
     def _numbers(self) -> Iterator[tuple[bool, str]]:
         row, tolerance = self.march.row, self.march.scene.job.numerics.tolerance
-        numbers = [*vars(row.measures).values(), row.work, row.stored, row.dissipated, *row.branch_dissipation]
+        numbers = list(vars(row.measures).values())
+        if self.march.scene.energy is not None:
+            numbers += [row.work, row.stored, row.dissipated, *row.branch_dissipation]
         yield not all(map(math.isfinite, numbers)), f"a number is not finite: {row}"
         yield not 0.0 <= row.measures.contact_area <= 1.0, f"contact area {row.measures.contact_area}"
         yield not row.certificate.worst <= tolerance, f"{row.certificate} where {tolerance:g} was asked for"
 
     # -- how exact it can be -------------------------------------------------------------------------------------------
 
-    def _blur(self) -> float:
+    def _blur(self) -> tuple[float, float]:
         scene, modulus = self.march.scene, self.march.alpha * self.march.scene.units.modulus
-        return 2.0 * scene.job.numerics.tolerance * scene.frame.height * modulus
+        return 2.0 * scene.job.numerics.tolerance * scene.frame.height * modulus, 2.0 * self.scales.length * modulus
 
     def _beyond(self, step: Step) -> bool:
         """Whether the last digit of the pressure moves the body by more than the certificate allows."""
@@ -156,12 +160,14 @@ def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> fl
 
         <p1 - p2, A (p1 - p2)> = alpha <p1 - p2, g1 - g2> <= 2 c H alpha (sum p1 + sum p2).
 
-    That is for one solve; what a history adds is much less than this bound leaves.
+    That is for one solve; what a history adds is much less than this bound leaves. If one of them has folded branches,
+    displacements are wrong by the bound that it gives, times the largest length, and gaps with them.
     """
-    largest = 0.0
+    folded, largest = abs(one.march.scene.condensed.bound - other.march.scene.condensed.bound), 0.0
     for step in one.pressures.keys() & other.pressures.keys():
         p, q = one.pressures[step], told(other.pressures[step])
-        allowed = one.blurs[step] * one.march.scene.slab.sum(float(p.sum() + q.sum()))[0]
+        certified, by_folding = one.blurs[step]
+        allowed = (certified + folded * by_folding) * one.march.scene.slab.sum(float(p.sum() + q.sum()))[0]
         apart = energy_of(one.march, p - q)
         if apart > 0.0:
             largest = max(largest, apart / allowed)
