@@ -113,18 +113,23 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
     affordable = slab.agree(left / (CALLS * per_call)) / len(timeline)
     if affordable >= 1.0:
         for step in as_run:
-            if slab.agree(time.perf_counter() - began > LATE * seconds):
+            if slab.agree(_late(began, seconds, stages)):
                 break
             _as_run(march, step, stages)
         return stages
     for span, stage in zip(timeline.spans, stages, strict=True):
         for step, weight in chosen(timeline, range(max(span.before, march.row.step) + 1, span.last + 1), affordable):
-            if slab.agree(time.perf_counter() - began > LATE * seconds):
+            if slab.agree(_late(began, seconds, stages)):
                 return stages
             cost = _made(march, step)
             if weight:
                 stage.add(weight, cost)
     return stages
+
+
+def _late(began: float, seconds: float, stages: list[Stage]) -> bool:
+    """Whether to stop, but not before there is more than the first steps, which start from nothing."""
+    return time.perf_counter() - began > LATE * seconds and sum(stage.tried for stage in stages) >= FIRST + BLOCK - 1
 
 
 def _as_run(march: March, step: Step, stages: list[Stage]) -> dict[str, float]:

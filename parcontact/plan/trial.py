@@ -14,7 +14,7 @@ from . import memory
 
 PER_POINT = 1.2e-8  # seconds of an operator call per point, and of what belongs to it: enough to choose a grid by
 PADDED = 3.0  # times that in an isolated contact
-CALLS = 100  # operator calls that a trial makes at least
+CALLS = 200  # operator calls that a trial makes at least
 SHARE = 0.7  # of the memory that is free
 MEMINFO = Path("/proc/meminfo")
 WAVE = 2.0  # cells that the shortest wave needs
