@@ -47,10 +47,10 @@ MUTANTS = (
     Mutant(
         "sums in single precision",
         "parallel/slab.py",
-        "own = np.array([*sums, *maxima], dtype=np.float64)",
-        "own = np.array([*sums, *maxima], dtype=np.float32).astype(np.float64)",
+        "return [*map(float, sums), *map(float, maxima)]",
+        "return [float(np.float32(value)) for value in (*sums, *maxima)]",
     ),
-    Mutant("slope at the Nyquist wavenumber", SURFACE, "symbol[2 * np.abs(mode.ravel()) == count] = 0.0", "pass"),
+    Mutant("slope at the Nyquist wavenumber", SURFACE, "symbol[nyquist] = 0.0", "pass"),
     Mutant(
         "Nyquist column counted twice", "parallel/fft.py", "(along_x == 0) | (2 * along_x == self.mx)", "along_x == 0"
     ),
