@@ -219,3 +219,18 @@ def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> No
         __main__.main(["plan", "job.yaml", *words])
     assert ended.value.code == 2
     assert "must be" in capsys.readouterr().err
+
+
+def test_what_cannot_be_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No mpirun, no sample; a place that cannot be written to, a guess."""
+    monkeypatch.setattr(elsewhere, "MPIRUN", tmp_path / "absent")
+    assert list(elsewhere.samples(job(), ["job.yaml"], [2], 1.0)) == []
+    assert machine.write_rate(Path("/proc/out")) == machine.SLOW_WRITE
+    assert machine.write_rate(tmp_path / "not" / "yet") > 0.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_too_large_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is no memory for any grid, nothing is tried."""
+    monkeypatch.setattr(trial, "_free", lambda: 1000)
+    assert trial.grid_for(job(), 1, 10.0) is None
