@@ -93,14 +93,15 @@ def test_heights_that_are_not_finite_cannot_be_helped() -> None:
     assert len(tried) == 1
 
 
+@pytest.mark.parametrize("control", [LOAD, Approach(-0.02)])
 @pytest.mark.parametrize("shape", [(1, 64), (37, 41), (6, 128)])
-def test_grids_that_cannot_be_halved(shape: tuple[int, int]) -> None:
+def test_grids_that_cannot_be_halved(shape: tuple[int, int], control: MeanPressure | Approach) -> None:
     """Along a direction of few or odd points they stay as they are."""
     h = np.random.default_rng(1).standard_normal(shape)
     body = solver(h, tolerance=1e-9)
     body.p.fill(np.inf)
     with np.errstate(invalid="ignore"):
-        contact, tried = retry.again(body, h, LOAD, body.solve(h, LOAD), factory(np.ptp(h)))
+        contact, tried = retry.again(body, h, control, body.solve(h, control), factory(np.ptp(h)))
     assert contact.converged
     grids = {37: 1, 1: 2, 6: 3}[shape[0]]
     assert tried == ["a cold start" if grids == 1 else f"a cold start on {grids} nested grids"]
