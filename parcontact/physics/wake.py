@@ -14,6 +14,8 @@ the influence coefficients are Love's A(x) plus, for each term, those along the 
     K(x) = J_g A(x) + sum J_i int_0^inf exp(-t/l_i)/l_i A(x + v t) dt.
 """
 
+import math
+
 import numba
 import numpy as np
 import pyfftw
@@ -28,6 +30,7 @@ from .halfspace import Convolution, love, over_cell, tabulate, wavenumbers
 Vector = tuple[float, float]
 GAUSS = np.polynomial.legendre.leggauss(6)
 LOCAL = 1e-4  # a creep length below this share of a cell is taken as 0: the body has crept before it has moved
+NEAR = 2.0  # cells: closer than this the edge of the loaded cell is felt
 FAR = 16.0  # cells: from here on two terms of the expansion in the size of the cell are good to 1e-7
 DECAYED = 40.0  # creep lengths after which the memory is over, exp(-40)
 
@@ -108,11 +111,74 @@ def wake(x: Array, y: Array, dx: float, dy: float, velocity: Vector, creep: Cree
     if np.all(short):
         return near
     direction = (velocity[0] / speed, velocity[1] / speed)
-    x, y = np.broadcast_arrays(x, y)
     weights, lasting = creep.compliances[~short], lengths[~short]
-    along = np.empty(x.shape)
-    _integrate(np.ascontiguousarray(x), np.ascontiguousarray(y), dx, dy, direction, weights, lasting, *GAUSS, along)
-    return near + along
+    if velocity[1] == 0.0 and x.shape[0] == y.shape[1] == 1:
+        order = np.argsort(direction[0] * x[0], kind="stable")
+        ahead = direction[0] * x[0, order]
+        if np.allclose(np.diff(ahead), dx, rtol=1e-6):
+            along = np.empty((y.size, x.size))
+            along[:, order] = _sweep(ahead, y[:, 0], dx, dy, weights, lasting)
+            return near + along
+    x, y = np.broadcast_arrays(x, y)
+    return near + _over_memory(np.ascontiguousarray(x), np.ascontiguousarray(y), dx, dy, direction, weights, lasting)
+
+
+def _over_memory(x: Array, y: Array, dx: float, dy: float, direction: Vector, weights: Array, lengths: Array) -> Array:
+    out = np.empty(x.shape)
+    _integrate(x, y, dx, dy, direction, weights, lengths, *GAUSS, out)
+    return out
+
+
+def _sweep(x: Array, y: Array, dx: float, dy: float, weights: Array, lengths: Array) -> Array:
+    """The integrals along +x for rising x, dx apart, and all y, from the farthest cell back to the first:
+
+        K(x) = int_0^dx exp(-s/l)/l A(x + s) ds + exp(-dx/l) K(x + dx),
+
+    which takes A at a few points per cell where an integral of its own for each cell takes hundreds.
+    """
+    shortest = float(lengths.min())
+    near, near_shares = _within_cell(dx, shortest, edge=True)
+    far, far_shares = _within_cell(dx, shortest, edge=False)
+    rate = (weights / lengths)[:, None]
+    near_memory, far_memory = (
+        shares * np.exp(-s / lengths[:, None]) * rate for s, shares in ((near, near_shares), (far, far_shares))
+    )
+    ends = np.empty((lengths.size, y.size))
+    last, rows = np.full((y.size, 1), x[-1]), np.ascontiguousarray(y.reshape(-1, 1))
+    for k in range(lengths.size):
+        ends[k] = _over_memory(last, rows, dx, dy, (1.0, 0.0), weights[k : k + 1], lengths[k : k + 1])[:, 0]
+    out = np.empty((y.size, x.size))
+    _recur(x, y, dx, dy, near, far, near_memory, far_memory, np.exp(-dx / lengths), ends, out)
+    return out
+
+
+def _within_cell(dx: float, shortest: float, edge: bool) -> tuple[Array, Array]:
+    """Gauss points and shares on (0, dx), in panels that grow from the shortest memory and, with `edge`, shrink towards
+    dx/2: there a point that comes from the centre of the loaded cell leaves it, and A has a logarithm in its slope."""
+    ends = shortest * 2.0 ** np.arange(max(math.ceil(math.log2(dx / shortest)), 0))
+    if edge:
+        steps = 0.5 * dx * 4.0 ** -np.arange(4.0)
+        ends = np.concatenate([ends, [0.5 * dx], 0.5 * dx - steps, 0.5 * dx + steps])
+    edges = np.unique([0.0, *ends[ends < dx], dx])
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (1.0 + GAUSS[0])).ravel(), (half * GAUSS[1]).ravel()
+
+
+@numba.njit(cache=True)
+def _recur(x, y, dx, dy, near, far, near_memory, far_memory, decay, ends, out):  # type: ignore[no-untyped-def]
+    """The recursion of `_sweep`, from the values at the last x; `near` are the nodes close to the loaded cell."""
+    for j in range(y.size):
+        kept = ends[:, j].copy()
+        out[j, -1] = kept.sum()
+        for i in range(x.size - 2, -1, -1):
+            close = abs(x[i]) < NEAR * dx and abs(y[j]) < NEAR * dy
+            nodes, memory = (near, near_memory) if close else (far, far_memory)
+            kept *= decay
+            for n in range(nodes.size):
+                there = _love(x[i] + nodes[n], y[j], dx, dy)
+                for k in range(kept.size):
+                    kept[k] += memory[k, n] * there
+            out[j, i] = kept.sum()
 
 
 @numba.njit(cache=True)
@@ -120,7 +186,7 @@ def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  
     """Integral over s > 0 of `sum weights/lengths exp(-s/lengths) A(x + s direction)`, nu = 1/2.
 
     Gauss panels no longer than what changes there: the memory at its shortest length, and later at s itself; the
-    displacement at half the distance from the cell.
+    displacement at half the distance from the cell, and at its edge.
     """
     cell = min(dx, dy)
     shortest, end = lengths.min(), DECAYED * lengths.max()
@@ -129,7 +195,7 @@ def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  
             total, s = 0.0, 0.0
             while s < end:
                 distance = np.hypot(x[j, i] + s * direction[0], y[j, i] + s * direction[1])
-                step = min(max(shortest, s), 0.25 * cell + 0.5 * distance, end - s)
+                step = min(max(shortest, s), 0.1 * cell + 0.5 * max(distance - cell, 0.0), end - s)
                 for node, share in zip(nodes, shares):  # noqa: B905  # numba has no strict zip
                     t = s + 0.5 * step * (1.0 + node)
                     memory = 0.0

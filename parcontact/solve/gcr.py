@@ -8,6 +8,9 @@ ones, and goes as far as makes the sum of squares of `r = C R (A x - h)` smalles
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from .contact import Operator
@@ -23,12 +26,12 @@ class Directions:
         self.z = slab.empty(dtype)
         self.r = slab.empty(dtype)
 
-    def improve(self, x: Array, u: Array, h: Array, working: Array, limit: int, reduction: float) -> int:
+    def improve(self, x: Array, u: Array, h: Array, working: NDArray[np.bool_], limit: int, reduction: float) -> int:
         """Up to `limit` steps on `working`, until the residual has fallen by `reduction`; u stays A x. Collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         if members == 0.0:
             return 0
-        size = self.slab.sum(_residual(working, u, h, total / members, self.r))[0]
+        size = self.slab.sum(residual(working, u, h, total / members, self.r))[0]
         goal = reduction**2 * size
         norms: list[float] = []
         means: list[float] = []
@@ -37,8 +40,8 @@ class Directions:
                 return step
             t, w = self.t[step], self.w[step]
             self.preconditioner.apply(self.r, self.z)
-            _, mean = self.slab.sum(*_sum_on(working, self.z))
-            _spread(working, self.z, mean / members, t)
+            _, mean = self.slab.sum(*sum_on(working, self.z))
+            spread(working, self.z, mean / members, t)
             self.operator.apply(t, w)
             self._orthogonalize(working, members, norms, means)
             total, square, product = self.slab.sum(*_products(working, w, self.r))
@@ -50,14 +53,16 @@ class Directions:
             size = self.slab.sum(_step(working, alpha, t, w, means[-1], x, u, self.r))[0]
         return limit
 
-    def _orthogonalize(self, working: Array, members: float, norms: list[float], means: list[float]) -> None:
+    def _orthogonalize(
+        self, working: NDArray[np.bool_], members: float, norms: list[float], means: list[float]
+    ) -> None:
         """Take from the newest direction what its image has in common with the earlier images, on the set."""
         last = len(norms)
         if last == 0:
             return
         w = self.w[last]
         sums = [_common(working, w, self.w[k]) for k in range(last)]
-        total, *common = self.slab.sum(_sum_on(working, w)[1], *sums)
+        total, *common = self.slab.sum(sum_on(working, w)[1], *sums)
         for k in range(last):
             beta = (common[k] - total * means[k]) / norms[k]
             _subtract(beta, self.t[k], self.t[last])
@@ -80,7 +85,7 @@ def gaps_on(working, u, h):
 
 
 @loop
-def _residual(working, u, h, mean, r):
+def residual(working, u, h, mean, r):
     """`r = u - h - mean` on the set, 0 elsewhere; returns its sum of squares."""
     size = 0.0
     for j in range(u.shape[0]):
@@ -94,7 +99,7 @@ def _residual(working, u, h, mean, r):
 
 
 @loop
-def _sum_on(working, z):
+def sum_on(working, z):
     count, total = 0.0, 0.0
     for j in range(z.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -108,7 +113,7 @@ def _sum_on(working, z):
 
 
 @loop
-def _spread(working, z, mean, t):
+def spread(working, z, mean, t):
     """`t = z - mean` on the set, 0 elsewhere."""
     for j in range(z.shape[0]):
         for i in range(z.shape[1]):

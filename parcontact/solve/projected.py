@@ -1,0 +1,112 @@
+"""Steps of smallest residual, projected onto the admissible pressures in each step.
+
+On the working set c (pressure, or penetration) of an admissible pressure x, a step goes along the preconditioned
+residual t and the last two changes of x, as far along each as makes the sum of squares of `C R (A x - h)` smallest (R:
+values on c, C: subtract the mean over c). Then what has become negative is put to 0, the load is restored, and A is
+applied anew, so that the changes that are kept have exact images. A need not be symmetric. Nothing is guaranteed: where
+a residual has nothing in common with the image of its own t, steps stop to help, and the caller has to notice.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import loop
+from ..parallel.slab import Array, Slab
+from .contact import Operator
+from .gcr import gaps_on, residual, spread, sum_on
+from .surround import Surround
+
+Set = NDArray[np.bool_]
+DIRECTIONS = 3  # the residual's, and the last two changes
+
+
+class Projected:
+    """Buffers: the maps t and w are lent, at least DIRECTIONS of them, as are r and z."""
+
+    def __init__(
+        self,
+        slab: Slab,
+        operator: Operator,
+        preconditioner: Operator,
+        lent: tuple[list[Array], list[Array], Array, Array],
+        dtype: type,
+    ) -> None:
+        self.slab, self.operator = slab, operator
+        t, w, self.r, self.z = lent
+        self.t, self.w = t[:DIRECTIONS], w[:DIRECTIONS]
+        self.surround = Surround(slab, preconditioner, dtype)
+
+    def begin(self) -> None:
+        """Forget earlier changes."""
+        for field in (*self.t, *self.w):
+            field.fill(0.0)
+
+    def step(self, x: Array, u: Array, h: Array, working: Set) -> None:
+        """Move x, which is then admissible but for its load; its image u is left as it was. Collective."""
+        members, total = self.slab.sum(*gaps_on(working, u, h))
+        residual(working, u, h, total / members, self.r)
+        self.surround.apply(working, self.r, self.z)
+        _, mean = self.slab.sum(*sum_on(working, self.z))
+        spread(working, self.z, mean / members, self.t[0])
+        self.operator.apply(self.t[0], self.w[0])
+        sums = np.array(self.slab.sum(*_gram(working, self.r, *self.w)))
+        a, b, c = self.slab.agree(_smallest(sums, members))
+        _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
+        self.w[2][...] = u
+
+    def keep(self, x: Array, u: Array) -> None:
+        """Remember the change that the last step has come to, now that u is the image of x."""
+        for kept, new in ((self.t, x), (self.w, u)):
+            np.subtract(new, kept[2], out=kept[2])
+            kept[1], kept[2] = kept[2], kept[1]
+
+
+def _smallest(sums: Array, members: float) -> list[float]:
+    """How far to go along each direction, from the sums of `_gram`; 0 along what is 0 or has been left out."""
+    totals, against, pairs = sums[:3], sums[3:6], sums[6:]
+    gram = np.empty((3, 3))
+    gram[np.triu_indices(3)] = pairs
+    gram = np.triu(gram) + np.triu(gram, 1).T - np.outer(totals, totals) / members
+    size = np.sqrt(np.maximum(gram.diagonal(), 0.0))
+    if not np.all(np.isfinite(sums)) or not size[0] > 0.0:
+        return [0.0] * 3
+    size[size == 0.0] = np.inf
+    far = np.linalg.lstsq(gram / np.outer(size, size), against / size, rcond=1e-10)[0] / size
+    return [float(value) for value in far]
+
+
+@loop
+def _gram(working, r, a, b, c):
+    """Over the set: sums of a, b and c, of their products with r, and of aa, ab, ac, bb, bc and cc."""
+    total = np.zeros(12)
+    for j in range(r.shape[0]):
+        s_a, s_b, s_c, r_a, r_b, r_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        a_a, a_b, a_c, b_b, b_c, c_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(r.shape[1]):
+            weight = 1.0 if working[j, i] else 0.0
+            x, y, z, here = weight * a[j, i], weight * b[j, i], weight * c[j, i], r[j, i]
+            s_a += x
+            s_b += y
+            s_c += z
+            r_a += here * x
+            r_b += here * y
+            r_c += here * z
+            a_a += x * x
+            a_b += x * y
+            a_c += x * z
+            b_b += y * y
+            b_c += y * z
+            c_c += z * z
+        total += np.array([s_a, s_b, s_c, r_a, r_b, r_c, a_a, a_b, a_c, b_b, b_c, c_c])
+    return total
+
+
+@loop
+def _move(working, along_a, along_b, along_c, a, b, c, x):
+    """Move x on the set, cut it off at 0, put 0 elsewhere; the old x is left in c."""
+    for j in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            old = x[j, i]
+            value = old - along_a * a[j, i] - along_b * b[j, i] - along_c * c[j, i]
+            x[j, i] = max(value, 0.0) if working[j, i] else 0.0
+            c[j, i] = old
