@@ -1,5 +1,6 @@
 """What to say of a step that failed: what happened, where, and what to change."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -40,7 +41,7 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
     if not np.isfinite(last.certificate.worst):
         yield "look for heights, loads or moduli that are not finite or too far apart"
         return
-    reach, sharp = _reach(scene, last.u, h), _sharp(scene, h)
+    reach, sharp = _reach(scene, last, h), _sharp(scene, h)
     if numerics.tolerance < reach:
         yield f"{numerics.precision} precision reaches only about {reach:.1g} here: try a larger numerics.tolerance"
         if numerics.precision == "single":
@@ -57,10 +58,15 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
     yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
 
 
-def _reach(scene: Scene, u: Array, h: Array) -> float:
-    """The certificate that the rounding of displacements and heights allows; collective."""
-    largest = max(scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (u, h)]))
-    return ROUNDINGS * float(np.finfo(u.dtype).eps) * largest / scene.solver.height
+def _reach(scene: Scene, last: Contact, h: Array) -> float:
+    """The certificate that the rounding of heights, displacements and pressures allows; collective.
+
+    A pressure p that is wrong in its last digit moves the body by that digit of `p (1 - nu) L/(2 pi)` in a wave as long
+    as the box: a load far beyond full contact has no digits left for what differs from its mean.
+    """
+    sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
+    sizes[2] *= (1.0 - scene.job.material.poisson) * max(scene.frame.size) / (2 * math.pi)
+    return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / scene.solver.height
 
 
 def _sharp(scene: Scene, h: Array) -> float:

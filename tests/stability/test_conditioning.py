@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
+from parcontact.failure import StepError
 from parcontact.march import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.record.row import Row
@@ -212,3 +213,27 @@ def test_sums_over_large_maps(communicators: list[MPI.Intracomm], nx: int, ny: i
         found = slab.sum(kernels.total(own), kernels.dot(own, own), *kernels.weigh(own, own, own, -1.0))
         assert_allclose(found, [exact, squares, exact, squares, exact], rtol=(nx + ny) * np.finfo(float).eps)
         assert {tuple(other) for other in comm.allgather(found)} == {tuple(found)}
+
+
+# -- what no digits are left for ---------------------------------------------------------------------------------------
+
+
+def test_a_fluid_under_a_load_for_ages_says_why_it_fails(tmp_path: Path) -> None:
+    """The modulus of the step falls to 1e-16 of its first value: the load is then so far beyond full contact that the
+    last digit of a pressure outweighs all differences between points."""
+    data = job(noise(2.0**-20), tmp_path, {"pressure": 1e3}, tolerance=1e-6)
+    data["material"] = {"model": "zener", "modulus_inf": 0.0, "branches": [{"modulus": 1e6, "relaxation_time": 1e-6}]}
+    data["history"] = [{"pressure": 1e3}, {"pressure": 1e3, "duration": 1e10, "time_step": 1e10}]
+    with pytest.raises(StepError, match=r"double precision reaches only about .* try a larger numerics.tolerance"):
+        marched(data)
+
+
+def test_a_fluid_long_at_rest(tmp_path: Path) -> None:
+    """Nothing is left of its modulus, by which the errors of folded branches are measured: all keep their maps."""
+    data = job(noise(2.0**-20), tmp_path, {"approach": -1e-7}, accuracy=1e-3)
+    data["material"] = {"model": "zener", "modulus_inf": 0.0, "branches": [{"modulus": 1e6, "relaxation_time": 1e-6}]}
+    data["history"] = [{"approach": -1e-7}, {"approach": -1e-7, "duration": 1e3, "time_step": 1e2}]
+    data["output"]["energy"] = False
+    march, rows = marched(data)
+    assert march.scene.condensed.bound <= 1e-3
+    assert rows[-1].measures.pressure < 1e-10 * rows[1].measures.pressure
