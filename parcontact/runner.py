@@ -147,7 +147,10 @@ class _Journey:
         try:
             march.run(self.march, [self.record, self.decide], steps)
         except StepError as error:
-            raise RunError(f"{error}{self._left()}") from error
+            text = f"{error}{self._left()}"
+            self._log_counts()
+            self.console.log(text)
+            raise RunError(text) from error
 
     def _left(self) -> str:
         """Leave a checkpoint of the last good step; what to say of it."""
@@ -202,12 +205,15 @@ class _Journey:
         saved = self.slab.agree(self.directory.saved() if self.slab.root else [])
         return f"; the newest checkpoint is {saved[0][1]}" if saved else "; there is no checkpoint"
 
+    def _log_counts(self) -> None:
+        spent = time.monotonic() - self.began
+        self.console.log(f"checkpoints took {self.saving:.3g} s of {spent:.4g} s")
+        counts = ", ".join(f"{name} {count}" for name, count in sorted(self.slab.tally.items()))
+        self.console.log(f"counts on root: {counts}")
+
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
-        spent = time.monotonic() - self.began
-        console.log(f"checkpoints took {self.saving:.3g} s of {spent:.4g} s")
-        counts = ", ".join(f"{name} {count}" for name, count in sorted(self.slab.tally.items()))
-        console.log(f"counts on root: {counts}")
+        self._log_counts()
         if self.stop:
             console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")
             return AGAIN

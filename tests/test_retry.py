@@ -70,6 +70,24 @@ def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:
     assert f", retry {sum(1 + text.count(', with ') for text in retried)}" in log
 
 
+@pytest.mark.parametrize("stretch", [1e-4, 1e4])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_stalls_at_first_is_solved(tmp_path: Path, seed: int, stretch: float) -> None:
+    """White noise on a box of 10 000 : 1, where projected steps get no better than a gap of a third of the height."""
+    np.save(tmp_path / "white.npy", 1e-6 * np.random.default_rng(seed).standard_normal((16, 16)))
+    data = {
+        "grid": {"points": 16, "size": [1e-3, 1e-3 * stretch]},
+        "surface": {"shape": "file", "path": str(tmp_path / "white.npy")},
+        "material": ELASTIC,
+        "history": [{"approach": -5e-7}],
+        "numerics": {"tolerance": 1e-8},
+    }
+    march, found = marched(data)
+    assert found[-1].certificate.worst <= 1e-8
+    assert re.search(r"stalled: no better certificate than 0\.\d+ in .*; solved when retried with .*", found[-1].remark)
+    assert march.scene.slab.tally["retry"] == 1 + found[-1].remark.count(", with ")
+
+
 def test_no_cost_where_nothing_fails() -> None:
     """As many transforms, operators, reductions and bytes as a program without retries."""
     data = {"grid": GRID, "surface": ROUGH, "material": ZENER, "history": [PRESS, SLIDE]}
@@ -165,6 +183,9 @@ def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
         found, clean = maps(last), maps(bench.where / "clean" / "checkpoint" / last.name)
         assert {name for name in clean if found[name] != clean[name]} <= {EARLIER, f"checksums/{EARLIER}"}
         assert rows(out) == rows(bench.where / "clean")
+        counts, message = (out / "run.log").read_text().splitlines()[-2:]
+        assert f", retry {1 + said.count(', with ')}," in f"{counts},"
+        assert message.endswith(said)
     bench.comm.Barrier()
     assert bench.run(data | {"numerics": {**SINGLE, "tolerance": 1e-3}}, out) == 0
     if bench.comm.rank == 0:
