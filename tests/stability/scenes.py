@@ -19,7 +19,7 @@ MOST_POINTS = 576
 
 @dataclass(frozen=True)
 class Sketch:
-    """A job whose surface is a map of heights [m]; `offset` [m] is added to all of them.
+    """A job whose surface is a map of heights [m], and maybe a shape of its own; `offset` [m] is added to all of them.
 
     Without `energy` branches that the job cannot tell from springs are folded, as far as numerics.accuracy allows.
     """
@@ -32,6 +32,7 @@ class Sketch:
     numerics: Json = field(default_factory=dict)
     offset: float = 0.0
     energy: bool = True
+    shape: Json = field(default_factory=dict)
 
     def job(self, directory: Path) -> Job:
         """The job, its heights in a file of this directory."""
@@ -42,7 +43,11 @@ class Sketch:
         return Job.model_validate(
             {
                 "grid": {"points": [nx, ny], "size": list(self.size), "boundary": self.boundary},
-                "surface": [{"shape": "file", "path": str(path)}, *([constant] if self.offset else [])],
+                "surface": [
+                    {"shape": "file", "path": str(path)},
+                    *([constant] if self.offset else []),
+                    *([self.shape] if self.shape else []),
+                ],
                 "material": self.material,
                 "history": list(self.history),
                 "numerics": self.numerics,
@@ -106,6 +111,23 @@ def heights(dice: Random, ny: int, nx: int) -> Map:
     return np.zeros((ny, nx))
 
 
+def formula(dice: Random, size: tuple[float, float], points: tuple[int, int], height: float) -> Json:
+    """A round shape, or roughness by its spectrum, of about this height [m]."""
+    longest, cell = max(size), max(length / count for length, count in zip(size, points, strict=True) if count > 1)
+    round_shape = {"radius": longest**2 / (8.0 * height), "profile": dice.choice(["exact", "paraboloid"])}
+    kind = dice.choice(["sphere", "cylinder", "rough"])
+    if kind == "rough" and 2.0 * cell < min(size) / 2.0:
+        return {
+            "shape": "rough",
+            "hurst": dice.uniform(0.1, 1.0),
+            "long_wavelength": longest,
+            "short_wavelength": 2.0 * cell,
+            "rms_height": height,
+            "seed": dice.randint(0, 9),
+        }
+    return {"shape": "sphere" if kind == "sphere" else "cylinder", **round_shape}
+
+
 def box(dice: Random) -> tuple[float, float]:
     """Sides [m] from nanometres to kilometres, up to 10 000 : 1."""
     length, stretch = decades(dice, -7, 3), dice.choice([0.0, dice.uniform(-4, 4)])
@@ -115,9 +137,12 @@ def box(dice: Random) -> tuple[float, float]:
 def sketch(dice: Random, stages: int = 6) -> Sketch:
     """A scene of at most so many stages."""
     body, (ny, nx), size = material(dice), shape(dice), box(dice)
-    surface = heights(dice, ny, nx) * min(size) * decades(dice, -6, 0)
+    height = min(size) * decades(dice, -6, 0)
+    surface = height * heights(dice, ny, nx)
+    own = formula(dice, size, (nx, ny), height) if dice.random() < 0.2 else {}
     boundary = dice.choice(["periodic", "periodic", "free"])
-    history = Storyteller(dice, surface, size, boundary == "periodic", body).history(stages)
+    controls = ("pressure", "force") if own else ("pressure", "pressure", "force", "approach")
+    history = Storyteller(dice, surface, size, boundary == "periodic", body, controls).history(stages)
     numerics = {
         "tolerance": dice.choice([1e-4, 1e-4, 1e-6, 1e-8]),
         "integrator": dice.choice(["exponential", "exponential", "backward-euler"]),
@@ -125,4 +150,4 @@ def sketch(dice: Random, stages: int = 6) -> Sketch:
         "precision": dice.choice(["double"] * 9 + ["mixed"]),
         "accuracy": dice.choice([0.0, 1e-3]),
     }
-    return Sketch(surface, size, boundary, body, history, numerics, energy=dice.random() < 0.7)
+    return Sketch(surface, size, boundary, body, history, numerics, energy=dice.random() < 0.7, shape=own)

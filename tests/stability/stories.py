@@ -27,6 +27,7 @@ class Storyteller:
     size: tuple[float, float]
     periodic: bool
     body: Json
+    controls: tuple[str, ...]
     load: Json = field(default_factory=dict)
     way: tuple[float, float] = (0.0, 0.0)
 
@@ -85,7 +86,7 @@ class Storyteller:
 
     def _loaded(self, duration: float) -> Json:
         """A load of any size for a motion that takes this long."""
-        control = self.dice.choice(["pressure", "pressure", "force", "approach"])
+        control = self.dice.choice(self.controls)
         if control == "approach":
             top, mean = float(self.surface.max()), float(self.surface.mean())
             depth = self.dice.uniform(0.0, 0.95 if self.periodic else 3.0)

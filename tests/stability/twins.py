@@ -1,5 +1,6 @@
 """The same scene told in another way: what must come out alike."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from random import Random
@@ -23,7 +24,8 @@ class Twin:
 
 def twin(dice: Random, of: Sketch) -> Twin:
     """One of them."""
-    return dice.choice([offset, scaled, mirrored, transposed, *([] if of.energy else [folded, folded])])(dice, of)
+    others = [*([] if of.shape else [mirrored, transposed]), *([] if of.energy else [folded, folded])]
+    return dice.choice([offset, scaled, *others])(dice, of)
 
 
 def folded(dice: Random, of: Sketch) -> Twin:
@@ -34,9 +36,15 @@ def folded(dice: Random, of: Sketch) -> Twin:
 
 def offset(dice: Random, of: Sketch) -> Twin:
     """The surface higher or lower by up to 1e6 times its height."""
-    added = (float(np.ptp(of.heights)) or of.size[0]) * decades(dice, -2, 6) * dice.choice([-1, 1])
+    added = (float(np.ptp(of.heights)) or _shape_height(of)) * decades(dice, -2, 6) * dice.choice([-1, 1])
     history = tuple(_higher(stage, added) for stage in of.history)
     return Twin("offset", replace(of, offset=of.offset + added, history=history), lambda p: p)
+
+
+def _shape_height(of: Sketch) -> float:
+    """At least about that of the shape on the box [m], or a length of the box if there is none."""
+    rough, radius = of.shape.get("rms_height", 0.0), of.shape.get("radius", math.inf)
+    return float(rough or min(of.size) ** 2 / radius or of.size[0])
 
 
 def scaled(dice: Random, of: Sketch) -> Twin:
@@ -48,8 +56,9 @@ def rescaled(of: Sketch, length: float, modulus: float, time: float) -> tuple[Sk
     """The same scene in units that are so many times smaller, and what turns its pressures back."""
     factors = {
         **dict.fromkeys(("shear_modulus", "modulus_inf", "modulus", "G0", "G1", "pressure"), modulus),
+        **dict.fromkeys(("radius", "rms_height", "long_wavelength", "short_wavelength", "approach"), length),
         **dict.fromkeys(("relaxation_time", "duration", "time_step", "first"), time),
-        **{"force": modulus * length**2, "approach": length, "eta1": modulus * time, "velocity": length / time},
+        **{"force": modulus * length**2, "eta1": modulus * time, "velocity": length / time},
     }
     sketch = replace(
         of,
@@ -57,6 +66,7 @@ def rescaled(of: Sketch, length: float, modulus: float, time: float) -> tuple[Sk
         size=(of.size[0] * length, of.size[1] * length),
         offset=of.offset * length,
         material=_times(of.material, factors),
+        shape=_times(of.shape, factors),
         history=tuple(_times(stage, factors) for stage in of.history),
     )
     return sketch, lambda p: p / modulus
@@ -96,7 +106,7 @@ def _times(part: Json, factors: dict[str, float], factor: float = 1.0) -> Json:
             return [times(entry, factor) for entry in value]
         return value * factor if isinstance(value, float) else value
 
-    dimensionless = {"poisson", "growth"}
+    dimensionless = {"poisson", "growth", "hurst"}
     return {
         name: value if name in dimensionless else times(value, factors.get(name, factor))
         for name, value in part.items()
