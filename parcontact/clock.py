@@ -130,8 +130,10 @@ class Span:
     def interval(self, index: int, since: int | None = None) -> float:
         """How long the step `index` takes, or all steps `since` another one have taken with it [s].
 
-        From the stage alone, as late instants may have no digits for it.
+        From the stage alone, as late instants may have no digits for it; steps that are alike are so to the last bit.
         """
+        if since is None and self.ends.growth == 1.0:
+            return self.stage.seconds / self.ends.count
         return (self.ends[index] - self.ends[index - 1 if since is None else since]) * self.stage.seconds
 
     def position(self, index: int) -> tuple[float, float]:

@@ -83,6 +83,16 @@ class Elastic:
         """Nothing to remember."""
 
 
+@dataclass(frozen=True)
+class _Plan:
+    """What a step dt is made of: its modulus, decay and gain of the kept branches, what they and u weigh in heights."""
+
+    dt: float
+    alpha: float
+    advance: tuple[Array, Array]
+    weights: tuple[Array, float]
+
+
 class Zener:
     """Relaxing branches: this rank's rows of one map per branch and of the last displacement.
 
@@ -111,11 +121,10 @@ class Zener:
         self.branches.fill(0.0)
         self.u = slab.zeros(dtype)
         self._work = slab.zeros(dtype)
-        self._step = self._pending = self._still
-
-    @property
-    def _still(self) -> tuple[Array, Array]:
-        return np.ones(len(self.kept)), np.zeros(len(self.kept))
+        self._still: tuple[Array, Array] = np.ones(len(self.kept)), np.zeros(len(self.kept))
+        self._step: tuple[Array, Array] = self._still
+        self._pending: tuple[Array, Array] = self._still
+        self._plan: _Plan | None = None
 
     def elapsed(self, dt: float) -> Array:
         """`z = dt/tau` of each branch."""
@@ -127,13 +136,20 @@ class Zener:
 
     def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
         """Modulus alpha and effective heights `h + r/alpha` of a step; may be called again for another dt."""
-        decay, gain = self.coefficients(dt)
-        total = float(gain[self._moving].sum())
-        self._step = decay, gain = decay[self.kept], gain[self.kept]
-        alpha = self._spring + total
-        loops.begin(self.branches, *self._pending, self._work, decay / alpha, total / alpha, self.u, *heights.parts)
+        if self._plan is None or self._plan.dt != dt:
+            self._plan = self._planned(dt)
+        alpha, weights = self._plan.alpha, self._plan.weights
+        self._step = self._plan.advance
+        loops.begin(self.branches, *self._pending, self._work, *weights, self.u, *heights.parts)
         self._pending = self._still
         return alpha, self._work
+
+    def _planned(self, dt: float) -> "_Plan":
+        decay, gain = self.coefficients(dt)
+        total = float(gain[self._moving].sum())
+        alpha = self._spring + total
+        decay, gain = decay[self.kept], gain[self.kept]
+        return _Plan(dt, alpha, (decay, gain), (decay / alpha, total / alpha))
 
     def commit(self, displacement: Array, heights: Heights) -> None:
         """End the step: `displacement` is `A p/alpha`, which under the effective heights stands for u."""
