@@ -51,6 +51,7 @@ from ..theory.viscoelastic import Integrator, Prony, complex_modulus, relaxation
 from .material import coefficients
 
 LENGTHS, DIRECTIONS = 13, 64  # of a band that are looked at
+PER_DECADE = 4  # lengths of growing steps that are looked at
 FOR_FAST = 0.5  # share of the accuracy for memoryless branches: which they are must not depend on how long a job is
 
 
@@ -66,6 +67,11 @@ class Phase:
     last: float
     velocity: tuple[float, float]
     jump: bool
+
+    @property
+    def steps(self) -> Array:
+        """Some from the first to the last [s]: while they grow, the modulus of a step may fall before memory does."""
+        return np.geomspace(self.first, self.last, 1 + math.ceil(PER_DECADE * abs(math.log10(self.last / self.first))))
 
 
 @dataclass(frozen=True)
@@ -215,10 +221,9 @@ class _Passing:
         passing = self.omega[..., None] > 0.0
         resting = self.prony.moduli * np.minimum(self.prony.relaxation_times / phase.first, 1.0)
         before = np.maximum(self.held, np.where(passing, self.moving, resting))
-        dropped = self.step(phase.first)[0] * before
         decay, gain = self.step(phase.last)
         self.held = decay * before + np.where(passing, self.moving, gain)
-        return self.share(dropped, self.modulus(phase.first))
+        return np.max([self.share(self.step(dt)[0] * before, self.modulus(dt)) for dt in phase.steps], axis=0)
 
     @np.errstate(over="ignore")  # infinitely many relaxation times are all right
     def slow(self, phase: Phase) -> Array:

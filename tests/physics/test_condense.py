@@ -147,6 +147,19 @@ def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
     assert wrong[1] < 1e-3 * wrong[0]
 
 
+def test_steps_that_outgrow_stiffer_branches() -> None:
+    """A stiff branch makes the modulus of the first step a thousand times the second one's; that goes to sleep long
+    before. A displacement that grows with time, in steps that do: what is dropped is a part of the step's modulus."""
+    prony, steps = normal_form(1e3, [1e9, 1e6], [1.0, 1e6]), 10.0 ** np.arange(0, 8)
+    whole, fewer = (Zener(POINT, prony, "exponential", memoryless=fast) for fast in ([], [1]))
+    moments = [(dt, float(time)) for dt, time in zip(steps, np.cumsum(steps), strict=True)]
+    moduli = [whole.begin(dt, Heights(np.zeros((1, 1))))[0] for dt in steps]
+    wrong = np.abs(stresses(fewer, moments) - stresses(whole, moments)) / moduli / np.cumsum(steps)
+    found = condense(prony, [Phase(moments[-1][1], 1.0, 1e7, (0.0, 0.0), jump=False)], [WAVE], "exponential", 0.5)
+    assert 0.05 < wrong.max() <= found.memoryless_errors[1]
+    assert 1 not in found.memoryless
+
+
 # -- what is chosen ----------------------------------------------------------------------------------------------------
 
 
