@@ -18,6 +18,8 @@ from parcontact.clock import steps
 from parcontact.errors import RunError
 from parcontact.failure import StepError
 from parcontact.march import March, run
+from parcontact.physics.halfspace import Convolution, Narrowed
+from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
 
 GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
@@ -98,6 +100,21 @@ def test_no_cost_where_nothing_fails() -> None:
     assert {name for name in tally if name.startswith("fft ")} == {"fft 64x64 float64"}
     solves = sum(row.operator_calls for row in found)
     assert tally["operator"] == solves
+
+
+@pytest.mark.parametrize("precision", ["double", "mixed"])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: str) -> None:
+    """FFTW guesses them: what it measures depends on how busy the machine is, and the last digits on that."""
+    data = {"grid": {**GRID, "boundary": boundary}, "surface": ROUGH, "material": ELASTIC, "history": [PRESS]}
+    built = begun(data | {"numerics": {"precision": precision}}).scene
+    coarse = solver_on(built.frame, built.slab.resized(32, 32), 1e-3)
+    assert coarse.p.shape == (32, 32)
+    assert built.frame.fft.measured
+    for operator in (coarse.operator, coarse.preconditioner):
+        narrowed = operator.operator if isinstance(operator, Narrowed) else operator
+        assert isinstance(narrowed, Convolution)
+        assert not narrowed.fft.measured
 
 
 # -- given up ---------------------------------------------------------------------------------------------------------
