@@ -19,6 +19,7 @@ from . import kernels
 from .contact import Approach, Contact, ContactSolver, MeanPressure
 
 SETS = 40  # guesses after which to give up
+BUDGET = 4  # times max_iterations, for all sets together: nothing is left to be tried after this
 SHARE = 0.1  # of the tolerance: the largest gap on a set to which its linear problem is solved
 
 
@@ -34,7 +35,8 @@ def solve(solver: ContactSolver, h: Array, control: MeanPressure | Approach) -> 
         iterations += search.solve_on_set()
         chosen = search.next_set()
         np.maximum(solver.p, 0.0, out=solver.p)
-        spent = f" in max_iterations = {solver.max_iterations}" if iterations >= solver.max_iterations else ""
+        limit = BUDGET * solver.max_iterations
+        spent = f" in {BUDGET} times max_iterations = {limit}" if iterations >= limit else ""
         contact = solver.judge(h, control, f"found no contact among {count} sets of points{spent}")
         if contact.converged or spent or not np.isfinite(contact.certificate.worst):
             break
