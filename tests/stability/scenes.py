@@ -1,6 +1,6 @@
 """Random scenes, as hard as they come: bodies, surfaces, grids, histories.
 
-All choices are made by an object like `random.Random`: seeded in a campaign, Hypothesis's own in a test.
+All choices follow from a seeded `random.Random`.
 """
 
 from dataclasses import dataclass, field
