@@ -1,8 +1,8 @@
 """A job tried out: some of its steps are made in memory, the rest are taken to be like them.
 
-Every stage is looked at in blocks, evenly spaced: one long step up to the block, one step to settle, and then two whose
-cost is taken for all steps of the block's part of the stage. The jump of a stage, and every step of a history that is
-short enough, is made as it is.
+Every stage is looked at in blocks, evenly spaced: one long step up to the block, some to settle after it, and then
+some whose cost is taken for all steps of the block's part of the stage. The jump of a stage, and every step of a history
+that is short enough, is made as it is.
 """
 
 import resource
@@ -19,9 +19,10 @@ from ..march import March
 from ..parallel.slab import Slab, deal
 from ..stationary import steps_to_make
 
-BLOCK = 3  # steps of a block, of which the first settles
+SETTLING = 4  # steps after a long one until solves take as many iterations as ever
+BLOCK = 8  # steps of a block, these among them
 CALLS = 12  # operator calls expected of a step that starts from the one before
-LONG = 2  # steps that a long step costs
+LONG = 4  # steps that a long step costs, with what settling costs more
 FIRST = 2  # steps that are always made
 KILO = 1024  # bytes in what the system counts resident memory in
 LATE = 2.0  # times the time given: then no more steps are made
@@ -129,7 +130,7 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
 
 def _late(began: float, seconds: float, stages: list[Stage]) -> bool:
     """Whether to stop, but not before there is more than the first steps, which start from nothing."""
-    return time.perf_counter() - began > LATE * seconds and sum(stage.tried for stage in stages) >= FIRST + BLOCK - 1
+    return time.perf_counter() - began > LATE * seconds and sum(stage.tried for stage in stages) > FIRST
 
 
 def _as_run(march: March, step: Step, stages: list[Stage]) -> dict[str, float]:
@@ -162,10 +163,10 @@ def chosen(timeline: Timeline, numbers: range, share: float) -> Iterator[tuple[S
     for part in deal(len(numbers), count):
         first = part.start + (part.stop - part.start - BLOCK) // 2
         yield _leap(timeline, numbers[done:first]), 0.0
-        yield timeline[numbers[first]], 0.0
-        done = first + BLOCK
-        weight = (part.stop - part.start) / (BLOCK - 1)
-        yield from ((timeline[number], weight) for number in numbers[first + 1 : done])
+        settled, done = first + SETTLING, first + BLOCK
+        yield from ((timeline[number], 0.0) for number in numbers[first:settled])
+        weight = (part.stop - part.start) / (BLOCK - SETTLING)
+        yield from ((timeline[number], weight) for number in numbers[settled:done])
     if numbers[done:]:
         yield _leap(timeline, numbers[done:]), 0.0
 
