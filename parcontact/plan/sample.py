@@ -1,8 +1,8 @@
 """A job tried out: some of its steps are made in memory, the rest are taken to be like them.
 
 Every stage is looked at in blocks, evenly spaced: one long step up to the block, some to settle after it, and then
-some whose cost is taken for all steps of the block's part of the stage. The jump of a stage, and every step of a history
-that is short enough, is made as it is.
+some whose cost is taken for all steps of the block's part of the stage. The jump of a stage, and every step of a
+history that is short enough, is made as it is.
 """
 
 import resource
