@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from mpi4py import MPI
 
-from . import __version__, curve, job, runner
+from . import __version__, curve, job, runner, watch
 from .errors import InputError, RunError
 from .parallel.slab import Slab
 
@@ -248,7 +248,7 @@ def _check(options: argparse.Namespace, world: MPI.Intracomm) -> int:
 
 
 def _plan(options: argparse.Namespace, world: MPI.Intracomm) -> int:
-    started = time.process_time()
+    started = time.time() - watch.began()
     from .plan import machine, making
 
     loaded = _load(options, world)

@@ -124,7 +124,7 @@ def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> fl
     may last, PBS_WALLTIME, which is counted from the start of this program: a little too late. An end before that start
     is that of another job, whose environment was handed on.
     """
-    born = _born()
+    born = began()
     limits = [] if wall is None else [born + wall]
     for name, start in (("PARCONTACT_END_TIME", 0.0), ("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", born)):
         with suppress(KeyError, ValueError):
@@ -133,7 +133,7 @@ def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> fl
     return min(limits, default=None)
 
 
-def _born() -> float:
+def began() -> float:
     """When this process began, in the time of `time.time`."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
