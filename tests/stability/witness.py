@@ -15,6 +15,7 @@ from parcontact.record.row import Row
 
 EPS = float(np.finfo(float).eps)
 ROUNDINGS = 64  # that a number may be off by, of the largest it is a difference of
+DIGITS = 4  # roundings of the displacement, of the size of the strain times the box, below which no gap is certain
 LOAD = 1e-12  # relative, of the sum over all points
 ENERGY = 1e-10  # relative, of sums over all steps: the weights of very short steps have ten digits
 
@@ -141,15 +142,14 @@ class Witness:
         return 2.0 * scene.job.numerics.tolerance * scene.frame.height * modulus, 2.0 * self.scales.length * modulus
 
     def _beyond(self, step: Step) -> bool:
-        """Whether the last digit of the pressure moves the body by more than the certificate allows."""
+        """Whether the last digits of the pressure move the body by more than the certificate allows."""
         scene, grid = self.march.scene, self.march.scene.job.grid
         if step.control == "approach":
             return False
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
         alpha, _ = scene.material.begin(step.dt, scene.path.at(step.position))
         strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
-        digit = EPS * strain * max(grid.lx, grid.ly) / (2 * math.pi)
-        return digit > scene.job.numerics.tolerance * scene.frame.height
+        return DIGITS * EPS * strain * max(grid.lx, grid.ly) > scene.job.numerics.tolerance * scene.frame.height
 
 
 def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> float:
