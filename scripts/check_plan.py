@@ -45,7 +45,7 @@ checkpoint: {{every: 100}}
 grid: {{points: 256, size: 1.0e-2, boundary: free}}
 surface: {{shape: sphere, radius: 1.0e-2, center: [3.0e-3, 5.0e-3]}}
 material: {SLS}
-history: [{{force: 0.15, velocity: 0.046765, duration: 2.4e-2, time_step: 1.6e-4}}]
+history: [{{force: 0.15, velocity: 0.046765, duration: 2.4e-2, time_step: 8.0e-5}}]
 numerics: {{tolerance: 1.0e-6}}
 output: {{energy: true}}
 """,
