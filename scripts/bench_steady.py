@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/bench_steady.py [--points 1024]
 
-A rough surface under the twelve-branch compound of jobs/materials, certified to 1e-4: from a cold start at three
+A rough surface under the twelve-branch compound that comes with the program, certified to 1e-4: from a cold start at three
 velocities, then along a curve of eight velocities per decade. Operator calls are counted, so a busy machine does not
 matter. Exit code 1 if a limit is not kept. Some minutes on one core.
 """
@@ -20,11 +20,11 @@ from parcontact.parallel.slab import Slab
 from parcontact.steadystate import SteadySliding
 
 COLD, CURVE = 400, 150  # calls at most; the goals are 200 and 60
-MATERIAL = Path(__file__).parents[1] / "jobs/materials/synthetic_tyre.yaml"
+
 TEXT = """\
 grid: {{points: {points}, size: 1.0e-3}}
 surface: {{shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: {short!r}, rms_slope: 0.02, seed: 1}}
-material: {{include: {material}}}
+material: {{include: synthetic_tyre}}
 history: [{{pressure: 1.0e5}}]
 numerics: {{tolerance: 1.0e-4}}
 """
@@ -33,7 +33,7 @@ numerics: {{tolerance: 1.0e-4}}
 def states(points):
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory, "rough.yaml")
-        path.write_text(TEXT.format(points=points, short=1.6e-2 / points, material=MATERIAL))
+        path.write_text(TEXT.format(points=points, short=1.6e-2 / points))
         return SteadySliding(scene.frame(job.load(path), Slab(MPI.COMM_SELF, points, points)))
 
 

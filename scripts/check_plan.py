@@ -15,13 +15,12 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-MATERIALS = Path(__file__).parents[1] / "jobs" / "materials"
 BIN = Path(sys.executable).parent
 MEMORY, TIME = 0.10, 0.30
 SECONDS = 4  # for which a job is tried
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2.5e-4, short_wavelength: SHORT, rms_slope: 0.02, seed: 1}"
-TYRE = f"{{include: {MATERIALS / 'synthetic_tyre.yaml'}}}"
+TYRE = "{include: synthetic_tyre}"
 SLS = "{model: zener, modulus_inf: 0.275e6, branches: [{modulus: 2.475e6, relaxation_time: 1.0e-3}]}"
 ELASTIC = "{model: elastic, shear_modulus: 1.0e6}"
 JOBS = {

@@ -179,6 +179,13 @@ def test_include_by_name_from_a_folder_above() -> None:
     assert "include" not in job.resolved()
 
 
+def test_a_compound_of_the_program() -> None:
+    """From any directory; one of the same name nearby comes first."""
+    assert len(job_of(with_material("{include: synthetic_tyre}")).material.branches) == 12
+    write("materials/synthetic_tyre.yaml", "{model: elastic, shear_modulus: 1}")
+    assert job_of(with_material("{include: synthetic_tyre}")).material.model == "elastic"
+
+
 def test_the_nearest_material_wins() -> None:
     write("materials/m.yaml", "{model: elastic, shear_modulus: 1}")
     write("near/materials/m.yaml", "{model: elastic, shear_modulus: 2}")
@@ -239,11 +246,13 @@ def test_included_files_that_are_no_material(content: str, mistake: str) -> None
 def test_an_include_that_is_not_there() -> None:
     must = "material.include must name a material file"
     assert mistakes_of(with_material("{include: rubbr}")) == [
-        f"job.yaml:3:21: {must}, got 'rubbr' (looked for materials/rubbr.yaml from the job file upwards)"
+        f"job.yaml:3:21: {must}, got 'rubbr' (looked for materials/rubbr.yaml from the job file upwards, and "
+        "among the program's own: synthetic_tyre)"
     ]
     assert mistakes_of(with_material("{include: no/m.yaml, poisson: 9}")) == [
         f"job.yaml:3:21: {must}, got 'no/m.yaml' (looked from the job file)"
     ]
     assert mistakes_of(SMALL, "material.include=3") == [
-        f"--set material.include=3: {must}, got 3 (looked for materials/3.yaml from the job file upwards)"
+        f"--set material.include=3: {must}, got 3 (looked for materials/3.yaml from the job file upwards, and "
+        "among the program's own: synthetic_tyre)"
     ]

@@ -11,6 +11,7 @@ from parcontact.jobfile.source import Key, Mistake, Place, Source, parse, read
 
 MATERIAL: Key = ("material",)
 INCLUDE: Key = ("material", "include")
+OURS = Path(__file__).parents[1] / "materials"  # compounds that come with the program
 
 
 class Override(NamedTuple):
@@ -106,7 +107,9 @@ def _include(source: Source, job: Path) -> None:
     name = beside.pop("include")
     found = _find(name, job)
     if found is None:
-        where = "from the job file" if _is_path(name) else f"for materials/{name}.yaml from the job file upwards"
+        own = ", ".join(sorted(path.stem for path in OURS.glob("*.yaml")))
+        upwards = f"for materials/{name}.yaml from the job file upwards, and among the program's own: {own}"
+        where = "from the job file" if _is_path(name) else upwards
         sentence = f"material.include must name a material file, got {quote(name)} (looked {where})"
         source.mistakes.append(Mistake(source.place(INCLUDE), sentence))
         source.broken.add(MATERIAL)
@@ -145,7 +148,8 @@ def _is_path(name: Any) -> bool:
 
 
 def _find(name: Any, job: Path) -> Path | None:
-    """The file that an include means: a path from the job file, or the first materials/<name>.yaml on the way up."""
+    """The file that an include means: a path from the job file, or the first materials/<name>.yaml on the way up, or a
+    compound that comes with the program."""
     if not isinstance(name, str):
         return None
     directory = job.absolute().parent
@@ -153,6 +157,7 @@ def _find(name: Any, job: Path) -> Path | None:
         candidates = [directory / Path(name).expanduser()]
     else:
         candidates = [folder / "materials" / f"{name}.yaml" for folder in (directory, *directory.parents)]
+        candidates.append(OURS / f"{name}.yaml")
     return next((candidate for candidate in candidates if candidate.is_file()), None)
 
 

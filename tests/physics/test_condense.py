@@ -20,7 +20,7 @@ POINT = Slab(MPI.COMM_SELF, 1, 1)
 INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
 # terms of 1 MPa, a decade apart, around a wave of frequency 1 rad/s
 DECADES = normal_form(1e6, np.full(11, 1e6), 10.0 ** np.arange(-5, 6))
-# jobs/materials/synthetic_tyre.yaml
+# parcontact/materials/synthetic_tyre.yaml
 TYRE = normal_form(
     1e6,
     np.array([300, 350, 220, 80, 24, 7, 2.4, 1, 0.5, 0.3, 0.2, 0.15]) * 1e6,
