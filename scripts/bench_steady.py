@@ -2,9 +2,9 @@
 
     .venv/bin/python scripts/bench_steady.py [--points 1024]
 
-A rough surface under the twelve-branch compound that comes with the program, certified to 1e-4: from a cold start at three
-velocities, then along a curve of eight velocities per decade. Operator calls are counted, so a busy machine does not
-matter. Exit code 1 if a limit is not kept. Some minutes on one core.
+A rough surface under the twelve-branch compound that comes with the program, certified to 1e-4: from a cold start at
+three velocities, then along a curve of eight velocities per decade. Operator calls are counted, so a busy machine does
+not matter. Exit code 1 if a limit is not kept. Some minutes on one core.
 """
 
 import argparse
