@@ -25,8 +25,8 @@ Vector = tuple[float, float]
 class Point:
     """A steady state: velocity [m/s], pressure [Pa], what it measures, its certificate, and what it took.
 
-    `operator_calls` are in applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a
-    free scene, whose wake goes on outside the box).
+    `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did (`solve.steady`).
+    `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box).
     """
 
     velocity: Vector
@@ -34,6 +34,7 @@ class Point:
     measures: Measures
     certificate: Certificate
     operator_calls: float
+    sets: int
     seconds: float
     dissipated: tuple[float, ...]
 
@@ -62,8 +63,7 @@ class SteadySliding:
             self.levels.append(coarser)
         self.p: Array | None = None
         self.contact: SteadyContact | None = None
-        self._speeds: list[float] = []
-        self._earlier: Array | None = None
+        self._speed = 0.0
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
@@ -86,7 +86,8 @@ class SteadySliding:
         self._remember(contact, float(np.hypot(*velocity)))
         measures = self.ledger.measures(contact.p, 1.0, contact.u, self.levels[0].heights, contact.d, (0.0, 0.0))
         lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
-        return Point(velocity, pressure, measures, contact.certificate, calls, time.perf_counter() - began, lost)
+        seconds = time.perf_counter() - began
+        return Point(velocity, pressure, measures, contact.certificate, calls, contact.sets, seconds, lost)
 
     def branch_maps(self, velocity: Vector) -> Iterator[Array]:
         """The map h_k of each branch in the last state, the same array each time; collective."""
@@ -148,25 +149,16 @@ class SteadySliding:
     def _starts(self, speed: float) -> Iterator[Array | None]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure.
 
-        Near the last velocity it is the last state, extrapolated in the logarithm of the velocity where two are known.
+        Near the last velocity it is the last state. To extrapolate it in the logarithm of the velocity, or to add what
+        changes on the next coarser grid, brings it no nearer: contact spots appear and vanish.
         """
-        if self.p is None or not 0.5 < speed / self._speeds[-1] < 2.0:
-            yield None
-            return
-        if self._earlier is not None:
-            far, near = np.log(speed / self._speeds[-1]), np.log(self._speeds[-1] / self._speeds[-2])
-            yield np.maximum(self.p + min(max(far / near, 0.0), 1.0) * (self.p - self._earlier), 0.0)
-        else:
+        if self.p is not None and 0.5 < speed / self._speed < 2.0:
             yield self.p
         yield None
 
     def _remember(self, contact: SteadyContact, speed: float) -> None:
-        self.contact = contact
-        self._earlier, near = self.p, bool(self._speeds) and 0.5 < speed / self._speeds[-1] < 2.0
-        if not near or speed == self._speeds[-1]:
-            self._earlier = None
+        self.contact, self._speed = contact, speed
         self.p = contact.p.copy()
-        self._speeds = [*self._speeds[-1:], speed]
 
     def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took."""

@@ -20,7 +20,6 @@ from parcontact.parallel.slab import Slab
 from parcontact.steadystate import SteadySliding
 
 COLD, CURVE = 400, 150  # calls at most; the goals are 200 and 60
-
 TEXT = """\
 grid: {{points: {points}, size: 1.0e-3}}
 surface: {{shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: {short!r}, rms_slope: 0.02, seed: 1}}

@@ -98,7 +98,7 @@ def main() -> int:
             print(f"{number}: {error}", flush=True)
             continue
         solved += 1
-        sets += sliding.contact.sets > 0
+        sets += point.sets > 0
         calls.append(point.operator_calls)
         areas.append(point.measures.contact_area)
         found, asked = certificate(sliding, law, speed, pressure), sliding.base.job.numerics.tolerance
