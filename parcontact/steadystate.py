@@ -51,7 +51,7 @@ class Level:
 class SteadySliding:
     """Steady states of one job's surface and body; making and calling it are collective.
 
-    Started from coarser grids, or from the last state where that is near. Memory: some 25 maps.
+    Started from coarser grids, or from the last state where that is near. Memory: some 30 maps.
     """
 
     def __init__(self, base: Frame) -> None:

@@ -12,6 +12,7 @@ from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace
+from parcontact.solve import steady
 from parcontact.steadystate import Point, SteadySliding
 from parcontact.theory import cylinder_sliding, full_contact
 from parcontact.theory.viscoelastic import complex_modulus
@@ -83,6 +84,16 @@ def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> N
     """To ten times the tolerance of the certificate, 1e-5: each rank count stops elsewhere within it."""
     frictions = [sphere_at(shared_path, comm, 1.0, 64).measures.friction for comm in communicators]
     assert frictions == pytest.approx([frictions[0]] * len(frictions), rel=1e-4)
+
+
+@pytest.mark.mpi
+def test_both_methods_agree(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Projected steps, and the active set that goes on where they do not help: to ten times the certificate's 1e-5."""
+    projected = sphere_at(shared_path, comm, 1.0, 64)
+    monkeypatch.setattr(steady, "HALVING", 0)
+    changed = sphere_at(shared_path, comm, 1.0, 64)
+    assert projected.sets == 0 < changed.sets
+    assert projected.measures.friction == pytest.approx(changed.measures.friction, rel=1e-4)
 
 
 @pytest.mark.mpi
