@@ -103,6 +103,7 @@ def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) 
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     plist.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    plist.set_obj_track_times(False)  # the same data make the same bytes at any time
     space = h5py.h5s.create_simple(shape)
     group, _, leaf = name.rpartition("/")
     parent = file.require_group(group) if group else file

@@ -1,5 +1,6 @@
 """Checkpoints: whole or refused, the same from any number of ranks."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -71,6 +72,7 @@ def test_any_number_of_ranks_reads_it(communicators: list[MPI.Intracomm], shared
 @pytest.mark.mpi
 def test_same_bytes_both_ways(comm: MPI.Intracomm, shared_path: Path) -> None:
     write(shared_path / "together.h5", comm)
+    time.sleep(1.0)  # instants within a file would differ: HDF5 keeps them in seconds
     write(shared_path / "in turn.h5", comm, in_turn=True)
     comm.Barrier()
     assert (shared_path / "together.h5").read_bytes() == (shared_path / "in turn.h5").read_bytes()
