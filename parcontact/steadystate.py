@@ -1,5 +1,6 @@
 """Steady sliding of a job's surface, solved directly: points of a friction curve, and where a march may start from."""
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +18,8 @@ from .solve.contact import Certificate
 from .solve.steady import SteadyContact, SteadySolver
 from .theory.viscoelastic import Prony
 
-COARSE_TOLERANCE = 1e-3  # of the certificate on all grids but the finest
+COARSE_TOLERANCE = 7e-4  # of the certificate on all grids but the finest
+NEAR = 1.1  # a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 
 
@@ -51,7 +53,7 @@ class Level:
 class SteadySliding:
     """Steady states of one job's surface and body; making and calling it are collective.
 
-    Started from coarser grids, or from the last state where that is near. Memory: some 30 maps.
+    Started from coarser grids, or from the last state where that is very near. Memory: some 30 maps.
     """
 
     def __init__(self, base: Frame) -> None:
@@ -63,7 +65,7 @@ class SteadySliding:
             self.levels.append(coarser)
         self.p: Array | None = None
         self.contact: SteadyContact | None = None
-        self._speed = 0.0
+        self._speed = self._pressure = 0.0
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
@@ -72,18 +74,18 @@ class SteadySliding:
         """
         began = time.perf_counter()
         mean = pressure / self.base.units.pressure
-        calls = 0.0
-        for start in self._starts(np.hypot(*velocity)):
+        speed, calls = math.hypot(*velocity), 0.0
+        for start in self._starts(speed, pressure):
             contact, more = self._descend(velocity, mean, start)
             calls += more
             if contact.converged:
                 break
         else:
             raise RunError(
-                f"steady sliding at {np.hypot(*velocity):g} m/s under {pressure:g} Pa: {contact.failure}. Try a "
+                f"steady sliding at {speed:g} m/s under {pressure:g} Pa: {contact.failure}. Try a "
                 "velocity nearer to one that works, a finer grid, or a larger numerics.tolerance."
             )
-        self._remember(contact, float(np.hypot(*velocity)))
+        self._remember(contact, speed, pressure)
         measures = self.ledger.measures(contact.p, 1.0, contact.u, self.levels[0].heights, contact.d, (0.0, 0.0))
         lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
         seconds = time.perf_counter() - began
@@ -146,18 +148,22 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(self, speed: float) -> Iterator[Array | None]:
+    def _starts(self, speed: float, pressure: float) -> Iterator[Array | None]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure.
 
-        Near the last velocity it is the last state. To extrapolate it in the logarithm of the velocity, or to add what
-        changes on the next coarser grid, brings it no nearer: contact spots appear and vanish.
+        The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
+        logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
+        appear and vanish.
         """
-        if self.p is not None and 0.5 < speed / self._speed < 2.0:
-            yield self.p
-        yield None
+        if self.p is None:
+            yield None
+        elif pressure == self._pressure and max(speed, self._speed) <= NEAR * min(speed, self._speed):
+            yield from (self.p, None)
+        else:
+            yield from (None, self.p)
 
-    def _remember(self, contact: SteadyContact, speed: float) -> None:
-        self.contact, self._speed = contact, speed
+    def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
+        self.contact, self._speed, self._pressure = contact, speed, pressure
         self.p = contact.p.copy()
 
     def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float]:

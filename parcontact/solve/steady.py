@@ -25,7 +25,7 @@ from .contact import Certificate, Operator
 from .gcr import Directions, gaps_on
 from .projected import Projected
 
-HALVING = 12  # projected steps in which the certificate must halve
+HALVING = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.01, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 PATIENCE = 25  # changes of the set without coming nearer to a solution after which a solve gives up
 
