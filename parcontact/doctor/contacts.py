@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..theory import full_contact, hertz, jgh, viscoelastic, westergaard
+from ..theory import full_contact, hertz, jgh, persson, viscoelastic, westergaard
 from .bench import Bench
 from .jobs import (
     GLASSY,
@@ -109,7 +109,8 @@ WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 
 
 
 def closed_by_load(bench: Bench) -> None:
-    """Many waves in full contact, sliding: the force is the sum over them, in closed form, steady and of steps."""
+    """Many waves in full contact, sliding: the force is the sum over them, in closed form, steady and of steps, and
+    after Persson for any gamma."""
     velocity, points = 0.3 * WAVELENGTH / RELAXATION, 16
     surface = [
         {"shape": "wave", "amplitude": share * HEIGHT, "waves": [x, y], "phase": 1.0 * x} for x, y, share in WAVES
@@ -123,4 +124,8 @@ def closed_by_load(bench: Bench) -> None:
     for what, row, modulus in (("force", rows[0], exact), ("force of steps", rows[-1], discrete)):
         forces = full_contact.traction(share * HEIGHT, K * x, K * y, modulus) * WAVELENGTH**2
         bench.expect_all(what, [row.measures.force_x, row.measures.force_y], forces, 1e-8)
+        along = (1e6, share * HEIGHT, K * x, K * y, velocity, 0.0, modulus)
+        for gamma in (0.0, 1.0):
+            friction = -row.measures.force_x / (1e6 * WAVELENGTH**2)
+            bench.expect("friction", friction, float(persson.friction_coefficient(*along, gamma)), 1e-8)
     bench.expect("area", min(row.measures.contact_area for row in rows), 1.0, 0.0)
