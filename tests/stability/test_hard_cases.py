@@ -14,7 +14,6 @@ from parcontact.doctor.bench import Bench, Finding
 from parcontact.doctor.cases import CASES, Case, Outcome, examine, table
 
 NAMES = [case.examine.__name__ for case in CASES]
-ON_THREE = ("single_point", "many_decades")  # in other precisions: the quickest of those that slide
 BY_NAME = dict(zip(NAMES, CASES, strict=True))
 
 
@@ -36,8 +35,6 @@ def test_double_precision(ranks: MPI.Intracomm, name: str) -> None:
 @pytest.mark.parametrize("precision", ["single", "mixed"])
 @pytest.mark.parametrize("name", NAMES)
 def test_other_precisions(ranks: MPI.Intracomm, precision: str, name: str) -> None:
-    if ranks.size > 2 and name not in ON_THREE:
-        pytest.skip("on one and two ranks only")
     assert examine(BY_NAME[name], ranks, precision).wrong == []
 
 
