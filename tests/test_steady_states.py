@@ -135,6 +135,24 @@ def test_cylinder(shared_path: Path, comm: MPI.Intracomm, ratio: float, speed: f
     assert extrapolated == pytest.approx(exact, rel=1e-2)
 
 
+def test_starts(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """The last state saves work very near it; elsewhere a state costs what it costs afresh, in operator calls."""
+    text = (
+        "grid: {points: 128, size: 1.0e-3}\n"
+        "surface: {shape: rough, hurst: 0.8, long_wavelength: 5.0e-4, short_wavelength: 1.25e-4, rms_slope: 0.05}\n"
+        "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-3}]}\n"
+        "history: [{pressure: 1.0}]\n"
+    )
+    states = sliding(shared_path, text, comm)
+    calls = [states.solve((v, 0.0), p).operator_calls for v, p in ((0.1, 1e5), (0.103, 1e5), (0.5, 1e5), (0.5, 3e5))]
+    fresh = [
+        sliding(shared_path, text, comm).solve((v, 0.0), p).operator_calls
+        for v, p in ((0.103, 1e5), (0.5, 1e5), (0.5, 3e5))
+    ]
+    assert calls[1] < 0.8 * fresh[0]
+    assert calls[2:] == pytest.approx(fresh[1:], abs=6)  # plans that round otherwise may change a step or two
+
+
 def test_random_scenes_are_right_or_say_so(shared_path: Path, comm: MPI.Intracomm) -> None:
     """What is returned as converged meets the contact conditions, by an operator of numpy's own."""
     random = np.random.default_rng(20)

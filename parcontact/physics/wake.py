@@ -16,11 +16,11 @@ the influence coefficients are Love's A(x) plus, for each term, those along the 
 
 import math
 
-import numba
 import numpy as np
 import pyfftw
 from numpy.typing import DTypeLike
 
+from ..compiled import loop
 from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
@@ -164,7 +164,7 @@ def _within_cell(dx: float, shortest: float, edge: bool) -> tuple[Array, Array]:
     return (edges[:-1, None] + half * (1.0 + GAUSS[0])).ravel(), (half * GAUSS[1]).ravel()
 
 
-@numba.njit(cache=True)
+@loop
 def _recur(x, y, dx, dy, near, far, near_memory, far_memory, decay, ends, out):  # type: ignore[no-untyped-def]
     """The recursion of `_sweep`, from the values at the last x; `near` are the nodes close to the loaded cell."""
     for j in range(y.size):
@@ -181,7 +181,7 @@ def _recur(x, y, dx, dy, near, far, near_memory, far_memory, decay, ends, out): 
             out[j, i] = kept.sum()
 
 
-@numba.njit(cache=True)
+@loop
 def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  # type: ignore[no-untyped-def]
     """Integral over s > 0 of `sum weights/lengths exp(-s/lengths) A(x + s direction)`, nu = 1/2.
 
@@ -207,7 +207,7 @@ def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  
             out[j, i] = total
 
 
-@numba.njit(cache=True)
+@loop
 def _love(x, y, dx, dy):  # type: ignore[no-untyped-def]
     """Love's displacement for nu = 1/2; far away the first two terms of its expansion in the size of the cell."""
     r2 = x * x + y * y
