@@ -53,7 +53,8 @@ def _at_rest(march: "March", span: Span, number: int, target: int) -> bool:
         return True
     if index == 1:  # a jump of the load has just been: branches that have no map have not relaxed yet
         return False
-    return remaining(march, material, span.interval(span.count, since=index - 1)) <= march.scene.job.numerics.tolerance
+    change = remaining(march, material, span.interval(span.count, since=index - 1))
+    return march.scene.slab.agree(change <= march.scene.job.numerics.tolerance)
 
 
 def remaining(march: "March", material: Zener, seconds: float) -> float:
