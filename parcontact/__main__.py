@@ -11,9 +11,11 @@ from typing import Any, NoReturn
 
 from mpi4py import MPI
 
-from . import __version__, curve, job, runner, watch
+from . import __version__, job
 from .errors import InputError, RunError
 from .parallel.slab import Slab
+from .run import runner, watch
+from .steady import curve
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # and runner.AGAIN
 VERBS = ("run", "steady", "check", "plan", "info", "plot", "doctor")

@@ -10,26 +10,26 @@ from typing import Any
 import numpy as np
 
 from . import job as jobs
-from .clock import Step
 from .effects import decisions as calls_for
-from .effects.condensation import condensed, told_of
 from .effects.decisions import Decision, Effect
+from .effects.folded_branches import condensed, told_of
 from .effects.relaxation import relaxation_of
 from .job import Job
+from .job.timeline import Step
 from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
 from .physics import halfspace, heightfile
-from .physics.condense import Condensed
+from .physics.body import Elastic, Heights, Zener
 from .physics.energy import ElasticEnergy, ZenerEnergy
+from .physics.folding import Condensed
 from .physics.ledger import Ledger
-from .physics.material import Elastic, Heights, Zener
+from .physics.motion import AnyFraction, Path, WholeCells
+from .physics.prony import Prony
 from .physics.roughness import Moments, Roughness, moments
 from .physics.shapes import Round, Shape
-from .physics.sliding import AnyFraction, Path, WholeCells
 from .physics.surface import Surface, single_wave
 from .physics.units import Units
 from .solve.contact import ContactSolver
-from .theory.viscoelastic import Prony
 
 Follower = Callable[[Any, Step], None]  # an effect that is told of every step: called with the march and the step made
 

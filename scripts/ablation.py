@@ -22,10 +22,10 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.clock import Step
 from parcontact.effects import decisions as calls_for
 from parcontact.job import Job
-from parcontact.march import March
+from parcontact.job.timeline import Step
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.fields import FieldsFile
 from parcontact.record.provenance import Link, Provenance

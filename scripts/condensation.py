@@ -21,10 +21,10 @@ from pathlib import Path
 from mpi4py import MPI
 
 from parcontact import job, scene
-from parcontact.clock import steps
-from parcontact.march import March
+from parcontact.job.timeline import steps
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.physics.material import Heights, Zener
+from parcontact.physics.body import Heights, Zener
 from parcontact.record.row import Row
 
 JOB = Path(__file__).parents[1] / "jobs" / "velocity_step.yaml"

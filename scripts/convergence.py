@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from parcontact import job, march, scene
+from parcontact import job, scene
+from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
 from parcontact.theory import hertz
 

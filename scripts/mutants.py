@@ -30,12 +30,12 @@ class Mutant:
     new: str
 
 
-MATERIAL, SOLVER, SURFACE = "physics/material.py", "solve/contact.py", "physics/surface.py"
+MATERIAL, SOLVER, SURFACE = "physics/body.py", "solve/contact.py", "physics/surface.py"
 MUTANTS = (
     Mutant("exp - 1 for expm1", MATERIAL, "-np.expm1(-z)", "1.0 - np.exp(-z)"),
     Mutant("decay of the other integrator", MATERIAL, "return np.exp(-z), ", "return 1.0 / (1.0 + z), "),
     Mutant("no limit to dt/tau", MATERIAL, ", 1e-100 * dt)", ", 0.0)"),
-    Mutant("no jumps", "clock.py", "_jumps(stage, before), ends", "stage.seconds == 0.0, ends"),
+    Mutant("no jumps", "job/timeline.py", "_jumps(stage, before), ends", "stage.seconds == 0.0, ends"),
     Mutant(
         "no centring",
         SOLVER,

@@ -18,7 +18,8 @@ import numpy as np
 import pyfftw
 from mpi4py import MPI
 
-from parcontact import job, march, scene
+from parcontact import job, scene
+from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import Convolution
 from parcontact.solve import kernels

@@ -18,8 +18,8 @@ from mpi4py import MPI
 from parcontact import job, scene
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
-from parcontact.steadystate import SteadySliding
-from parcontact.theory.viscoelastic import complex_modulus
+from parcontact.physics.prony import complex_modulus
+from parcontact.steady.sliding import SteadySliding
 
 TEXT = """\
 grid: {{points: {points}, size: 1.0e-3}}

@@ -13,7 +13,8 @@ import pytest
 import yaml
 from conftest import RunParcontact
 
-from parcontact import __main__, watch
+from parcontact import __main__
+from parcontact.run import watch
 
 JOB: dict[str, Any] = {
     "grid": {"points": [16, 12], "size": [1e-3, 7.5e-4]},

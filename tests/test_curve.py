@@ -8,11 +8,13 @@ import pytest
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact import march, scene, steadystart
-from parcontact.curve import request
+from parcontact import scene
 from parcontact.errors import InputError
+from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
 from parcontact.record.measures import read
+from parcontact.steady import start as steadystart
+from parcontact.steady.curve import request
 from parcontact.theory import full_contact
 
 WAVE = """\

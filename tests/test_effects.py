@@ -14,18 +14,19 @@ import pytest
 from marching import begun, marched
 from mpi4py import MPI
 
-from parcontact import runner, scene
-from parcontact.clock import Step
+from parcontact import scene
 from parcontact.effects import decisions as calls_for
 from parcontact.effects.decisions import Effect
 from parcontact.job import Job
-from parcontact.march import March
+from parcontact.job.timeline import Step
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace, loops
+from parcontact.physics.body import Elastic, Material, Zener
 from parcontact.physics.ledger import Ledger
-from parcontact.physics.material import Elastic, Material, Zener
-from parcontact.physics.sliding import WholeCells
+from parcontact.physics.motion import WholeCells
 from parcontact.record import fields, measures
+from parcontact.run import runner
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
 Json = dict[str, Any]

@@ -15,8 +15,9 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from parcontact import job, march, scene
+from parcontact import job, scene
 from parcontact.errors import RunError
+from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
 from parcontact.theory import hertz, jgh, westergaard

@@ -9,10 +9,11 @@ import pytest
 from marching import begun, marched
 from mpi4py import MPI
 
-from parcontact import __main__, state
-from parcontact.clock import Timeline
+from parcontact import __main__
 from parcontact.effects import decisions as calls_for
 from parcontact.job import Job
+from parcontact.job.timeline import Timeline
+from parcontact.march import state
 from parcontact.parallel.slab import Slab
 from parcontact.plan import elsewhere, machine, memory, trial
 from parcontact.plan.sample import Sample, Stage, chosen, sample

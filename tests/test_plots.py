@@ -8,11 +8,12 @@ import pytest
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from parcontact import job, runner
+from parcontact import job
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 from parcontact.record import plots
 from parcontact.record.pictures.run import scaled, size_of
+from parcontact.run import runner
 
 WAVE = """
 grid: {points: 32, size: 2.0e-3}

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from parcontact import job, march, scene
+from parcontact import job, scene
+from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
 
 if TYPE_CHECKING:

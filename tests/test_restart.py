@@ -13,10 +13,11 @@ import pytest
 import yaml
 from mpi4py import MPI
 
-from parcontact import job, runner
+from parcontact import job
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 from parcontact.record import checkpoint
+from parcontact.run import runner
 
 ROUGH = {
     "shape": "rough",

@@ -13,11 +13,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from test_restart import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
-from parcontact import state
-from parcontact.clock import steps
 from parcontact.errors import RunError
-from parcontact.failure import StepError
-from parcontact.march import March, run
+from parcontact.job.timeline import steps
+from parcontact.march import state
+from parcontact.march.failure import StepError
+from parcontact.march.step import March, run
 from parcontact.physics.halfspace import Convolution, Narrowed
 from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver

@@ -11,12 +11,12 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from parcontact.march import March
+from parcontact.march.step import March
 from parcontact.parallel.fft import BLOCK_BYTES
+from parcontact.physics.prony import Integrator, relaxation
 from parcontact.record import measures
 from parcontact.record.row import Row
 from parcontact.theory import full_contact
-from parcontact.theory.viscoelastic import Integrator, relaxation
 
 if TYPE_CHECKING:
     from conftest import RunParcontact

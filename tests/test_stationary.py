@@ -12,11 +12,11 @@ from marching import begun, column, marched
 from mpi4py import MPI
 from test_restart import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
 
-from parcontact.clock import Timeline
-from parcontact.march import March, run
-from parcontact.physics.material import Zener
+from parcontact.job.timeline import Timeline
+from parcontact.march.rest import remaining, steps_to_make
+from parcontact.march.step import March, run
+from parcontact.physics.body import Zener
 from parcontact.record.row import Row
-from parcontact.stationary import remaining, steps_to_make
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
 DWELL = {"name": "dwell", "pressure": 1e4, "duration": 0.1, "time_step": {"first": 1e-4, "growth": 1.2}}

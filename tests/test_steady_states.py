@@ -12,10 +12,10 @@ from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace
+from parcontact.physics.prony import complex_modulus
 from parcontact.solve import steady
-from parcontact.steadystate import Point, SteadySliding
+from parcontact.steady.sliding import Point, SteadySliding
 from parcontact.theory import cylinder_sliding, full_contact
-from parcontact.theory.viscoelastic import complex_modulus
 
 RADIUS, G0, FORCE, CREEP_TIME = 1.0e-2, 2.75e6, 0.15, 1.0e-2
 CONTACT = (3 * FORCE * RADIUS / (16 * G0)) ** (1 / 3)  # a*, Hertz with the instantaneous modulus [m]

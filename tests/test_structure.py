@@ -12,18 +12,17 @@ import parcontact
 HOUSE = Path(parcontact.__file__).parent
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
-    {"__init__", "errors", "compiled", "theory"},
-    {"parallel", "jobfile"},
-    {"physics", "job"},
-    {"solve", "clock"},
+    {"__init__", "errors", "compiled"},
+    {"parallel", "job"},
+    {"physics"},
+    {"theory", "solve"},
     {"effects"},
     {"record"},
     {"scene"},
-    {"steadystate", "failure", "stationary"},
     {"march"},
-    {"state", "restart", "watch", "steadystart"},
-    {"runner", "curve", "plan"},
-    {"study", "doctor"},
+    {"steady"},
+    {"run", "plan"},
+    {"doctor"},
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}

@@ -8,9 +8,9 @@ import pytest
 from marching import BRANCHES, PRONY, SLS, begun, column, example, marched
 from numpy.testing import assert_allclose
 
-from parcontact.march import March
+from parcontact.march.step import March
+from parcontact.physics.body import Zener
 from parcontact.physics.energy import ZenerEnergy
-from parcontact.physics.material import Zener
 from parcontact.record.row import Row
 from parcontact.theory import lee_radok, westergaard
 

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import scene, steadystart
-from ..clock import Step, steps
+from .. import scene
 from ..job import Job
-from ..march import March
+from ..job.timeline import Step, steps
+from ..march.step import March
 from ..parallel.slab import Array, Slab
 from ..record.row import Row
+from ..steady import start as steadystart
 
 if TYPE_CHECKING:
     from mpi4py import MPI

@@ -2,22 +2,10 @@
 
 import numpy as np
 
-from ..theory import full_contact, hertz, jgh, persson, viscoelastic, westergaard
+from ..physics import prony as viscoelastic
+from ..theory import full_contact, hertz, jgh, persson, westergaard
 from .bench import Bench
-from .jobs import (
-    GLASSY,
-    HEIGHT,
-    MEAN,
-    PRONY,
-    RADIUS,
-    RELAXATION,
-    WAVELENGTH,
-    K,
-    flat,
-    sphere,
-    wave,
-    zener,
-)
+from .jobs import GLASSY, HEIGHT, MEAN, PRONY, RADIUS, RELAXATION, WAVELENGTH, K, flat, sphere, wave, zener
 
 ITERATIONS = 60  # a contact may take this many at most
 RUBBER = zener(GLASSY, [], [])

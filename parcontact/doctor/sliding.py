@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..theory import full_contact, viscoelastic, westergaard
+from ..physics import prony as viscoelastic
+from ..theory import full_contact, westergaard
 from .bench import Bench
 from .jobs import FAST, GLASSY, HEIGHT, LONG_TERM, MEAN, PRONY, RELAXATION, WAVELENGTH, K, crossed, wave, zener
 from .times import INTEGRATORS

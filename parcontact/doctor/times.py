@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..march import March
-from ..theory import viscoelastic
+from ..march.step import March
+from ..physics import prony as viscoelastic
 from .bench import Bench
 from .jobs import GLASSY, HEIGHT, LONG_TERM, PRONY, RELAXATION, WAVELENGTH, Json, K, crossed, sphere, wave, zener
 

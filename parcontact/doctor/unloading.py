@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..march import March
+from ..march.step import March
 from ..theory import lee_radok
 from .bench import Bench
 from .jobs import CREEP, PRONY, RADIUS, sphere

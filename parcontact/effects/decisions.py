@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .. import job as jobs
-from ..clock import Timeline
 from ..job import Job
-from .condensation import condensed
+from ..job.timeline import Timeline
+from .folded_branches import condensed
 from .relaxation import relaxation_of
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from .. import job as jobs
 from ..job import Job
-from ..theory.viscoelastic import Prony, normal_form, zener_to_prony
+from ..physics.prony import Prony, normal_form, zener_to_prony
 
 
 def relaxation_of(job: Job) -> Prony:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .material import Zener
+from .body import Zener
 
 SMALL = 1e-2  # z below which differences of exponentials are summed as series, here to ten digits
 

@@ -24,8 +24,8 @@ from ..compiled import loop
 from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
-from ..theory.viscoelastic import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 from .halfspace import Convolution, love, over_cell, tabulate, wavenumbers
+from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 
 Vector = tuple[float, float]
 GAUSS = np.polynomial.legendre.leggauss(6)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import decisions as calls_for
-from ..effects.condensation import condensed
+from ..effects.folded_branches import condensed
 from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..parallel.fft import footprint, transform_name

@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from .. import scene, steadystart
-from ..clock import Step, Timeline
+from .. import scene
 from ..effects import decisions as calls_for
 from ..job import Job
-from ..march import March
+from ..job.timeline import Step, Timeline
+from ..march.rest import steps_to_make
+from ..march.step import March
 from ..parallel.slab import Slab, deal
-from ..stationary import steps_to_make
+from ..steady import start as steadystart
 
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever
 BLOCK = 8  # steps of a block, these among them

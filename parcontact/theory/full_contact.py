@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..physics.prony import Integrator, complex_modulus, discrete_modulus, normal_form
 from .arrays import Array, ComplexArray, ComplexValues, Values
-from .viscoelastic import Integrator, complex_modulus, discrete_modulus, normal_form
 
 
 class Waves(NamedTuple):

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import hyp1f1
 
+from ..physics.prony import CreepSpectrum, creep_spectrum, normal_form, relaxation, relaxation_integral
 from .arrays import Array
 from .quadrature import graded_rule
-from .viscoelastic import CreepSpectrum, creep_spectrum, normal_form, relaxation, relaxation_integral
 
 # a force put on at t = 0 and held
 

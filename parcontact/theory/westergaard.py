@@ -16,8 +16,8 @@ Arguments are in SI units and broadcast.
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..physics.prony import creep_spectrum
 from .arrays import Array, Values
-from .viscoelastic import creep_spectrum
 
 
 def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:

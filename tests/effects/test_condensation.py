@@ -13,14 +13,15 @@ from marching import begun, column, load_script, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 
-from parcontact import job, runner, scene
-from parcontact.clock import steps
-from parcontact.effects.condensation import bands, condensed, phases
+from parcontact import job, scene
+from parcontact.effects.folded_branches import bands, condensed, phases
 from parcontact.errors import InputError
 from parcontact.job import Job
+from parcontact.job.timeline import steps
 from parcontact.parallel.slab import Slab
-from parcontact.physics.condense import Band, Phase
-from parcontact.physics.material import Zener
+from parcontact.physics.body import Zener
+from parcontact.physics.folding import Band, Phase
+from parcontact.run import runner
 
 Json = dict[str, Any]
 

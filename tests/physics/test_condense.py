@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.condense import Band, Condensed, Phase, condense, nothing
-from parcontact.physics.material import Heights, Zener
+from parcontact.physics.body import Heights, Zener
+from parcontact.physics.folding import Band, Condensed, Phase, condense, nothing
+from parcontact.physics.prony import Integrator, Prony, complex_modulus, creep, normal_form
 from parcontact.theory import full_contact
-from parcontact.theory.viscoelastic import Integrator, Prony, complex_modulus, creep, normal_form
 
 Array = NDArray[np.float64]
 

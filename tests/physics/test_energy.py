@@ -6,9 +6,9 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.body import Heights, Zener
 from parcontact.physics.energy import Balance, ElasticEnergy, ZenerEnergy, bend_weights, dissipation_weights
-from parcontact.physics.material import Heights, Zener
-from parcontact.theory.viscoelastic import Integrator, Prony, complex_modulus
+from parcontact.physics.prony import Integrator, Prony, complex_modulus
 
 BODY = Prony(0.3, np.array([0.5, 2.0, 1.0]), np.array([0.05, 0.4, 1e2]))
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)

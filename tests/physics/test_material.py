@@ -8,8 +8,8 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.material import Elastic, Heights, Zener
-from parcontact.theory.viscoelastic import Integrator, Prony, creep, normal_form, relaxation, zener_to_prony
+from parcontact.physics.body import Elastic, Heights, Zener
+from parcontact.physics.prony import Integrator, Prony, creep, normal_form, relaxation, zener_to_prony
 
 POINT = Slab(MPI.COMM_SELF, 1, 1)
 MICRON = 1e-6

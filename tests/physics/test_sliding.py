@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.material import Heights
+from parcontact.physics.body import Heights
+from parcontact.physics.motion import AnyFraction, WholeCells
 from parcontact.physics.shapes import Round
-from parcontact.physics.sliding import AnyFraction, WholeCells
 from parcontact.physics.surface import Surface
 
 from .maps import gathered, random_map

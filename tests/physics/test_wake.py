@@ -12,7 +12,7 @@ from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace, wake
-from parcontact.theory.viscoelastic import Prony, complex_modulus, creep_spectrum
+from parcontact.physics.prony import Prony, complex_modulus, creep_spectrum
 
 from .maps import gathered, random_map
 

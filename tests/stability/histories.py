@@ -11,9 +11,9 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.job import Job
-from parcontact.march import March, run
+from parcontact.march.step import March, run
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.material import Zener
+from parcontact.physics.body import Zener
 from parcontact.record.row import Row
 
 Json = dict[str, Any]

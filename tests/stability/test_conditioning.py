@@ -11,8 +11,8 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from parcontact.failure import StepError
-from parcontact.march import March
+from parcontact.march.failure import StepError
+from parcontact.march.step import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.record.row import Row
 from parcontact.solve import kernels

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from parcontact import clock
-from parcontact.clock import Step
 from parcontact.errors import RunError
-from parcontact.march import March, run
+from parcontact.job import timeline as clock
+from parcontact.job.timeline import Step
+from parcontact.march.step import March, run
 from parcontact.parallel.slab import Array
 from parcontact.record.row import Row
 

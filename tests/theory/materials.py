@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from parcontact.theory.viscoelastic import Prony
+from parcontact.physics.prony import Prony
 
 # one Zener branch: 2.75 MPa at once, a tenth of it in the end, creep time 10 ms and so relaxation time 1 ms
 ZENER = Prony(0.275e6, np.array([2.475e6]), np.array([1e-3]))

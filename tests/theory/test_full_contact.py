@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
+from parcontact.physics.prony import Integrator, Prony, complex_modulus, discrete_modulus, relaxation
 from parcontact.theory import full_contact
-from parcontact.theory.viscoelastic import Integrator, Prony, complex_modulus, discrete_modulus, relaxation
 
 from .materials import TWELVE_DECADES, ZENER
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
+from parcontact.physics.prony import Prony, creep, relaxation
 from parcontact.theory import hertz, lee_radok
-from parcontact.theory.viscoelastic import Prony, creep, relaxation
 
 from .materials import TWELVE_DECADES, ZENER
 

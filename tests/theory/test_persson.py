@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_simpson, simpson
 from scipy.special import erf
 
+from parcontact.physics.prony import complex_modulus
 from parcontact.theory import full_contact, persson
 from parcontact.theory.full_contact import Waves
-from parcontact.theory.viscoelastic import complex_modulus
 
 from .materials import TWELVE_DECADES
 

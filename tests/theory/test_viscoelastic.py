@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from parcontact.theory.viscoelastic import (
+from parcontact.physics.prony import (
     Integrator,
     Prony,
     complex_modulus,

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ...clock import Timeline
 from ...errors import InputError
 from ...job import Job
+from ...job.timeline import Timeline
 from ...parallel.slab import Array
 from .. import hdf5, measures
 

@@ -8,9 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
-from parcontact.jobfile.fault import Fault, refuse
-from parcontact.jobfile.part import Context, Part, Rule, chosen
-from parcontact.jobfile.values import Natural, Positive, Real, Whole
+from .fault import Fault, refuse
+from .part import Context, Part, Rule, chosen
+from .values import Natural, Positive, Real, Whole
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]

@@ -3,22 +3,26 @@
 import time
 from dataclasses import dataclass
 
-from . import march, restart, scene, state, steadystart, watch
-from .clock import Timeline, reached
-from .effects import decisions as calls_for
-from .errors import InputError, RunError
-from .failure import StepError
-from .job import Job, Rough
-from .march import March
-from .parallel.slab import Slab
-from .record import checkpoint, plans
-from .record.checkpoint import Entry, Facts
-from .record.directory import Directory
-from .record.provenance import Link, Provenance, extended
-from .record.recorder import Recorder
+from .. import scene
+from ..effects import decisions as calls_for
+from ..errors import InputError, RunError
+from ..job import Job, Rough
+from ..job.timeline import Timeline, reached
+from ..march import state
+from ..march import step as march
+from ..march.failure import StepError
+from ..march.rest import steps_to_make
+from ..march.step import March
+from ..parallel.slab import Slab
+from ..record import checkpoint, plans
+from ..record.checkpoint import Entry, Facts
+from ..record.directory import Directory
+from ..record.provenance import Link, Provenance, extended
+from ..record.recorder import Recorder
+from ..scene import Scene
+from ..steady import start as steadystart
+from . import restart, watch
 from .restart import Origin
-from .scene import Scene
-from .stationary import steps_to_make
 from .watch import Signals, Watch
 
 DONE, AGAIN = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError, Valida
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from parcontact.jobfile.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
+from .fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
 
 
 @dataclass(frozen=True)

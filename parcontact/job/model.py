@@ -14,43 +14,15 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
-from parcontact.jobfile import advice, table
-from parcontact.jobfile.fault import Fault, faults_of
-from parcontact.jobfile.history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_range
-from parcontact.jobfile.loading import read_job
-from parcontact.jobfile.material import Elastic, Material, PronyBranch, Zener, ZenerBranch
-from parcontact.jobfile.part import Context, Part, Rule
-from parcontact.jobfile.sections import Checkpoint, Grid, Numerics, Output
-from parcontact.jobfile.source import Key, Mistake, Source, dump
-from parcontact.jobfile.surface import Cylinder, Flat, HeightFile, Rough, Shape, Sphere, Wave
-
-__all__ = [
-    "Checkpoint",
-    "Control",
-    "Cylinder",
-    "Elastic",
-    "Flat",
-    "GeometricStep",
-    "Grid",
-    "HeightFile",
-    "Initial",
-    "Job",
-    "JobError",
-    "Numerics",
-    "Output",
-    "PronyBranch",
-    "Ramp",
-    "Rough",
-    "Sphere",
-    "Stage",
-    "Steady",
-    "Wave",
-    "Zener",
-    "ZenerBranch",
-    "describe",
-    "load",
-    "log_range",
-]
+from . import advice, table
+from .fault import Fault, faults_of
+from .history import Initial, Stage, Steady
+from .loading import read_job
+from .material import Elastic, Material, Zener
+from .part import Context, Part, Rule
+from .sections import Checkpoint, Grid, Numerics, Output
+from .source import Key, Mistake, Source, dump
+from .surface import Rough, Shape
 
 
 class JobError(Exception):

@@ -47,8 +47,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..parallel.slab import Array
-from ..theory.viscoelastic import Integrator, Prony, complex_modulus, relaxation
-from .material import coefficients
+from .body import coefficients
+from .prony import Integrator, Prony, complex_modulus, relaxation
 
 LENGTHS, DIRECTIONS = 13, 64  # of a band that are looked at
 PER_DECADE = 4  # lengths of growing steps that are looked at

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from .job import Checkpoint
-from .parallel.slab import Slab
+from ..job import Checkpoint
+from ..parallel.slab import Slab
 
 SIGNALS = (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
 LOOK_SECONDS = 0.2  # between two looks for the stop file

@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from parcontact.jobfile.fault import quote
-from parcontact.jobfile.source import Key, Mistake, Place, Source, parse, read
+from .fault import quote
+from .source import Key, Mistake, Place, Source, parse, read
 
 MATERIAL: Key = ("material",)
 INCLUDE: Key = ("material", "include")

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from .errors import InputError
-from .march import March
-from .physics.material import Zener
-from .steadystate import SteadySliding
+from ..errors import InputError
+from ..march.step import March
+from ..physics.body import Zener
+from .sliding import SteadySliding
 
 
 def begin(march: March) -> None:

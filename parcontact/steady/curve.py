@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from . import scene
-from .errors import InputError, RunError
-from .job import Job
-from .parallel.slab import Slab
-from .record import steady_plot
-from .record.directory import Directory
-from .steadystate import Point, SteadySliding
+from .. import scene
+from ..errors import InputError, RunError
+from ..job import Job
+from ..parallel.slab import Slab
+from ..record import steady_plot
+from ..record.directory import Directory
+from .sliding import Point, SteadySliding
 
 COLUMNS = (
     "velocity,pressure,force_x,force_y,friction,contact_area,approach,mean_gap,max_pressure,"

@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create_model
 
-from parcontact.jobfile.fault import Fault, refuse
-from parcontact.jobfile.part import Part, Rule
-from parcontact.jobfile.values import Flag, NonNegative, Positive, Real, Vector, listed
+from .fault import Fault, refuse
+from .part import Part, Rule
+from .values import Flag, NonNegative, Positive, Real, Vector, listed
 
 Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
 Control = Literal["pressure", "force", "approach"]

@@ -16,12 +16,12 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from .clock import Span, Step, Timeline
-from .parallel.slab import Array
-from .physics.material import Zener
+from ..job.timeline import Span, Step, Timeline
+from ..parallel.slab import Array
+from ..physics.body import Zener
 
 if TYPE_CHECKING:
-    from .march import March
+    from .step import March
 
 
 def steps_to_make(march: "March", timeline: Timeline, until: float | None = None) -> Iterator[Step]:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from parcontact.jobfile.history import Ramp
-from parcontact.jobfile.part import Part
+from .history import Ramp
+from .part import Part
 
 
 def plain(value: Any) -> Any:

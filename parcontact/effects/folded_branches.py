@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from .. import job as jobs
-from ..clock import Timeline
 from ..job import Grid, Job
-from ..physics.condense import Band, Condensed, Phase, condense, nothing
-from ..theory.viscoelastic import Prony
+from ..job.timeline import Timeline
+from ..physics.folding import Band, Condensed, Phase, condense, nothing
+from ..physics.prony import Prony
 from .relaxation import relaxation_of
 
 

@@ -8,7 +8,8 @@ from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
-from .job import GeometricStep, Grid, Ramp, Stage
+from .history import GeometricStep, Ramp, Stage
+from .sections import Grid
 
 ROUND_OFF = 1e-9  # relative: a duration this close to a whole number of steps is one
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..parallel.slab import Array, Slab, allocate
-from ..theory.viscoelastic import Prony
 from . import loops
+from .prony import Prony
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from .clock import Step, Timeline
-from .errors import InputError
-from .job import HeightFile, Job, Stage
-from .jobfile.table import plain
-from .parallel.slab import Slab
-from .record import checkpoint
-from .record.checkpoint import Contents
-from .record.directory import Directory
+from ..errors import InputError
+from ..job import HeightFile, Job, Stage
+from ..job.table import plain
+from ..job.timeline import Step, Timeline
+from ..parallel.slab import Slab
+from ..record import checkpoint
+from ..record.checkpoint import Contents
+from ..record.directory import Directory
 
 SAME = ("grid", "surface", "material", "initial")  # sections that must not change
 SAME_NUMERICS = ("integrator", "kernel", "precision", "slope")

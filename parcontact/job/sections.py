@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from parcontact.jobfile.fault import Fault
-from parcontact.jobfile.part import Context, Part, Rule
-from parcontact.jobfile.values import Count, Flag, Positive, both, listed
+from .fault import Fault
+from .part import Context, Part, Rule
+from .values import Count, Flag, Positive, both, listed
 
 
 class Grid(Part):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from parcontact.jobfile.source import Key
+from .source import Key
 
 AT_VALUE, AT_KEY = "at value", "at key"  # the types of our errors within pydantic
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .clock import Step
-from .errors import RunError
-from .parallel.slab import Array
-from .scene import Scene
-from .solve.contact import Contact
+from ..errors import RunError
+from ..job.timeline import Step
+from ..parallel.slab import Array
+from ..scene import Scene
+from ..solve.contact import Contact
 
 ROUNDINGS = 4.0  # of the largest length, over the surface's height: no certificate is sure to be better
 LONG = 1.5  # cells that a surface moves in a long step

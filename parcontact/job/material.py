@@ -8,9 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, ValidationInfo
 
-from parcontact.jobfile.fault import Fault, quote, refuse
-from parcontact.jobfile.part import Part, Rule, chosen
-from parcontact.jobfile.values import NonNegative, Positive
+from .fault import Fault, quote, refuse
+from .part import Part, Rule, chosen
+from .values import NonNegative, Positive
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
 Poisson = Annotated[float, Field(gt=-1, le=0.5, strict=True, description="a Poisson ratio [-] above -1 and up to 0.5")]

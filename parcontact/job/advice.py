@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from parcontact.jobfile.history import GeometricStep, Stage
-from parcontact.jobfile.sections import Grid
-from parcontact.jobfile.surface import Rough
+from .history import GeometricStep, Stage
+from .sections import Grid
+from .surface import Rough
 
 if TYPE_CHECKING:
-    from parcontact.job import Job
+    from . import Job
 
 LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter of luck (paper, end of section 3)
 CELLS_PER_WAVE = 8  # fewer under-resolve the contact of the shortest waves (paper, end of section 3)

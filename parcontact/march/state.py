@@ -6,13 +6,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .errors import InputError
-from .march import March
-from .parallel.slab import Slab
-from .physics.energy import ZenerEnergy
-from .physics.material import Zener
-from .record.checkpoint import Contents, Entry, read
-from .scene import Scene
+from ..errors import InputError
+from ..parallel.slab import Slab
+from ..physics.body import Zener
+from ..physics.energy import ZenerEnergy
+from ..record.checkpoint import Contents, Entry, read
+from ..scene import Scene
+from .step import March
 
 MAYBE = "contact/earlier pressure"  # not kept by a history of single solves, whose successor starts from the last one
 

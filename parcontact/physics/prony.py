@@ -10,11 +10,11 @@ time 0 (no stress after the first instant) or infinity (a spring).
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from .arrays import Array, ComplexArray
-
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 Integrator = Literal["backward-euler", "exponential"]
 
 

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import DTypeLike
 
-from .material import Heights
+from .body import Heights
 from .surface import Surface
 
 

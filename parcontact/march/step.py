@@ -7,19 +7,19 @@ from functools import partial
 
 import numpy as np
 
+from ..job.timeline import Step, Timeline
+from ..parallel import rows
+from ..parallel.slab import Array
+from ..physics import loops
+from ..physics.body import Zener
+from ..physics.energy import ElasticEnergy, ZenerEnergy
+from ..record.row import Row
+from ..scene import Scene, solver_on
+from ..solve import retry
+from ..solve.contact import Approach, Contact, MeanPressure
 from . import failure
-from .clock import Step, Timeline
 from .failure import StepError
-from .parallel import rows
-from .parallel.slab import Array
-from .physics import loops
-from .physics.energy import ElasticEnergy, ZenerEnergy
-from .physics.material import Zener
-from .record.row import Row
-from .scene import Scene, solver_on
-from .solve import retry
-from .solve.contact import Approach, Contact, MeanPressure
-from .stationary import steps_to_make
+from .rest import steps_to_make
 
 Task = Callable[["March"], bool | None]
 ROUND_OFF = 1e-14  # relative to lengths whose sum is compared with 0

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import RunError
-from .parallel import regrid
-from .parallel.fft import FFT
-from .parallel.slab import Array, Slab
-from .physics import halfspace, wake
-from .physics.ledger import Ledger, Measures
-from .scene import Frame
-from .solve.contact import Certificate
-from .solve.steady import SteadyContact, SteadySolver
-from .theory.viscoelastic import Prony
+from ..errors import RunError
+from ..parallel import regrid
+from ..parallel.fft import FFT
+from ..parallel.slab import Array, Slab
+from ..physics import halfspace, wake
+from ..physics.ledger import Ledger, Measures
+from ..physics.prony import Prony
+from ..scene import Frame
+from ..solve.contact import Certificate
+from ..solve.steady import SteadyContact, SteadySolver
 
 COARSE_TOLERANCE = 7e-4  # of the certificate on all grids but the finest
 NEAR = 1.1  # a velocity this many times the last one, or less, is near it

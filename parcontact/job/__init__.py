@@ -1,0 +1,35 @@
+"""A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
+
+from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_range
+from .material import Elastic, PronyBranch, Zener, ZenerBranch
+from .model import Job, JobError, describe, load
+from .sections import Checkpoint, Grid, Numerics, Output
+from .surface import Cylinder, Flat, HeightFile, Rough, Sphere, Wave
+
+__all__ = [
+    "Checkpoint",
+    "Control",
+    "Cylinder",
+    "Elastic",
+    "Flat",
+    "GeometricStep",
+    "Grid",
+    "HeightFile",
+    "Initial",
+    "Job",
+    "JobError",
+    "Numerics",
+    "Output",
+    "PronyBranch",
+    "Ramp",
+    "Rough",
+    "Sphere",
+    "Stage",
+    "Steady",
+    "Wave",
+    "Zener",
+    "ZenerBranch",
+    "describe",
+    "load",
+    "log_range",
+]
