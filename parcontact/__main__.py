@@ -15,7 +15,7 @@ from . import __version__, job
 from .errors import InputError, RunError
 from .parallel.slab import Slab
 from .run import runner, watch
-from .steady import curve
+from .steady_sliding import curve
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # and runner.AGAIN
 VERBS = ("run", "steady", "check", "plan", "info", "plot", "doctor")

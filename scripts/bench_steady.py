@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from parcontact import job, scene
 from parcontact.parallel.slab import Slab
-from parcontact.steady.sliding import SteadySliding
+from parcontact.steady_sliding.sliding import SteadySliding
 
 COLD, CURVE = 400, 150  # calls at most; the goals are 200 and 60
 TEXT = """\

@@ -19,7 +19,7 @@ from parcontact import job, scene
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.steady.sliding import SteadySliding
+from parcontact.steady_sliding.sliding import SteadySliding
 
 TEXT = """\
 grid: {{points: {points}, size: 1.0e-3}}

@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from parcontact import job, scene
 from parcontact.parallel.slab import Slab
-from parcontact.steady.sliding import Point, SteadySliding
+from parcontact.steady_sliding.sliding import Point, SteadySliding
 
 RADIUS, G0, FORCE, CREEP_TIME, BOX = 1.0e-2, 2.75e6, 0.15, 1.0e-2, 4.8
 CONTACT = (3 * FORCE * RADIUS / (16 * G0)) ** (1 / 3)

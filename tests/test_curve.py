@@ -13,8 +13,8 @@ from parcontact.errors import InputError
 from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
 from parcontact.record.measures import read
-from parcontact.steady import start as steadystart
-from parcontact.steady.curve import request
+from parcontact.steady_sliding import start as steadystart
+from parcontact.steady_sliding.curve import request
 from parcontact.theory import full_contact
 
 WAVE = """\

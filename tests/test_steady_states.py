@@ -14,7 +14,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics import halfspace
 from parcontact.physics.prony import complex_modulus
 from parcontact.solve import steady
-from parcontact.steady.sliding import Point, SteadySliding
+from parcontact.steady_sliding.sliding import Point, SteadySliding
 from parcontact.theory import cylinder_sliding, full_contact
 
 RADIUS, G0, FORCE, CREEP_TIME = 1.0e-2, 2.75e6, 0.15, 1.0e-2

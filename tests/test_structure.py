@@ -20,7 +20,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"record"},
     {"scene"},
     {"march"},
-    {"steady"},
+    {"steady_sliding"},
     {"run", "plan"},
     {"doctor"},
     {"__main__"},

@@ -15,7 +15,7 @@ from ..job.timeline import Step, steps
 from ..march.step import March
 from ..parallel.slab import Array, Slab
 from ..record.row import Row
-from ..steady import start as steadystart
+from ..steady_sliding import start as steadystart
 
 if TYPE_CHECKING:
     from mpi4py import MPI

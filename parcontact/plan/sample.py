@@ -18,7 +18,7 @@ from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
-from ..steady import start as steadystart
+from ..steady_sliding import start as steadystart
 
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever
 BLOCK = 8  # steps of a block, these among them

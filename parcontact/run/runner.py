@@ -20,7 +20,7 @@ from ..record.directory import Directory
 from ..record.provenance import Link, Provenance, extended
 from ..record.recorder import Recorder
 from ..scene import Scene
-from ..steady import start as steadystart
+from ..steady_sliding import start as steadystart
 from . import restart, watch
 from .restart import Origin
 from .watch import Signals, Watch
