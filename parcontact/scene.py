@@ -18,10 +18,12 @@ from .job import Job
 from .job.timeline import Step
 from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
-from .physics import halfspace, heightfile
+from .physics import heightfile
 from .physics.body import Elastic, Heights, Zener
+from .physics.convolution import Convolution
 from .physics.energy import ElasticEnergy, ZenerEnergy
 from .physics.folding import Condensed
+from .physics.halfspace import HalfSpace
 from .physics.ledger import Ledger
 from .physics.motion import AnyFraction, Path, WholeCells
 from .physics.prony import Prony
@@ -57,6 +59,13 @@ class Frame:
     @property
     def size(self) -> tuple[float, float]:
         return self.job.grid.lx / self.units.length, self.job.grid.ly / self.units.length
+
+    @property
+    def half_space(self) -> HalfSpace:
+        """The body's, of shear modulus 1, in the run's units."""
+        return HalfSpace(
+            self.size, self.job.material.poisson, self.job.numerics.kernel, self.job.grid.boundary == "free"
+        )
 
     @property
     def dtype(self) -> type[np.floating]:
@@ -224,22 +233,15 @@ def _material(base: Frame, branches: Condensed) -> Elastic | Zener:
 
 def _solver(base: Frame, tolerance: float) -> ContactSolver:
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
-    return ContactSolver(base.slab, _operator(base), _preconditioner(base), height, tolerance, limit, base.dtype)
+    return ContactSolver(
+        base.slab, base.half_space.operator(base.fft), _preconditioner(base), height, tolerance, limit, base.dtype
+    )
 
 
-def _operator(base: Frame) -> halfspace.Convolution:
-    poisson = base.job.material.poisson
-    if calls_for.isolated(base.job).on:
-        return halfspace.free(base.slab, base.size, poisson, base.dtype, base.fft.measured)
-    return halfspace.periodic(base.fft, base.size, poisson, base.job.numerics.kernel)
-
-
-def _preconditioner(base: Frame) -> halfspace.Convolution | halfspace.Narrowed:
-    poisson = base.job.material.poisson
-    if calls_for.mixed_precision(base.job).on:
-        narrow = FFT(base.slab, dtype=np.float32, measured=base.fft.measured)
-        return halfspace.Narrowed(halfspace.inverse(narrow, base.size, poisson))
-    return halfspace.inverse(base.fft, base.size, poisson)
+def _preconditioner(base: Frame) -> Convolution:
+    single = calls_for.mixed_precision(base.job).on
+    fft = FFT(base.slab, dtype=np.float32, measured=base.fft.measured) if single else base.fft
+    return base.half_space.inverse(fft)
 
 
 def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> ElasticEnergy | ZenerEnergy:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace
+from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
 from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
 
@@ -30,7 +30,8 @@ def solver(heights: Map, tolerance: float, max_iterations: int = 500) -> Contact
     ny, nx = heights.shape
     slab = Slab(MPI.COMM_SELF, nx, ny)
     fft = FFT(slab)
-    operator, inverse = halfspace.periodic(fft, (1.0, 1.0)), halfspace.inverse(fft, (1.0, 1.0))
+    half_space = HalfSpace((1.0, 1.0))
+    operator, inverse = half_space.operator(fft), half_space.inverse(fft)
     return ContactSolver(slab, operator, inverse, float(np.ptp(heights)), tolerance, max_iterations)
 
 

@@ -62,7 +62,7 @@ MUTANTS = (
     ),
     Mutant(
         "Love's coefficients off by a cell",
-        "physics/halfspace.py",
+        "physics/convolution.py",
         "index, index - count)",
         "index, index - count + 1)",
     ),

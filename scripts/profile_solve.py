@@ -21,7 +21,7 @@ from mpi4py import MPI
 from parcontact import job, scene
 from parcontact.march import step as march
 from parcontact.parallel.slab import Slab
-from parcontact.physics.halfspace import Convolution
+from parcontact.physics.convolution import Convolution
 from parcontact.solve import kernels
 
 JOB = """

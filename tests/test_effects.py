@@ -21,7 +21,7 @@ from parcontact.job import Job
 from parcontact.job.timeline import Step
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace, loops
+from parcontact.physics import loops
 from parcontact.physics.body import Elastic, Material, Zener
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
@@ -113,7 +113,7 @@ def lasting(planned: Job) -> Counter[str]:
 
 
 def bare_solver(base: scene.Frame) -> ContactSolver:
-    operator, inverse = halfspace.periodic(base.fft, base.size), halfspace.inverse(base.fft, base.size)
+    operator, inverse = base.half_space.operator(base.fft), base.half_space.inverse(base.fft)
     return ContactSolver(base.slab, operator, inverse, base.height / base.units.height, 1e-15, ITERATIONS)
 
 

@@ -76,9 +76,7 @@ def test_fields_do_not_depend_on_the_ranks(path: Path, communicators: list[MPI.I
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("grid", GRIDS)
-def test_measures_agree_within_the_default_tolerance(
-    path: Path, communicators: list[MPI.Intracomm], grid: str
-) -> None:
+def test_measures_agree_within_the_default_tolerance(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
     """Lengths relative to the height of the surface, pressures to the highest."""
     overrides = [*GRIDS[grid], "numerics.tolerance=1.0e-4"]
     alone = solved(path, MPI.COMM_SELF, *overrides)

@@ -11,7 +11,7 @@ from parcontact import scene
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace
+from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.prony import complex_modulus
 from parcontact.solve import steady
 from parcontact.steady_sliding.sliding import Point, SteadySliding
@@ -219,6 +219,6 @@ def test_branches_add_up_to_the_body(shared_path: Path, comm: MPI.Intracomm, bou
     body = base.prony.modulus_inf * contact.u
     for branch in states.branch_maps(velocity):
         body = body + branch
-    free = halfspace.free(base.slab, base.size) if boundary == "free" else halfspace.periodic(base.fft, base.size)
-    expected = free.apply(contact.p, base.slab.empty())
+    elastic = HalfSpace(base.size, free=boundary == "free").operator(base.fft)
+    expected = elastic.apply(contact.p, base.slab.empty())
     assert np.max(np.abs(body - expected)) <= 1e-12 * np.max(np.abs(expected))

@@ -1,6 +1,5 @@
 """What to say of a step that failed: what happened, where, and what to change."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -65,7 +64,7 @@ def _reach(scene: Scene, last: Contact, h: Array) -> float:
     as the box: a load far beyond full contact has no digits left for what differs from its mean.
     """
     sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
-    sizes[2] *= (1.0 - scene.job.material.poisson) * max(scene.frame.size) / (2 * math.pi)
+    sizes[2] *= scene.frame.half_space.largest_compliance
     return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / scene.solver.height
 
 

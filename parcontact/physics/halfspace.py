@@ -1,198 +1,154 @@
-"""Operators of the half space: pressure -> normal displacement of the surface, and back.
+"""The half space: pressure -> normal displacement of its surface and back, at rest and under a sliding surface.
 
 An elastic half space of shear modulus 1 under the pressure p moves by the Boussinesq integral (paper, Eq. 1)
 
     u(x) = (1 - nu)/(2 pi) int p(x') / |x - x'| d2x',       in Fourier space   u^(q) = (1 - nu)/|q| p^(q).
 
 With a modulus G divide by G. Lengths may be in any unit: the result is in that unit times the pressure over the
-modulus. `spectral` takes this symbol as it is; `love` takes the pressure as constant on each cell (A. E. H. Love, Phil.
-Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2) and the displacement at cell centres. The mean displacement of a periodic
-half space is arbitrary and set to 0.
+modulus. The kernel `spectral` takes this symbol as it is; `love` takes the pressure as constant on each cell
+(`physics.love`) and the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and
+set to 0.
+
+A wave `exp(i q x)` of pressure that moves with the surface at the velocity v loads a point of a viscoelastic body at
+the angular frequency `-q v`, so that seen from the surface
+
+    u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
+
+Around an isolated contact the wake is not periodic: its influence coefficients are integrals along it
+(`physics.wake`).
 """
 
-import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
-import numba
 import numpy as np
-import pyfftw
-from numpy.typing import DTypeLike, NDArray
-from scipy.special import erf
+from numpy.typing import DTypeLike
 
-from ..parallel.fft import FFT
-from ..parallel.slab import Array, Slab
+from ..errors import InputError
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.slab import Array
+from .convolution import Convolution, padded_lengths, tabulate, wavenumbers
+from .love import cell_factor, love
+from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
+from .wake import wake
 
-NEAR = 4.0  # cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
-GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.legendre.leggauss(6))
-
-
-class Convolution:
-    """A linear operator given by its symbol on the wavenumbers of a transform, shape `fft.shape`."""
-
-    def __init__(self, fft: FFT, symbol: NDArray[np.inexact]) -> None:
-        self.fft = fft
-        scale = 1.0 / (fft.mx * fft.my)
-        self.symbol = np.multiply(symbol, scale).astype(fft.dtype if np.isrealobj(symbol) else fft.complex)
-        fft.slab.tally.hold(self.symbol)
-
-    def apply(self, field: Array, out: Array) -> Array:
-        """Collective."""
-        self.fft.slab.tally["operator"] += 1
-        return self.fft.convolve(field, self.symbol, out)
+Vector = tuple[float, float]
 
 
-class Narrowed:
-    """An operator of single precision for maps of double precision: half the time and messages, 7 digits."""
+@dataclass(frozen=True)
+class HalfSpace:
+    """A half space of shear modulus 1 that is loaded inside a box of `size = (lx, ly)` [any unit of length].
 
-    def __init__(self, operator: Convolution) -> None:
-        self.operator = operator
-
-    def apply(self, field: Array, out: Array) -> Array:
-        """Collective."""
-        return self.operator.apply(field, out)
-
-
-def wavenumbers(fft: FFT, size: tuple[float, float]) -> tuple[Array, Array]:
-    """Angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to its shape."""
-    along_x, along_y = fft.modes
-    return 2 * np.pi / size[0] * along_x, 2 * np.pi / size[1] * along_y
-
-
-def periodic(fft: FFT, size: tuple[float, float], poisson: float = 0.5, kernel: str = "spectral") -> Convolution:
-    """Pressure -> displacement of a periodic half space of shear modulus 1; a pressure's mean moves nothing."""
-    qx, qy = wavenumbers(fft, size)
-    q = np.hypot(qx, qy)
-    with np.errstate(divide="ignore"):
-        symbol = np.where(q > 0.0, (1.0 - poisson) / q, 0.0)
-    if kernel == "love":
-        symbol *= _cell_factor(fft, size)
-    return Convolution(fft, symbol)
-
-
-def inverse(fft: FFT, size: tuple[float, float], poisson: float = 0.5) -> Convolution:
-    """Displacement -> pressure, `|q|/(1 - nu)`: exact for the spectral periodic half space, else a preconditioner.
-
-    At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
-    acts on mean values only.
+    `free`: there is nothing around the box, and the coefficients are Love's; else the box repeats for ever, with the
+    `kernel`. Transforms are handed in: `fft` is one of the maps' own size, in whose precision operators calculate;
+    symbols have its shape. A free half space makes a padded transform for each of its operators, which nobody outside
+    sees.
     """
-    q = np.hypot(*wavenumbers(fft, size))
-    q[q == 0.0] = 2 * np.pi / max(size)
-    return Convolution(fft, q / (1.0 - poisson))
+
+    size: Vector
+    poisson: float = 0.5
+    kernel: Literal["spectral", "love"] = "spectral"
+    free: bool = False
+
+    # -- elastic ------------------------------------------------------------------------------------------------------
+
+    def symbol(self, fft: FFT) -> Array:
+        """Displacement over pressure of each wave of a periodic half space, `(1 - nu)/|q|`; a mean moves nothing."""
+        q = np.hypot(*wavenumbers(fft, self.size))
+        with np.errstate(divide="ignore"):
+            symbol = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
+        return symbol * cell_factor(fft, self.size) if self.kernel == "love" else symbol
+
+    def inverse_symbol(self, fft: FFT) -> Array:
+        """Pressure over displacement of each wave, `|q|/(1 - nu)`, whatever the kernel.
+
+        At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
+        acts on mean values only.
+        """
+        q = np.hypot(*wavenumbers(fft, self.size))
+        q[q == 0.0] = 2 * np.pi / max(self.size)
+        return np.asarray(q / (1.0 - self.poisson))
+
+    @property
+    def largest_compliance(self) -> float:
+        """Displacement over pressure of a wave as long as the box."""
+        return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
+
+    def operator(self, fft: FFT) -> Convolution:
+        """Pressure -> displacement; collective where the half space is free.
+
+        There the box is padded to twice its size with zeros, which makes the cyclic convolution with Love's
+        coefficients a linear one (paper, reference [12]).
+        """
+        if not self.free:
+            return Convolution(fft, self.symbol(fft))
+        padded = _padded(fft, fft.dtype, fft.measured)
+        return Convolution(padded, tabulate(padded, self.size, partial(love, poisson=self.poisson)).real)
+
+    def inverse(self, fft: FFT) -> Convolution:
+        """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
+        a preconditioner."""
+        return Convolution(fft, self.inverse_symbol(fft))
+
+    # -- under a surface that slides steadily -------------------------------------------------------------------------
+
+    def frequencies(self, fft: FFT, velocity: Vector) -> Array:
+        """Angular frequency `q v` of each wave under a surface of that velocity [length/s]; shape `fft.shape`."""
+        qx, qy = wavenumbers(fft, self.size)
+        return np.asarray(qx * velocity[0] + qy * velocity[1])
+
+    def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony) -> Spectrum:
+        """G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both."""
+        qx, qy = wavenumbers(fft, self.size)
+        at_x, at_y = (2 * np.abs(mode) == count for mode, count in zip(fft.modes, (fft.mx, fft.my), strict=True))
+        result = np.zeros(fft.shape, dtype=np.complex128)
+        for sign_x, sign_y in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+            along_x, along_y = np.where(at_x, sign_x * qx, qx), np.where(at_y, sign_y * qy, qy)
+            result += 0.25 * complex_modulus(-(along_x * velocity[0] + along_y * velocity[1]), *prony)
+        return result
+
+    def sliding_operator(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
+        """Pressure -> displacement of a viscoelastic body; collective where the half space is free.
+
+        Raises InputError for an unbounded body that flows: its wake never ends.
+        """
+        if self.free:
+            return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
+        return Convolution(fft, self.symbol(fft) / self.sliding_modulus(fft, velocity, prony))
+
+    def sliding_inverse(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
+        """Displacement -> pressure, as `inverse`."""
+        return Convolution(fft, self.inverse_symbol(fft) * self.sliding_modulus(fft, velocity, prony))
+
+    def branch_operator(self, fft: FFT, velocity: Vector, prony: Prony, k: int) -> Convolution:
+        """Pressure -> map h_k of branch k of an unbounded body; collective.
+
+        In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has no other poles than the creep function:
+        each of its terms is weighted by what the branch makes, at that term's rate -1/l_i, of a displacement.
+        """
+        creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
+        ratio = -tau / creep.retardation_times
+        shares = creep.compliances * modulus * ratio / (1.0 + ratio)
+        own = CreepSpectrum(modulus * creep.glass, shares, creep.retardation_times, 0.0)
+        return self._along_wake(fft, velocity, own, np.float64)
+
+    def _along_wake(self, fft: FFT, velocity: Vector, creep: CreepSpectrum, dtype: DTypeLike) -> Convolution:
+        padded = _padded(fft, dtype)
+
+        def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:
+            return wake(x, y, dx, dy, velocity, creep) * (2.0 * (1.0 - self.poisson))
+
+        return Convolution(padded, tabulate(padded, self.size, coefficient))
 
 
-def free(
-    slab: Slab,
-    size: tuple[float, float],
-    poisson: float = 0.5,
-    dtype: DTypeLike = np.float64,
-    measured: bool = True,
-) -> Convolution:
-    """Pressure -> displacement of an unbounded half space loaded inside the box only: Love's coefficients, zero padded.
-
-    Padding to twice the box makes the cyclic convolution a linear one (paper, reference [12]); nobody outside sees it.
-    """
-    lengths = padded_lengths(slab.nx, slab.ny)
-    fft = FFT(slab, lengths, dtype, measured)
-    return Convolution(fft, tabulate(fft, size, partial(love, poisson=poisson)).real)
+def _padded(fft: FFT, dtype: DTypeLike, measured: bool = True) -> FFT:
+    """A transform of at least twice the box of another one."""
+    return FFT(fft.slab, padded_lengths(fft.slab.nx, fft.slab.ny), dtype, measured)
 
 
-def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
-    """Lengths of the transforms of a free half space: fast ones of at least twice the box."""
-    return pyfftw.next_fast_len(2 * nx), pyfftw.next_fast_len(2 * ny)
-
-
-def tabulate(fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array]) -> NDArray[np.complexfloating]:
-    """Symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at distance (x, y) [length]
-    that a unit pressure on one cell causes; collective, and no rank holds the whole table.
-    """
-    slab = fft.slab
-    dx, dy = size[0] / slab.nx, size[1] / slab.ny
-    padded = slab.resized(fft.mx, fft.my)
-    x, y = (step * _distances(count) for step, count in ((dx, fft.mx), (dy, fft.my)))
-    table = np.ascontiguousarray(coefficient(x[None, :], y[padded.rows, None], dx, dy))
-    return FFT(padded, measured=fft.measured).forward(table)
-
-
-def _distances(count: int) -> NDArray[np.int64]:
-    index = np.arange(count)
-    return np.where(2 * index <= count, index, index - count)
-
-
-def love(x: Array, y: Array, dx: float, dy: float, poisson: float = 0.5) -> Array:
-    """Displacement [length] at distance (x, y) from the centre of a `dx x dy` cell under unit pressure, for G = 1.
-
-    Love (1929): `(1 - nu)/(2 pi)` times the integral of 1/r over the cell; relative error below 2e-14 at any distance.
-    """
-    return np.asarray(over_cell(x, y, dx, dy)) * (1.0 - poisson) / (2 * np.pi)
-
-
-@numba.vectorize(cache=True)
-def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the types itself
-    """Integral of 1/r over a `dx x dy` cell at distance (x, y).
-
-    Near by, the differences of the primitive `x asinh(y/|x|) + y asinh(x/|y|)` at the four corners. They cancel far
-    away: there each line of the cell across the farther direction is integrated in closed form, and then over lines.
-    """
-    x, y = abs(x), abs(y)
-    if x * dy < y * dx:
-        x, y, dx, dy = y, x, dy, dx
-    total = 0.0
-    if x < NEAR * dx:
-        for i in (-1, 1):
-            a = x + 0.5 * i * dx
-            for j in (-1, 1):
-                b = y + 0.5 * j * dy
-                if a != 0.0:
-                    total += i * j * a * math.asinh(b / abs(a))
-                if b != 0.0:
-                    total += i * j * b * math.asinh(a / abs(b))
-        return total
-    low, high = y - 0.5 * dy, y + 0.5 * dy
-    for node, weight in zip(GAUSS_NODES, GAUSS_WEIGHTS):  # noqa: B905  # numba has no strict zip
-        a = x + node * dx
-        if low > 0.0:
-            line = 2.0 * math.atanh(dy / (math.sqrt(a**2 + low**2) + math.sqrt(a**2 + high**2)))
-        else:
-            line = math.asinh(high / a) - math.asinh(low / a)
-        total += weight * line
-    return total * dx
-
-
-def _cell_factor(fft: FFT, size: tuple[float, float]) -> Array:
-    """Compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
-
-    A wave of pressures constant on cells contains all aliases of its wavenumber, each with the cell's form factor:
-    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
-
-        1/|q| = 2/sqrt(pi) int_0^inf exp(-q^2 t^2) dt
-
-    the sums over Qx and Qy separate, and the integral is one product of matrices. Double exponential quadrature (H.
-    Takahasi and M. Mori, Publ. RIMS 9 (1974) 721) starts far inside a cell and ends far outside the box.
-    """
-    qx, qy = wavenumbers(fft, size)
-    dx, dy = size[0] / fft.mx, size[1] / fft.my
-    shortest, longest = min(dx, dy) / 16, max(size)
-    u = np.arange(-3.7, math.log(2.0 * longest / shortest), 0.1)
-    t = shortest * np.exp(u - np.exp(-u))
-    weight = 0.2 / math.sqrt(math.pi) * t * (1.0 + np.exp(-u))
-    along_x, along_y = _blurred_cell(qx.ravel() * dx / 2, t / dx), _blurred_cell(qy.ravel() * dy / 2, t / dy)
-    q = np.hypot(qx, qy)
-    return np.where(q > 0.0, q * ((weight[:, None] * along_y).T @ along_x), 1.0)
-
-
-def _blurred_cell(b: Array, width: Array) -> Array:
-    """`sum_n sinc(b_n) exp(-(2 b_n width)^2)`, b_n = b + pi n: the sampled wave of a cell blurred by `width` [cells].
-
-    Shape (width, b). The sum over aliases converges fast for wide blurs; for narrow ones that over cells, with
-    the share of the blurred cell in each (Poisson's summation).
-    """
-    result = np.zeros((width.size, b.size))
-    wide = width > 0.25
-    for n in range(-5, 6):
-        alias = b + np.pi * n
-        result[wide] += np.sinc(alias / np.pi) * np.exp(-((2 * width[wide, None] * alias) ** 2))
-    for cell in range(-4, 5):
-        edges = [erf((cell + side) / (2 * width[~wide, None])) for side in (-0.5, 0.5)]
-        result[~wide] += (edges[1] - edges[0]) / 2 * np.cos(2 * cell * b)
-    return result
+def _creep(prony: Prony) -> CreepSpectrum:
+    creep = creep_spectrum(*prony)
+    if creep.fluidity > 0.0:
+        raise InputError("material: a body without long-term modulus leaves an endless wake; give it modulus_inf > 0")
+    return creep

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
-from .halfspace import wavenumbers
+from .convolution import wavenumbers
 
 EDGE = 1.0 - 1e-9  # wavenumbers equal to a limit up to round-off are taken as equal to it
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
 from . import loops
-from .halfspace import wavenumbers
+from .convolution import wavenumbers
 from .shapes import Shape
 
 Indices = NDArray[np.intp]

@@ -1,11 +1,6 @@
-"""Operators of steady sliding, seen from the rigid surface: what it meets of the body still remembers what it left.
+"""Influence coefficients of an isolated sliding contact: the body still remembers what the surface has left.
 
-At the velocity v a body point that is now at x was at `x + v t` a time t ago. A wave `exp(i q x)` of pressure that
-moves with the surface loads the body at the angular frequency `-q v`, so that on a periodic body
-
-    u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
-
-Around an isolated contact the wake is not periodic. There, with the creep function
+At the velocity v a body point that is now at x was at `x + v t` a time t ago. With the creep function
 
     J(t) = J_g + sum J_i (1 - exp(-t/l_i)),
 
@@ -17,15 +12,11 @@ the influence coefficients are Love's A(x) plus, for each term, those along the 
 import math
 
 import numpy as np
-import pyfftw
-from numpy.typing import DTypeLike
 
 from ..compiled import loop
-from ..errors import InputError
-from ..parallel.fft import FFT, Spectrum
-from ..parallel.slab import Array, Slab
-from .halfspace import Convolution, love, over_cell, tabulate, wavenumbers
-from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
+from ..parallel.slab import Array
+from .love import love, over_cell
+from .prony import CreepSpectrum
 
 Vector = tuple[float, float]
 GAUSS = np.polynomial.legendre.leggauss(6)
@@ -33,72 +24,6 @@ LOCAL = 1e-4  # a creep length below this share of a cell is taken as 0: the bod
 NEAR = 2.0  # cells: closer than this the edge of the loaded cell is felt
 FAR = 16.0  # cells: from here on two terms of the expansion in the size of the cell are good to 1e-7
 DECAYED = 40.0  # creep lengths after which the memory is over, exp(-40)
-
-
-def modulus(fft: FFT, size: Vector, velocity: Vector, prony: Prony) -> Spectrum:
-    """G*(-q v) on the wavenumbers of a spectrum; at a Nyquist wavenumber, which has two signs, the mean of both.
-
-    Lengths of `size` and `velocity` are in one unit.
-    """
-    qx, qy = wavenumbers(fft, size)
-    at_x, at_y = (2 * np.abs(mode) == count for mode, count in zip(fft.modes, (fft.mx, fft.my), strict=True))
-    result = np.zeros(fft.shape, dtype=np.complex128)
-    for sign_x, sign_y in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
-        along_x, along_y = np.where(at_x, sign_x * qx, qx), np.where(at_y, sign_y * qy, qy)
-        result += 0.25 * complex_modulus(-(along_x * velocity[0] + along_y * velocity[1]), *prony)
-    return result
-
-
-def periodic(fft: FFT, size: Vector, poisson: float, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
-    """Pressure -> displacement under a sliding surface on a periodic body, and its inverse (as `halfspace.inverse`)."""
-    q = np.hypot(*wavenumbers(fft, size))
-    moduli = modulus(fft, size, velocity, prony) / (1.0 - poisson)
-    with np.errstate(divide="ignore"):
-        inverse = np.where(q > 0.0, 1.0 / q, 0.0)
-    forward = Convolution(fft, inverse / moduli)
-    q[q == 0.0] = 2 * np.pi / max(size)
-    return forward, Convolution(fft, q * moduli)
-
-
-def free(
-    slab: Slab, size: Vector, poisson: float, velocity: Vector, prony: Prony, dtype: DTypeLike = np.float64
-) -> Convolution:
-    """Pressure -> displacement under an isolated sliding contact; collective.
-
-    Raises InputError for a body that flows: its wake never ends.
-    """
-    return _padded(slab, size, poisson, velocity, _creep(prony), dtype)
-
-
-def branch(slab: Slab, size: Vector, poisson: float, velocity: Vector, prony: Prony, k: int) -> Convolution:
-    """Pressure -> map h_k of branch k under an isolated sliding contact; collective.
-
-    In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has no other poles than the creep function: each of
-    its terms is weighted by what the branch makes, at that term's rate -1/l_i, of a displacement.
-    """
-    creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
-    ratio = -tau / creep.retardation_times
-    shares = creep.compliances * modulus * ratio / (1.0 + ratio)
-    own = CreepSpectrum(modulus * creep.glass, shares, creep.retardation_times, 0.0)
-    return _padded(slab, size, poisson, velocity, own, np.float64)
-
-
-def _creep(prony: Prony) -> CreepSpectrum:
-    creep = creep_spectrum(*prony)
-    if creep.fluidity > 0.0:
-        raise InputError("material: a body without long-term modulus leaves an endless wake; give it modulus_inf > 0")
-    return creep
-
-
-def _padded(
-    slab: Slab, size: Vector, poisson: float, velocity: Vector, creep: CreepSpectrum, dtype: DTypeLike
-) -> Convolution:
-    fft = FFT(slab, (pyfftw.next_fast_len(2 * slab.nx), pyfftw.next_fast_len(2 * slab.ny)), dtype)
-
-    def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:
-        return wake(x, y, dx, dy, velocity, creep) * (2.0 * (1.0 - poisson))
-
-    return Convolution(fft, tabulate(fft, size, coefficient))
 
 
 def wake(x: Array, y: Array, dx: float, dy: float, velocity: Vector, creep: CreepSpectrum) -> Array:

@@ -13,7 +13,7 @@ import pyfftw
 
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
-from ..physics import halfspace
+from ..physics.halfspace import HalfSpace
 from ..solve.contact import ContactSolver, MeanPressure
 
 TINY = 16  # points of a grid on which all time is that of calls
@@ -31,8 +31,8 @@ def cores() -> int:
 def per_call(alone: Slab) -> float:
     """Seconds of an operator call, and of what belongs to it, that do not depend on the grid; `alone` is one rank."""
     slab = Slab(alone.comm, TINY, TINY)
-    fft, size = FFT(slab), (1.0, 1.0)
-    solver = ContactSolver(slab, halfspace.periodic(fft, size), halfspace.inverse(fft, size), 1.0, 1e-15, 30)
+    fft, half_space = FFT(slab), HalfSpace((1.0, 1.0))
+    solver = ContactSolver(slab, half_space.operator(fft), half_space.inverse(fft), 1.0, 1e-15, 30)
     heights = slab.empty()
     heights[...] = np.random.default_rng(0).random(slab.shape)
     best = np.inf

@@ -11,7 +11,7 @@ from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..parallel.fft import footprint, transform_name
 from ..parallel.slab import deal
-from ..physics.halfspace import padded_lengths
+from ..physics.convolution import padded_lengths
 
 SOLVER = 6  # maps of a contact solver, besides one of a byte per point
 ZENER = 2  # maps of a body with memory, besides one per branch

@@ -11,7 +11,7 @@ from ..errors import RunError
 from ..parallel import regrid
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
-from ..physics import halfspace, wake
+from ..physics.convolution import Convolution, wavenumbers
 from ..physics.ledger import Ledger, Measures
 from ..physics.prony import Prony
 from ..scene import Frame
@@ -95,20 +95,16 @@ class SteadySliding:
         """The map h_k of each branch in the last state, the same array each time; collective."""
         assert self.contact is not None
         out = self.base.slab.empty(self.base.dtype)
+        fft, half_space, speed = self.base.fft, self.base.half_space, self._in_units(velocity)
         if self.base.job.grid.boundary == "free":
-            speed = (velocity[0] / self.base.units.length, velocity[1] / self.base.units.length)
             for k in range(self.base.prony.moduli.size):
-                poisson = self.base.job.material.poisson
-                yield wake.branch(self.base.slab, self.base.size, poisson, speed, self.base.prony, k).apply(
-                    self.contact.p, out
-                )
+                branch = half_space.branch_operator(fft, speed, self.base.prony, k)
+                yield branch.apply(self.contact.p, out)
             return
-        fft = self.base.fft
         u = fft.forward(self.contact.u).copy()
         for modulus, tau in zip(self.base.prony.moduli, self.base.prony.relaxation_times, strict=True):
             own = Prony(0.0, np.array([modulus]), np.array([tau]))
-            symbol = wake.modulus(fft, self.base.job.grid.size, velocity, own)
-            yield fft.backward(symbol * u, out)
+            yield fft.backward(half_space.sliding_modulus(fft, speed, own) * u, out)
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
@@ -116,7 +112,7 @@ class SteadySliding:
         Of the last state; only for periodic scenes, where waves are independent. Collective.
         """
         base = self.base
-        q = np.hypot(*halfspace.wavenumbers(base.fft, base.job.grid.size))
+        q = np.hypot(*wavenumbers(base.fft, base.job.grid.size))
         longest = max(base.job.grid.size)
         octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(int)
         power = self._powers(velocity, octave)
@@ -124,12 +120,16 @@ class SteadySliding:
         return longest / 2.0 ** np.arange(power.shape[1]), power.sum(axis=0) / (total if total > 0.0 else 1.0)
 
     def _powers(self, velocity: Vector, group: Array | None = None) -> Array:
-        """Power [W] lost in each branch to each group of waves, `|u^|^2 |q|/(1 - nu) |w| G_k''(|w|)`; collective."""
+        """Power [W] lost in each branch to each group of waves; collective.
+
+        A wave u^ loses `|u^|^2/A |w| G_k''(|w|)`, with A its displacement over its pressure for a modulus of 1.
+        """
         assert self.contact is not None
         base, fft, prony, grid = self.base, self.base.fft, self.base.prony, self.base.job.grid
-        q = np.hypot(*halfspace.wavenumbers(fft, base.size))
-        omega = np.abs(self._frequencies(velocity))
-        waves = fft.multiplicity * np.abs(fft.forward(self.contact.u)) ** 2 * q / (1.0 - base.job.material.poisson)
+        omega = np.abs(base.half_space.frequencies(fft, self._in_units(velocity)))
+        compliance = base.half_space.symbol(fft)
+        waves = fft.multiplicity * np.abs(fft.forward(self.contact.u)) ** 2
+        waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
         groups = 1 + int(np.log2(max(grid.points)))
         group = np.zeros(fft.shape, dtype=int) if group is None else group
         powers = []
@@ -140,11 +140,9 @@ class SteadySliding:
         flat = np.array(powers).reshape(-1)
         return np.array(base.slab.sum(*flat)).reshape(len(powers), -1) * unit if powers else np.zeros((0, groups + 1))
 
-    def _frequencies(self, velocity: Vector) -> Array:
-        """Angular frequency q v [rad/s] of each wave."""
-        fft = self.base.fft
-        qx, qy = halfspace.wavenumbers(fft, self.base.job.grid.size)
-        return np.asarray(qx * velocity[0] + qy * velocity[1])
+    def _in_units(self, velocity: Vector) -> Vector:
+        """A velocity [m/s] in the run's units of length per second."""
+        return velocity[0] / self.base.units.length, velocity[1] / self.base.units.length
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
@@ -197,17 +195,13 @@ class SteadySliding:
             dtype=base.dtype,
         )
 
-    def operators(
-        self, level: Level, velocity: Vector, prony: Prony
-    ) -> tuple[halfspace.Convolution, halfspace.Convolution]:
+    def operators(self, level: Level, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
         """Pressure -> displacement at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
-        base = self.base
-        poisson = base.job.material.poisson
-        speed = (velocity[0] / base.units.length, velocity[1] / base.units.length)
-        operator, inverse = wake.periodic(level.fft, base.size, poisson, speed, prony)
-        if base.job.grid.boundary == "free":
-            operator = wake.free(level.slab, base.size, poisson, speed, prony, base.dtype)
-        return operator, inverse
+        half_space, speed = self.base.half_space, self._in_units(velocity)
+        return (
+            half_space.sliding_operator(level.fft, speed, prony),
+            half_space.sliding_inverse(level.fft, speed, prony),
+        )
 
 
 def _coarser(level: Level) -> Level | None:
@@ -218,7 +212,7 @@ def _coarser(level: Level) -> Level | None:
     return Level(coarse, FFT(coarse, dtype=level.fft.dtype), regrid.restrict(level.slab, coarse, level.heights))
 
 
-def _stiffness(slab: Slab, operator: halfspace.Convolution, dtype: type[np.floating]) -> float:
+def _stiffness(slab: Slab, operator: Convolution, dtype: type[np.floating]) -> float:
     """Pressure on one point over the displacement it causes there; collective."""
     impulse, answer = slab.zeros(dtype), slab.empty(dtype)
     owner = slab.rows.start == 0 < slab.rows.stop

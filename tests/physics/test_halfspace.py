@@ -4,26 +4,34 @@ Sums and transforms in double precision are good to 1e-13 of the largest value, 
 """
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from numpy.typing import DTypeLike
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.halfspace import Convolution, Narrowed, free, inverse, love, periodic
+from parcontact.physics.convolution import Convolution
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.love import love
 
 from .maps import coordinates, gathered, product, random_map
 
 pytestmark = pytest.mark.mpi
 
 OPERATORS: dict[str, Callable[[Slab, tuple[float, float], float], Convolution]] = {
-    "spectral": lambda slab, size, poisson: periodic(FFT(slab), size, poisson),
-    "love": lambda slab, size, poisson: periodic(FFT(slab), size, poisson, "love"),
-    "free": free,
-    "inverse": lambda slab, size, poisson: inverse(FFT(slab), size, poisson),
+    "spectral": lambda slab, size, poisson: HalfSpace(size, poisson).operator(FFT(slab)),
+    "love": lambda slab, size, poisson: HalfSpace(size, poisson, "love").operator(FFT(slab)),
+    "free": lambda slab, size, poisson: free(slab, size, poisson),
+    "inverse": lambda slab, size, poisson: HalfSpace(size, poisson).inverse(FFT(slab)),
 }
+
+
+def free(slab: Slab, size: tuple[float, float], poisson: float = 0.5, dtype: DTypeLike = np.float64) -> Convolution:
+    return HalfSpace(size, poisson, "love", free=True).operator(FFT(slab, dtype=dtype))
 
 
 def applied(operator: Convolution, whole: Array) -> Array:
@@ -50,15 +58,15 @@ def test_cosine(comm: MPI.Intracomm, wx: int, wy: int, poisson: float) -> None:
     x, y = coordinates(slab, size)
     qx, qy = 2 * np.pi * wx / size[0], 2 * np.pi * wy / size[1]
     pressure = 1e5 * np.cos(qx * x + qy * y + 0.3)
-    u = periodic(FFT(slab), size, poisson).apply(pressure, slab.empty())
+    u = HalfSpace(size, poisson).operator(FFT(slab)).apply(pressure, slab.empty())
     expected = (1 - poisson) / np.hypot(qx, qy) * pressure
     assert_allclose(u, expected, rtol=0, atol=1e-13 * 1e5 * (1 - poisson) / np.hypot(qx, qy))
 
 
 @pytest.mark.parametrize("kernel", ["spectral", "love"])
-def test_mean_pressure_moves_nothing(comm: MPI.Intracomm, kernel: str) -> None:
+def test_mean_pressure_moves_nothing(comm: MPI.Intracomm, kernel: Literal["spectral", "love"]) -> None:
     slab = Slab(comm, 9, 12)
-    operator = periodic(FFT(slab), (1.0, 2.0), 0.5, kernel)
+    operator = HalfSpace((1.0, 2.0), 0.5, kernel).operator(FFT(slab))
     whole = random_map(9, 12)
     u = applied(operator, whole)
     assert_allclose(u.mean(), 0.0, atol=1e-15)
@@ -92,7 +100,7 @@ def test_love_of_a_wave_along_x(comm: MPI.Intracomm, aspect: float) -> None:
     """There only aliases along x count, `q sum_n sinc(q_n dx/2)/|q_n|`, however long the cells are along y."""
     slab, size = Slab(comm, 64, 3), (1.0, aspect * 3 / 64)
     fft = FFT(slab)
-    factor = periodic(fft, size, 0.5, "love").symbol * fft.modes[0] * 4 * np.pi * slab.points
+    factor = HalfSpace(size, 0.5, "love").operator(fft).symbol * fft.modes[0] * 4 * np.pi * slab.points
     b = np.pi * fft.modes[0][0] / 64
     n = np.arange(-20000, 20001)[:, None]
     terms = np.sinc(b / np.pi + n) * b / np.abs(b + np.pi * n + (b == 0.0))
@@ -105,9 +113,11 @@ def test_inverse(communicators: list[MPI.Intracomm]) -> None:
     whole = random_map(15, 12)
     for comm in communicators:
         slab, size = Slab(comm, 15, 12), (1.0, 3.0)
-        back = applied(inverse(FFT(slab), size, 0.3), applied(periodic(FFT(slab), size, 0.3), whole))
+        half_space = HalfSpace(size, 0.3)
+        inverse = half_space.inverse(FFT(slab))
+        back = applied(inverse, applied(half_space.operator(FFT(slab)), whole))
         assert_allclose(back, whole - whole.mean(), atol=1e-13)
-        assert_allclose(applied(inverse(FFT(slab), size, 0.3), np.ones((12, 15))), 2 * np.pi / 3 / 0.7, rtol=1e-13)
+        assert_allclose(applied(inverse, np.ones((12, 15))), 2 * np.pi / 3 / 0.7, rtol=1e-13)
 
 
 # -- free -------------------------------------------------------------------------------------------------------------
@@ -190,14 +200,14 @@ def test_any_number_of_ranks(communicators: list[MPI.Intracomm], name: str, nx: 
 def test_single_precision(comm: MPI.Intracomm) -> None:
     """Six digits, also for maps of double precision; half the bytes."""
     slab, size, whole = Slab(comm, 24, 20), (1.0, 1.0), random_map(24, 20)
-    reference = applied(periodic(FFT(slab), size), whole)
-    single = periodic(FFT(slab, dtype=np.float32), size)
+    reference = applied(HalfSpace(size).operator(FFT(slab)), whole)
+    single = HalfSpace(size).operator(FFT(slab, dtype=np.float32))
     tolerance = 1e-6 * np.abs(reference).max()
     assert single.symbol.dtype == np.float32
     assert_allclose(applied(single, whole.astype(np.float32)), reference, atol=tolerance)
     assert_allclose(applied(single, whole), reference, atol=tolerance)
     mine = whole[slab.rows].copy()
-    assert_allclose(Narrowed(single).apply(mine, slab.empty()), reference[slab.rows], atol=tolerance)
+    assert_allclose(single.apply(mine, slab.empty()), reference[slab.rows], atol=tolerance)
     reference = applied(free(slab, size), whole)
     assert_allclose(applied(free(slab, size, dtype=np.float32), whole), reference, atol=1e-6 * np.abs(reference).max())
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import dblquad
 
-from parcontact.physics.halfspace import love
+from parcontact.physics.love import love
 
 
 @pytest.mark.parametrize("aspect", [1.0, 0.1, 30.0])

@@ -11,7 +11,9 @@ from scipy.integrate import quad
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace, wake
+from parcontact.physics import wake
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.love import love as elastic
 from parcontact.physics.prony import Prony, complex_modulus, creep_spectrum
 
 from .maps import gathered, random_map
@@ -25,7 +27,7 @@ def along_the_wake(x: float, y: float, velocity: tuple[float, float]) -> float:
     """`J_g A(x) + sum J_i int exp(-t/l_i)/l_i A(x + v t) dt` with Love's A, by adaptive quadrature in units of l_i."""
 
     def love(t: float) -> float:
-        return float(halfspace.love(np.array(x + velocity[0] * t), np.array(y + velocity[1] * t), *CELL))
+        return float(elastic(np.array(x + velocity[0] * t), np.array(y + velocity[1] * t), *CELL))
 
     total = CREEP.glass * love(0.0)
     for compliance, time in zip(CREEP.compliances, CREEP.retardation_times, strict=True):
@@ -77,7 +79,7 @@ def test_slow_and_fast_bodies_are_elastic(speed: float, compliance: float) -> No
     over a creep length."""
     x, y = np.array([[0.0, 0.2, -1.0]]), np.array([[0.0, 0.1, 2.0]])
     found = wake.wake(x, y, *CELL, (speed, 0.0), CREEP)
-    assert_allclose(found, compliance * halfspace.love(x, y, *CELL), rtol=1e-6)
+    assert_allclose(found, compliance * elastic(x, y, *CELL), rtol=1e-6)
 
 
 @pytest.mark.mpi
@@ -88,7 +90,9 @@ def test_periodic_is_the_symbol(comm: MPI.Intracomm, velocity: tuple[float, floa
     nx, ny, size = 12, 9, (1.5, 0.8)
     slab = Slab(comm, nx, ny)
     fft = FFT(slab)
-    forward, inverse = wake.periodic(fft, size, 0.5, velocity, BODY)
+    half_space = HalfSpace(size)
+    forward = half_space.sliding_operator(fft, velocity, BODY)
+    inverse = half_space.sliding_inverse(fft, velocity, BODY)
     p = random_map(nx, ny)
     own = slab.empty()
     own[...] = p[slab.rows]
@@ -114,7 +118,8 @@ def test_free_is_the_sum_of_coefficients(comm: MPI.Intracomm) -> None:
     p = random_map(nx, ny)
     own = slab.empty()
     own[...] = p[slab.rows]
-    u = gathered(wake.free(slab, size, 0.5, velocity, BODY).apply(own, slab.empty()), slab)
+    operator = HalfSpace(size, free=True).sliding_operator(FFT(slab), velocity, BODY)
+    u = gathered(operator.apply(own, slab.empty()), slab)
     x, y = (0.1 * np.arange(nx))[None, :], (0.07 * np.arange(ny))[:, None]
     expected = np.zeros((ny, nx))
     for j in range(ny):
@@ -124,5 +129,6 @@ def test_free_is_the_sum_of_coefficients(comm: MPI.Intracomm) -> None:
 
 
 def test_waits_for_no_endless_wake() -> None:
+    half_space, fft = HalfSpace((1.0, 1.0), free=True), FFT(Slab(MPI.COMM_SELF, 4, 4))
     with pytest.raises(InputError, match="endless wake"):
-        wake.free(Slab(MPI.COMM_SELF, 4, 4), (1.0, 1.0), 0.5, (1.0, 0.0), Prony(0.0, np.ones(1), np.ones(1)))
+        half_space.sliding_operator(fft, (1.0, 0.0), Prony(0.0, np.ones(1), np.ones(1)))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace
+from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
 from parcontact.solve.contact import Certificate, Contact, ContactSolver
 
@@ -30,14 +30,10 @@ def solver(
     ny, nx = heights.shape
     slab = Slab(MPI.COMM_SELF, nx, ny)
     fft = FFT(slab, dtype=dtype)
-    if boundary == "free":
-        operator = halfspace.free(slab, size, poisson, dtype)
-    else:
-        operator = halfspace.periodic(fft, size, poisson, kernel)
+    half_space = HalfSpace(size, poisson, "love" if kernel == "love" else "spectral", boundary == "free")
     height = float(np.ptp(heights)) or size[0] / nx
-    return ContactSolver(
-        slab, operator, halfspace.inverse(fft, size, poisson), height, tolerance, max_iterations, dtype
-    )
+    operator, inverse = half_space.operator(fft), half_space.inverse(fft)
+    return ContactSolver(slab, operator, inverse, height, tolerance, max_iterations, dtype)
 
 
 def rough(points: int, seed: int = 1) -> Map:

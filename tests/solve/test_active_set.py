@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace
+from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve import active_set
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
@@ -87,7 +87,7 @@ def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approa
         fft, size = FFT(slab), (1.0, 12.5)
         h = slab.empty()
         h[...] = white((3, 24), 5)[slab.rows]
-        body = ContactSolver(slab, halfspace.periodic(fft, size), halfspace.inverse(fft, size), 1.0, 1e-11, 500)
+        body = ContactSolver(slab, HalfSpace(size).operator(fft), HalfSpace(size).inverse(fft), 1.0, 1e-11, 500)
         return slab, active_set.solve(body, h, control)
 
     slab, together = solved(comm)

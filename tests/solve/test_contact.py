@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace
+from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve import contact
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
@@ -290,7 +290,7 @@ def test_preconditioner_in_single_precision() -> None:
     double = solve(h, 0.4, tolerance=1e-9)
     solving = solver(h, tolerance=1e-9)
     narrow = FFT(Slab(MPI.COMM_SELF, 128, 128), dtype=np.float32)
-    solving.preconditioner = halfspace.Narrowed(halfspace.inverse(narrow, (1.0, 1.0)))
+    solving.preconditioner = HalfSpace((1.0, 1.0)).inverse(narrow)
     mixed = keep(solving.solve(h, MeanPressure(0.4)))
     assert abs(mixed.iterations - double.iterations) <= 2
     assert_allclose(mixed.p, double.p, atol=1e-7 * double.p.max())

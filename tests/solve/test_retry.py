@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import halfspace
+from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve import retry
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
@@ -24,7 +24,8 @@ def factory(height: float, **options: Any) -> Callable[[Slab, float], ContactSol
 
     def on(slab: Slab, tolerance: float) -> ContactSolver:
         fft = FFT(slab, measured=False)
-        operator, inverse = halfspace.periodic(fft, (1.0, 1.0)), halfspace.inverse(fft, (1.0, 1.0))
+        half_space = HalfSpace((1.0, 1.0))
+        operator, inverse = half_space.operator(fft), half_space.inverse(fft)
         return ContactSolver(slab, operator, inverse, height, tolerance, 500, **options)
 
     return on

@@ -1,0 +1,100 @@
+"""Love's coefficients: the displacement that a pressure constant on one cell causes, anywhere on the half space.
+
+For a shear modulus of 1 (A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2)
+
+    A(x, y) = (1 - nu)/(2 pi) int_cell dx' dy' / sqrt((x - x')^2 + (y - y')^2).
+"""
+
+import math
+
+import numba
+import numpy as np
+from scipy.special import erf
+
+from ..parallel.fft import FFT
+from ..parallel.slab import Array
+from .convolution import wavenumbers
+
+NEAR = 4.0  # cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
+GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.legendre.leggauss(6))
+
+
+def love(x: Array, y: Array, dx: float, dy: float, poisson: float = 0.5) -> Array:
+    """Displacement [length] at distance (x, y) from the centre of a `dx x dy` cell under unit pressure, for G = 1.
+
+    Love (1929): `(1 - nu)/(2 pi)` times the integral of 1/r over the cell; relative error below 2e-14 at any distance.
+    """
+    return np.asarray(over_cell(x, y, dx, dy)) * (1.0 - poisson) / (2 * np.pi)
+
+
+@numba.vectorize(cache=True)
+def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the types itself
+    """Integral of 1/r over a `dx x dy` cell at distance (x, y).
+
+    Near by, the differences of the primitive `x asinh(y/|x|) + y asinh(x/|y|)` at the four corners. They cancel far
+    away: there each line of the cell across the farther direction is integrated in closed form, and then over lines.
+    """
+    x, y = abs(x), abs(y)
+    if x * dy < y * dx:
+        x, y, dx, dy = y, x, dy, dx
+    total = 0.0
+    if x < NEAR * dx:
+        for i in (-1, 1):
+            a = x + 0.5 * i * dx
+            for j in (-1, 1):
+                b = y + 0.5 * j * dy
+                if a != 0.0:
+                    total += i * j * a * math.asinh(b / abs(a))
+                if b != 0.0:
+                    total += i * j * b * math.asinh(a / abs(b))
+        return total
+    low, high = y - 0.5 * dy, y + 0.5 * dy
+    for node, weight in zip(GAUSS_NODES, GAUSS_WEIGHTS):  # noqa: B905  # numba has no strict zip
+        a = x + node * dx
+        if low > 0.0:
+            line = 2.0 * math.atanh(dy / (math.sqrt(a**2 + low**2) + math.sqrt(a**2 + high**2)))
+        else:
+            line = math.asinh(high / a) - math.asinh(low / a)
+        total += weight * line
+    return total * dx
+
+
+def cell_factor(fft: FFT, size: tuple[float, float]) -> Array:
+    """Compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
+
+    Shape `fft.shape`; `size` is that of the box.
+
+    A wave of pressures constant on cells contains all aliases of its wavenumber, each with the cell's form factor:
+    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
+
+        1/|q| = 2/sqrt(pi) int_0^inf exp(-q^2 t^2) dt
+
+    the sums over Qx and Qy separate, and the integral is one product of matrices. Double exponential quadrature (H.
+    Takahasi and M. Mori, Publ. RIMS 9 (1974) 721) starts far inside a cell and ends far outside the box.
+    """
+    qx, qy = wavenumbers(fft, size)
+    dx, dy = size[0] / fft.mx, size[1] / fft.my
+    shortest, longest = min(dx, dy) / 16, max(size)
+    u = np.arange(-3.7, math.log(2.0 * longest / shortest), 0.1)
+    t = shortest * np.exp(u - np.exp(-u))
+    weight = 0.2 / math.sqrt(math.pi) * t * (1.0 + np.exp(-u))
+    along_x, along_y = _blurred_cell(qx.ravel() * dx / 2, t / dx), _blurred_cell(qy.ravel() * dy / 2, t / dy)
+    q = np.hypot(qx, qy)
+    return np.where(q > 0.0, q * ((weight[:, None] * along_y).T @ along_x), 1.0)
+
+
+def _blurred_cell(b: Array, width: Array) -> Array:
+    """`sum_n sinc(b_n) exp(-(2 b_n width)^2)`, b_n = b + pi n: the sampled wave of a cell blurred by `width` [cells].
+
+    Shape (width, b). The sum over aliases converges fast for wide blurs; for narrow ones that over cells, with
+    the share of the blurred cell in each (Poisson's summation).
+    """
+    result = np.zeros((width.size, b.size))
+    wide = width > 0.25
+    for n in range(-5, 6):
+        alias = b + np.pi * n
+        result[wide] += np.sinc(alias / np.pi) * np.exp(-((2 * width[wide, None] * alias) ** 2))
+    for cell in range(-4, 5):
+        edges = [erf((cell + side) / (2 * width[~wide, None])) for side in (-0.5, 0.5)]
+        result[~wide] += (edges[1] - edges[0]) / 2 * np.cos(2 * cell * b)
+    return result
