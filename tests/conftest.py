@@ -50,7 +50,13 @@ class RunParcontact(Protocol):
 
 
 @pytest.fixture
-def run_parcontact(tmp_path: Path) -> RunParcontact:
+def outside_mpi() -> dict[str, str]:
+    """The environment without the marks that MPI has left in it: they would confuse an mpirun started by this process."""
+    return {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+
+
+@pytest.fixture
+def run_parcontact(tmp_path: Path, outside_mpi: dict[str, str]) -> RunParcontact:
     """`run_parcontact(["job.yaml", "--quiet"], ranks=2)`: as a user would, in `tmp_path`; 0 ranks is without mpirun."""
 
     def run(
@@ -58,10 +64,8 @@ def run_parcontact(tmp_path: Path) -> RunParcontact:
     ) -> subprocess.CompletedProcess[str]:
         mpirun = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks else []
         command = [*mpirun, sys.executable, "-m", "parcontact", *map(str, args)]
-        # MPI has left marks in the environment of this process that would confuse the next mpirun.
-        clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
         pipe = subprocess.PIPE
-        process = subprocess.Popen(command, cwd=cwd or tmp_path, env=clean, stdout=pipe, stderr=pipe, text=True)
+        process = subprocess.Popen(command, cwd=cwd or tmp_path, env=outside_mpi, stdout=pipe, stderr=pipe, text=True)
         try:
             out, err = process.communicate(timeout=timeout)
         except subprocess.TimeoutExpired:
@@ -76,7 +80,7 @@ def run_parcontact(tmp_path: Path) -> RunParcontact:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Under mpirun no test may start another mpirun."""
     if WORLD.size > 1:
-        starters = [item for item in items if "run_parcontact" in getattr(item, "fixturenames", ())]
+        starters = [item for item in items if "outside_mpi" in getattr(item, "fixturenames", ())]
         config.hook.pytest_deselected(items=starters)
         items[:] = [item for item in items if item not in starters]
 

@@ -1,0 +1,52 @@
+"""Every script runs, at a size so small that it says little; where a script makes a claim that counts can show, it holds.
+
+Claims about time are not judged here: a busy machine would break them.
+"""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = sorted((ROOT / "scripts").glob("*.py"))
+
+
+class Small(NamedTuple):
+    """A small run: its words, what it must print, and the exit codes that are right."""
+
+    words: list[str]
+    printed: str
+    codes: tuple[int, ...] = (0,)
+
+
+TIMED = (0, 1)  # 1 where a limit was not kept, on time or one that is meant for larger grids
+SMALL = {
+    "ablation": Small(["--points", "128", "--rounds", "1", "--picture", "PICTURE"], r"at equal iterations", TIMED),
+    "bench_checkpoint": Small(["--points", "64", "--rounds", "1", "--branches", "2"], r"ratio \d", TIMED),
+    "bench_fft": Small(["--points", "64", "--rounds", "2"], r"2 ranks .* of the line above", TIMED),
+    "bench_steady": Small(["--points", "128"], r"(?s)cold: .*: yes.*curve: .*: yes"),
+    "check_plan": Small(["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED),
+    "condensation": Small(["64"], r"(?m)^ +0\.001 +5 "),
+    "convergence": Small(["32", "64"], r"order +-?[\d.]+ +2\.\d\d +1\.[5-9]"),
+    "faults": Small(["--trials", "1", "--flips", "4", "--backs", "1", "--fills", "0"], r""),
+    "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
+    "profile_solve": Small(["128"], r"(?m)^FFTs .*%(.*\n)*everything else"),
+    "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"0 violations, 0 failed solves"),
+    "random_steady": Small(["--trials", "2", "--points", "64"], r"2 solved, .* 0 WRONG"),
+    "steady_table": Small(["128"], r"(?m)^[0-2] are off", TIMED),  # at 512 points none is
+}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_small_run(script: Path, tmp_path: Path, outside_mpi: dict[str, str]) -> None:
+    small = SMALL[script.stem]  # a new script needs a small run
+    words = [str(tmp_path / "picture.png") if word == "PICTURE" else word for word in small.words]
+    command = [sys.executable, str(script), *words]
+    done = subprocess.run(command, cwd=tmp_path, env=outside_mpi, capture_output=True, text=True, timeout=240)
+    assert "Traceback" not in done.stderr
+    assert done.returncode in small.codes, done.stderr
+    assert re.search(small.printed, done.stdout), done.stdout
