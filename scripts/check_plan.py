@@ -4,7 +4,8 @@
 
 Each job is planned as a user would (`parcontact plan --ranks 1,2`), then run on 1 and on 2 ranks. Memory is what root
 holds in maps (`map bytes at most` in run.log) and the largest resident memory of a rank, each to 10 %; time is that of
-the whole command, to 30 %. `--coarser 4` takes a quarter of the points and waves as much longer. Takes two to three minutes on two idle cores; on a busy machine the times say little.
+the whole command, to 30 %. `--coarser 4` takes a quarter of the points, and waves as much longer. Takes two to three
+minutes on two idle cores; on a busy machine the times say little.
 """
 
 import argparse

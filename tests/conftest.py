@@ -51,7 +51,7 @@ class RunParcontact(Protocol):
 
 @pytest.fixture
 def outside_mpi() -> dict[str, str]:
-    """The environment without the marks that MPI has left in it: they would confuse an mpirun started by this process."""
+    """The environment without the marks that MPI has left in it, which would confuse another mpirun."""
     return {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
 
 

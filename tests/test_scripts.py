@@ -1,4 +1,4 @@
-"""Every script runs, at a size so small that it says little; where a script makes a claim that counts can show, it holds.
+"""Every script runs, at a size so small that it says little; a claim that counts can show must hold.
 
 Claims about time are not judged here: a busy machine would break them.
 """
@@ -29,11 +29,14 @@ SMALL = {
     "bench_checkpoint": Small(["--points", "64", "--rounds", "1", "--branches", "2"], r"ratio \d", TIMED),
     "bench_fft": Small(["--points", "64", "--rounds", "2"], r"2 ranks .* of the line above", TIMED),
     "bench_steady": Small(["--points", "128"], r"(?s)cold: .*: yes.*curve: .*: yes"),
-    "check_plan": Small(["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED),
+    "check_plan": Small(
+        ["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED
+    ),
     "condensation": Small(["64"], r"(?m)^ +0\.001 +5 "),
     "convergence": Small(["32", "64"], r"order +-?[\d.]+ +2\.\d\d +1\.[5-9]"),
     "faults": Small(["--trials", "1", "--flips", "4", "--backs", "1", "--fills", "0"], r""),
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
+    "mutants": Small(["--count", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "profile_solve": Small(["128"], r"(?m)^FFTs .*%(.*\n)*everything else"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"0 violations, 0 failed solves"),
     "random_steady": Small(["--trials", "2", "--points", "64"], r"2 solved, .* 0 WRONG"),
