@@ -5,12 +5,14 @@ and pressures to 1 % of the highest, Johnson's mean gap to 1e-3 of the amplitude
 measured is given where it is far better.
 """
 
+import itertools
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from marching import JOBS, load_script
+from marching import JOBS, load_script, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
@@ -85,6 +87,66 @@ def test_hertz_converges() -> None:
         observed = script.order(points, list(wrong))
         print(f"{name}: errors {', '.join(f'{error:.2e}' for error in wrong)}, order {observed:.2f}")
         assert observed > least
+
+
+def test_hertz_area_corrected() -> None:
+    """Counted areas are 1.4 % too large in the mean at 17 cells per radius; corrected by their edges 0.4 % too small.
+
+    Five loads, each with the sphere over a point and beside one; a circle of the right size that falls badly between
+    points stays wrong by 1 %, measured 0.9 %.
+    """
+    counted, corrected = [], []
+    cell = 1.5e-3 / 64
+    for force, beside in itertools.product((0.05, 0.07, 0.1, 0.15, 0.2), ([0.0, 0.0], [0.31, 0.17])):
+        centre = [0.75e-3 + share * cell for share in beside]
+        sphere = {"shape": "sphere", "radius": SPHERE[1], "center": centre}
+        _, rows = marched(
+            {
+                "grid": {"points": 64, "size": 1.5e-3, "boundary": "free"},
+                "surface": sphere,
+                "material": {"model": "elastic", "poisson": 0.5, "shear_modulus": SPHERE[2]},
+                "history": [{"force": force}],
+                "numerics": {"tolerance": 1e-6},
+            }
+        )
+        area = math.pi * float(hertz.contact_radius(force, *SPHERE[1:])) ** 2 / 1.5e-3**2
+        counted.append(rows[-1].measures.contact_area / area - 1)
+        corrected.append(rows[-1].measures.contact_area_corrected / area - 1)
+    print(f"counted {np.mean(counted):.4f}, corrected {np.mean(corrected):.4f}, at most {np.abs(corrected).max():.4f}")
+    assert 0.01 < np.mean(counted) < 0.018
+    assert -0.006 < np.mean(corrected) < 0.0
+    assert np.abs(corrected).max() < 0.01
+
+
+def test_johnson_area_corrected() -> None:
+    """The surface wavy in two directions, mean over 16 loads from 11 to 90 % of contact, of waves between the points.
+
+    The reference is the counted area at 128 and 256 cells per wave, extrapolated to the first order: in this mean it is
+    good to 1e-3. At 64 cells counted areas are then 1.3 % too large, corrected ones right to 2e-4.
+    """
+    full = float(jgh.full_contact_pressure(*WAVE))
+    areas = {}
+    for points in (64, 128, 256):
+        waves = [
+            {"shape": "wave", "amplitude": WAVE[0] / 2, "waves": [1, sign], "phase": phase}
+            for sign, phase in ((1, 0.48), (-1, 0.14))
+        ]
+        _, rows = marched(
+            {
+                "grid": {"points": points, "size": WAVE[1]},
+                "surface": waves,
+                "material": {"model": "elastic", "poisson": 0.5, "shear_modulus": WAVE[2]},
+                "history": [{"pressure": share * full} for share in np.linspace(0.05, 0.8, 16).tolist()],
+                "numerics": {"tolerance": 1e-6},
+            }
+        )
+        both = [(row.measures.contact_area, row.measures.contact_area_corrected) for row in rows[1:]]
+        areas[points] = np.array(both)
+    reference = 2 * areas[256][:, 0] - areas[128][:, 0]
+    counted, corrected = (areas[64] / reference[:, None] - 1).mean(axis=0)
+    print(f"counted {counted:.4f}, corrected {corrected:.4f}")
+    assert 0.01 < counted < 0.02
+    assert abs(corrected) < 2e-3
 
 
 def check_westergaard(row: Row, pressures: NDArray[Any], edge: float, wrong: float) -> None:

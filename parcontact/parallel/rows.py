@@ -1,5 +1,6 @@
 """Moving whole rows of a map, from one rank to another where they have to."""
 
+import numpy as np
 from mpi4py.util import dtlib
 
 from .slab import Array, Slab
@@ -24,6 +25,29 @@ def roll(slab: Slab, field: Array, count: int, out: Array) -> Array:
     comm.Alltoallv([field, (sent, leave_at), kind], [out, (got, arrive_at), kind])
     kind.Free()
     return out
+
+
+def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
+    """The row of a map that comes before this rank's first one, shape (nx,); collective.
+
+    The first row of a map has the last one before it if the map is `cyclic`, otherwise itself. A rank without rows gets
+    zeros.
+    """
+    ranks = [rank for rank, part in enumerate(slab.dealt) if part.start < part.stop]
+    if slab.comm.rank not in ranks:
+        return np.zeros(slab.nx, field.dtype)
+    place = ranks.index(slab.comm.rank)
+    first, last = place == 0, place == len(ranks) - 1
+    if len(ranks) == 1:
+        return field[-1] if cyclic else field[0]
+    row = field[0].copy()
+    target = slab.comm.Isend(field[-1], ranks[(place + 1) % len(ranks)]) if cyclic or not last else None
+    if cyclic or not first:
+        slab.comm.Recv(row, ranks[place - 1])
+    if target is not None:
+        target.Wait()
+        slab.tally["bytes sent"] += row.nbytes
+    return row
 
 
 def _arriving(source: slice, target: slice, count: int, ny: int) -> slice:

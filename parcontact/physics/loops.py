@@ -69,6 +69,26 @@ def measure(p, u, h):
 
 
 @loop
+def edges(p, above, cyclic):
+    """How many cell sides separate a point with pressure from one without, along x and y, each counted once.
+
+    `above` is the row before the first; the first point of a row has the last one before it if `cyclic`.
+    """
+    count = 0.0
+    for j in range(p.shape[0]):
+        before = p[j - 1] if j > 0 else above
+        across, along = 0.0, 0.0
+        for i in range(p.shape[1]):
+            across += 1.0 if (p[j, i] > 0.0) != (before[i] > 0.0) else 0.0
+        for i in range(1, p.shape[1]):
+            along += 1.0 if (p[j, i] > 0.0) != (p[j, i - 1] > 0.0) else 0.0
+        if cyclic:
+            along += 1.0 if (p[j, 0] > 0.0) != (p[j, -1] > 0.0) else 0.0
+        count += across + along
+    return count
+
+
+@loop
 def dot(a, b):
     """Sum of a b."""
     total = 0.0

@@ -11,7 +11,7 @@ from .row import Row
 SOLVED = ("iterations", "residual", "penetration", "operator_calls")
 COLUMNS = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap"),
-    *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds"),
+    *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds", "contact_area_corrected"),
 )
 
 
@@ -28,7 +28,7 @@ def values(row: Row) -> list[Any]:
     solve = (row.iterations, c.worst, c.penetration, row.operator_calls)
     energies = (row.work, row.stored, row.dissipated)
     shown = [row.step, row.time, row.distance, *forces, *lengths, *solve, *energies, round(row.seconds, 6)]
-    return [_text(value) for value in (*shown, *row.branch_dissipation)]
+    return [_text(value) for value in (*shown, m.contact_area_corrected, *row.branch_dissipation)]
 
 
 def _text(value: float) -> str:

@@ -17,7 +17,7 @@ from .sliding import Point, SteadySliding
 
 COLUMNS = (
     "velocity,pressure,force_x,force_y,friction,contact_area,approach,mean_gap,max_pressure,"
-    "residual,penetration,operator_calls,seconds"
+    "residual,penetration,operator_calls,seconds,contact_area_corrected"
 )
 HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
 
@@ -105,7 +105,7 @@ class _Table:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
         forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        self._csv.writerow([speed, m.pressure, *forces, *solve, *point.dissipated])
+        self._csv.writerow([speed, m.pressure, *forces, *solve, m.contact_area_corrected, *point.dissipated])
         self._file.flush()
         if self._waves:
             for wavelength, share in zip(*shares, strict=True):

@@ -24,6 +24,21 @@ def test_rolls_like_numpy(ny: int, count: int, single: bool) -> None:
     np.testing.assert_array_equal(field, whole[slab.rows])
 
 
+@settings(max_examples=40)
+@given(ny=st.integers(1, 9), cyclic=st.booleans())
+def test_row_before_the_first(ny: int, cyclic: bool) -> None:
+    """Copies, so equal; only ranks that have rows have one before them."""
+    slab = Slab(MPI.COMM_WORLD, 3, ny)
+    whole = np.arange(3.0 * ny).reshape(ny, 3)
+    field, first = whole[slab.rows].copy(), slab.rows.start
+    sent = slab.tally["bytes sent"]
+    before = rows.before_first(slab, field, cyclic)
+    if slab.rows.start < slab.rows.stop:
+        np.testing.assert_array_equal(before, whole[first - 1 if cyclic or first else 0])
+    assert before.shape == (3,)
+    assert slab.tally["bytes sent"] - sent <= 24  # one row
+
+
 def test_counts_what_is_sent() -> None:
     slab = Slab(MPI.COMM_WORLD, 4, 8)
     rows.roll(slab, slab.zeros(), 8, slab.empty())

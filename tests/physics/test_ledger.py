@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.ledger import Ledger, Measures
+from parcontact.physics.ledger import SIDE, Ledger, Measures
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface, single_wave
 from parcontact.physics.units import Units
@@ -95,6 +97,28 @@ def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
     assert_allclose(found.force_x, 3.0 * PRESSURE * (LX / NX) * (LY / NY) * (-distance / 1e-2), rtol=1e-13)
     assert_allclose(found.friction, distance / 1e-2, rtol=1e-13)
     assert found.force_y == 0.0
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 9), st.integers(1, 5), st.booleans(), st.integers(0, 99))
+def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int) -> None:
+    """Cells counted less `SIDE` for each side on the edge of contact: whole numbers, so the same on every rank.
+
+    In a periodic box of two cells each side is there twice, and counts twice; of one cell, not at all. Sides on the
+    edge of a free box do not count.
+    """
+    slab = Slab(MPI.COMM_WORLD, nx, ny)
+    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=periodic)
+    pressed = np.random.default_rng(seed).random((ny, nx)) < 0.5
+    p, none = slab.zeros(), slab.zeros()
+    p[...] = pressed[slab.rows]
+    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, none, none, 0.0, (0.0, 0.0))
+    if periodic:
+        sides = sum(np.count_nonzero(pressed != np.roll(pressed, 1, axis)) for axis in (0, 1))
+    else:
+        sides = sum(np.count_nonzero(np.diff(pressed, axis=axis)) for axis in (0, 1))
+    assert found.contact_area == np.count_nonzero(pressed) / (nx * ny)
+    assert found.contact_area_corrected == (np.count_nonzero(pressed) - SIDE * sides) / (nx * ny)
 
 
 def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:

@@ -67,6 +67,18 @@ def test_measure(shape: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("shape", MAPS)
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_edges(shape: tuple[int, int], cyclic: bool) -> None:
+    """Sides between what is pressed and what is not: whole numbers."""
+    p, above = maps(2, shape)
+    above = above[:1, :] if shape[0] else np.zeros((1, shape[1]))
+    pressed = np.concatenate([above, p]) > 0.0
+    expected = np.count_nonzero(np.diff(pressed, axis=0)) + np.count_nonzero(np.diff(pressed[1:], axis=1))
+    expected += np.count_nonzero(pressed[1:, 0] != pressed[1:, -1]) if cyclic else 0
+    assert loops.edges(p, above[0], cyclic) == expected
+
+
+@pytest.mark.parametrize("shape", MAPS)
 def test_products(shape: tuple[int, int]) -> None:
     a, b, c = maps(3, shape)
     assert_allclose(loops.dot(a, b), (a * b).sum(), rtol=1e-13, atol=1e-13)
