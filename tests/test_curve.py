@@ -109,6 +109,8 @@ def test_curve_from_the_command_line(run_parcontact: Callable, tmp_path: Path) -
     done = run_parcontact(["steady", "wave.yaml", "--velocities", "0.004:0.4:3", "--pressures", "2e5,4e5"], ranks=2)
     assert done.returncode == 0, done.stderr
     columns = read(tmp_path / "out/wave/steady.csv")
+    assert columns["friction_x"] == columns["friction"]  # along +x, the force against it
+    assert list(columns)[-1] == "friction_x"
     for speed, pressure, friction, force, power in zip(
         *(columns[name] for name in ("velocity", "pressure", "friction", "force_x", "dissipated_0")), strict=True
     ):

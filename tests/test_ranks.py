@@ -28,7 +28,7 @@ surface:
 material: {model: elastic, poisson: 0.5, shear_modulus: 1.0e6}
 history: [{pressure: 5.0e3}, {pressure: 2.0e4}]
 numerics: {tolerance: 1.0e-11}
-output: {fields: [pressure, displacement, gap]}
+output: {fields: [pressure, displacement, gap, height]}
 """
 ROWS = "surface={shape: wave, amplitude: 1.0e-6, waves: [3, 1], phase: 0.3}"  # of 3 rows: no rough wave would fit
 RUBBER = "material={model: zener, modulus_inf: 1.0e6, branches: [{modulus: 9.0e6, relaxation_time: 1.0e-3}]}"
@@ -41,7 +41,7 @@ GRIDS = {
     "few rows": ["grid.points=[64, 3]", ROWS],
     "one row": ["grid.points=[64, 1]", ROWS.replace("[3, 1]", "[3, 0]")],
 }
-FIELDS = ("pressure", "displacement", "gap")
+FIELDS = ("pressure", "displacement", "gap", "height")
 
 
 def solved(path: Path, comm: MPI.Intracomm, *overrides: str) -> march.March:

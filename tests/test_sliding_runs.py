@@ -408,6 +408,32 @@ def test_example_of_full_contact() -> None:
     assert friction[-1] == pytest.approx(9.771e-4 * np.exp(-5.0), rel=5e-3)
 
 
+def test_a_reversal_changes_the_sign_of_friction_x() -> None:
+    """`-force_x` over the normal force to rounding, past 0 after the reversal, where `friction` has a cusp."""
+    there, back = ({"velocity": speed, "distance": 16 * CELL, "cells_per_step": 1} for speed in (FAST, -FAST))
+    _, rows = marched(wave([there, back]))
+    signed, magnitude = (column(rows, name) for name in ("friction_x", "friction"))
+    assert_allclose(signed[1:], -traction(rows[1:]), rtol=1e-14)
+    assert np.array_equal(np.abs(signed), magnitude)
+    assert np.all(signed[2:17] > 0.0)
+    assert signed[-1] < 0.0
+
+
+@pytest.mark.parametrize(("cells", "boundary"), [(3.0, "periodic"), (2.25, "periodic"), (2.25, "free")])
+def test_height_is_where_the_surface_is(tmp_path: Path, cells: float, boundary: str) -> None:
+    """`h0(x - s)` with its mean, to 1e-12 of it, which the gap is counted from; 10 roundings of each length."""
+    x = np.arange(64) * CELL
+    np.save(tmp_path / "wave.npy", 3.0 * HEIGHT + HEIGHT * np.cos(K * x)[None, :])
+    data = wave([{"velocity": FAST, "distance": cells * CELL, "cells_per_step": cells}], tolerance=1e-6)
+    data["grid"]["boundary"] = boundary
+    data["surface"] = {"shape": "file", "path": str(tmp_path / "wave.npy")}
+    march, _ = marched(data)
+    height, gap, displacement = (march.field(name) for name in ("height", "gap", "displacement"))
+    assert_allclose(height[0], 3.0 * HEIGHT + HEIGHT * np.cos(K * (x - cells * CELL)), rtol=1e-12)
+    approach = march.row.measures.approach
+    assert_allclose(gap, displacement - height - approach, rtol=0.0, atol=4e-15 * (3 * HEIGHT + abs(approach)))
+
+
 def test_example_of_a_sphere() -> None:
     """What jobs/sphere_sliding.yaml promises for V* = 1, within 3 % with 8 cells per a* and steps twice as long."""
     _, rows = marched(example("sphere_sliding", "grid.points=176", "history.0.time_step=2.5e-4"))

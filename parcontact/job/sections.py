@@ -68,7 +68,7 @@ class Numerics(Part):
     accept_unconverged: Flag = Field(default=False, description="true or false")
 
 
-FieldName = Literal["pressure", "displacement", "gap"]
+FieldName = Literal["pressure", "displacement", "gap", "height"]
 
 
 def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:

@@ -180,7 +180,10 @@ class March:
         return balance.work * unit, balance.stored * unit, math.fsum(lost), lost
 
     def field(self, name: str) -> Array:
-        """This rank's rows of `pressure` [Pa], `displacement` [m] or `gap` [m], as a new array."""
+        """This rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], as a new array.
+
+        `height` is that of the rigid surface where it is now, so that `gap = displacement - height - approach`.
+        """
         scene, units = self.scene, self.scene.units
         if name == "pressure":
             return self.p * (self.alpha * units.pressure)
@@ -188,7 +191,10 @@ class March:
         if name == "displacement":
             return u * units.height
         base, offset = scene.path.at(self.position).parts
-        return (u - np.roll(base, offset, axis=1) - self.d) * units.height
+        heights = np.roll(base, offset, axis=1)
+        if name == "height":
+            return heights * units.height + scene.frame.surface.datum
+        return (u - heights - self.d) * units.height
 
 
 def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = None) -> bool:

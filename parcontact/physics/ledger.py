@@ -38,6 +38,15 @@ class Measures:
     max_pressure: float = 0.0
     contact_area_corrected: float = 0.0
 
+    @property
+    def friction_x(self) -> float:
+        """Tangential over normal force along x, positive where it opposes motion along +x: `-force_x/normal force`.
+
+        Unlike `friction` it changes its sign with the direction of sliding; 0 at zero load.
+        """
+        force = math.hypot(self.force_x, self.force_y)
+        return 0.0 - self.friction * (self.force_x / force) if force > 0.0 else 0.0
+
 
 @dataclass(frozen=True)
 class Ledger:

@@ -16,7 +16,7 @@ from ..parallel.slab import Array, Slab
 from . import hdf5, layout
 from .provenance import Provenance
 
-UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m"}
+UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m"}
 KIND = "parcontact fields"
 XDMF_SECONDS = 10.0  # at least between two versions of fields.xdmf, which grows with every instant
 
@@ -124,8 +124,8 @@ class FieldsFile:
     def _draw(self) -> None:
         def draw() -> None:
             with h5py.File(self.path, "r") as file:
-                times = file["t"][...]
-            text = xdmf(self.path.name, times, (self.slab.ny, self.slab.nx), self.size, self.names)
+                times, steps = file["t"][...], file["step"][...]
+            text = xdmf(self.path.name, times, steps, (self.slab.ny, self.slab.nx), self.size, self.names)
             with hdf5.replaced(self.path.with_suffix(".xdmf")) as part:
                 part.write_text(text)
 
@@ -172,24 +172,34 @@ def _layout(path: Path) -> tuple[Layout | None, str]:
         return None, f"{path} cannot be read ({hdf5.reason(error)}): the fields saved so far are lost"
 
 
-def xdmf(file: str, times: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]) -> str:
-    """The XDMF text that describes the saved instants."""
+def xdmf(
+    file: str, times: Array, steps: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]
+) -> str:
+    """The XDMF text that describes the saved instants: maps of one layer of points in the plane z = 0.
+
+    XDMF counts z, y, x, the fastest last. Of a mesh of two dimensions ParaView's reader takes the first for z, which
+    puts it into the y-z plane; a mesh of three with one layer has no such choice. Readers show one map per time: where
+    several instants have the same one, as those of loads without duration, the numbers of the steps stand for times.
+    """
     (ny, nx), (lx, ly) = shape, size
+    saved = np.flatnonzero(~np.isnan(times))
+    told = times if len(set(times[saved].tolist())) == saved.size else steps.astype(np.float64)
+    real = 'NumberType="Float" Precision="8"'
     grids = []
-    for index, time in enumerate(times):
-        if np.isnan(time):
-            continue
+    for index in saved:
         attributes = "".join(
-            f'<Attribute Name="{name}" Center="Node"><DataItem ItemType="HyperSlab" Dimensions="{ny} {nx}">'
+            f'<Attribute Name="{name}" Center="Node"><DataItem ItemType="HyperSlab" Dimensions="1 {ny} {nx}">'
             f'<DataItem Dimensions="3 3" Format="XML">{index} 0 0 1 1 1 1 {ny} {nx}</DataItem>'
-            f'<DataItem Dimensions="{len(times)} {ny} {nx}" NumberType="Float" Precision="8" Format="HDF">'
+            f'<DataItem Dimensions="{len(times)} {ny} {nx}" {real} Format="HDF">'
             f"{file}:/{name}</DataItem></DataItem></Attribute>"
             for name in names
         )
+        spacing = f"{lx / nx!r} {ly / ny!r} {lx / nx!r}"  # the same in the order of x, y, z and of z, y, x
         grids.append(
-            f'<Grid><Time Value="{float(time)!r}"/><Topology TopologyType="2DCoRectMesh" Dimensions="{ny} {nx}"/>'
-            f'<Geometry GeometryType="ORIGIN_DXDY"><DataItem Dimensions="2" Format="XML">0 0</DataItem>'
-            f'<DataItem Dimensions="2" Format="XML">{ly / ny!r} {lx / nx!r}</DataItem></Geometry>{attributes}</Grid>'
+            f'<Grid><Time Value="{float(told[index])!r}"/><Topology TopologyType="3DCoRectMesh" '
+            f'Dimensions="1 {ny} {nx}"/><Geometry GeometryType="ORIGIN_DXDYDZ">'
+            f'<DataItem Dimensions="3" {real} Format="XML">0 0 0</DataItem>'
+            f'<DataItem Dimensions="3" {real} Format="XML">{spacing}</DataItem></Geometry>{attributes}</Grid>'
         )
     return (
         '<?xml version="1.0"?><Xdmf Version="3.0"><Domain><Grid GridType="Collection" CollectionType="Temporal">'

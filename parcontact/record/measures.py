@@ -11,24 +11,26 @@ from .row import Row
 SOLVED = ("iterations", "residual", "penetration", "operator_calls")
 COLUMNS = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap"),
-    *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds", "contact_area_corrected"),
+    *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds"),
 )
+LAST = ("friction_x", "contact_area_corrected")  # columns that came later stand at the end: nothing before them shifts
 
 
 def columns(branches: int) -> list[str]:
     """Names of the columns when the dissipation of so many branches is asked for."""
-    return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches))]
+    return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST]
 
 
-def values(row: Row) -> list[Any]:
-    """One line of the file, in the order of COLUMNS, then the dissipation of each branch if there is any."""
+def values(row: Row, branches: int) -> list[Any]:
+    """One line of the file, in the order of `columns(branches)`."""
     m, c = row.measures, row.certificate
     forces = (m.pressure, m.force_x, m.force_y, m.friction)
     lengths = (m.contact_area, m.approach, m.mean_gap, m.max_pressure)
     solve = (row.iterations, c.worst, c.penetration, row.operator_calls)
     energies = (row.work, row.stored, row.dissipated)
     shown = [row.step, row.time, row.distance, *forces, *lengths, *solve, *energies, round(row.seconds, 6)]
-    return [_text(value) for value in (*shown, m.contact_area_corrected, *row.branch_dissipation)]
+    last = (m.friction_x, m.contact_area_corrected)
+    return [_text(value) for value in (*shown, *row.branch_dissipation[:branches], *last)]
 
 
 def _text(value: float) -> str:
@@ -50,7 +52,7 @@ class MeasuresFile:
             self._file.flush()
 
     def write(self, row: Row) -> None:
-        self._writer.writerow(values(row)[: len(COLUMNS) + self._branches])
+        self._writer.writerow(values(row, self._branches))
         self._file.flush()
 
     def sync(self) -> None:

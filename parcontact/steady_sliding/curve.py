@@ -17,8 +17,9 @@ from .sliding import Point, SteadySliding
 
 COLUMNS = (
     "velocity,pressure,force_x,force_y,friction,contact_area,approach,mean_gap,max_pressure,"
-    "residual,penetration,operator_calls,seconds,contact_area_corrected"
+    "residual,penetration,operator_calls,seconds"
 )
+LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches, so that nothing before it shifts
 HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
 
 
@@ -91,7 +92,7 @@ class _Table:
         branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
         self._file = self.path.open("w", newline="")
         self._csv = csv.writer(self._file, lineterminator="\n")
-        self._csv.writerow([*COLUMNS.split(","), *(f"dissipated_{k}" for k in range(branches))])
+        self._csv.writerow([*COLUMNS.split(","), *(f"dissipated_{k}" for k in range(branches)), *LAST])
         self._waves = (directory / "steady_waves.csv").open("w", newline="") if wanted.waves else None
         if self._waves:
             self._waves.write("velocity,pressure,wavelength,share\n")
@@ -105,7 +106,7 @@ class _Table:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
         forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        self._csv.writerow([speed, m.pressure, *forces, *solve, m.contact_area_corrected, *point.dissipated])
+        self._csv.writerow([speed, m.pressure, *forces, *solve, *point.dissipated, m.friction_x, m.contact_area_corrected])
         self._file.flush()
         if self._waves:
             for wavelength, share in zip(*shares, strict=True):

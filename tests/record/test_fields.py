@@ -126,6 +126,58 @@ def test_cut_back_without_going_on(comm: MPI.Intracomm, shared_path: Path) -> No
         assert np.isnan(file["t"][...]).tolist() == [False, False, True]
 
 
+def instants(path: Path, file: h5py.File) -> list[tuple[float, tuple[Array, ...], Array]]:
+    """What a reader takes from the XDMF text: per instant its time, x, y, z of the points, and the pressures.
+
+    By the standard, meshes of equal spacing have their dimensions as z, y, x, and data lie with x fastest. All values of
+    a mesh must be declared: real numbers are of 4 bytes otherwise.
+    """
+    found = []
+    for grid in [grid for grid in ElementTree.parse(path).iter("Grid") if grid.find("Time") is not None]:
+        time, topology, geometry = (grid.find(name) for name in ("Time", "Topology", "Geometry"))
+        assert time is not None
+        assert topology is not None
+        assert geometry is not None
+        assert topology.get("TopologyType") == "3DCoRectMesh"
+        assert geometry.get("GeometryType") == "ORIGIN_DXDYDZ"
+        shape = [int(word) for word in topology.get("Dimensions", "").split()]
+        assert all(item.get("Precision") == "8" for item in geometry)
+        origin, spacing = ([float(word) for word in (item.text or "").split()] for item in geometry)
+        assert spacing[0] == spacing[2]  # readers differ in which of the two is that of x
+        z, y, x = (start + step * np.arange(n) for start, step, n in zip(origin, spacing, shape, strict=True))
+        slab = grid.find("Attribute[@Name='pressure']/DataItem")
+        assert slab is not None
+        places, data = slab
+        start, _, count = np.array([int(word) for word in (places.text or "").split()]).reshape(3, 3)
+        part = tuple(slice(a, a + n) for a, n in zip(start, count, strict=True))
+        values = file[(data.text or "").rpartition(":/")[2]][part]
+        assert [int(word) for word in slab.get("Dimensions", "").split()] == shape
+        found.append((float(time.get("Value", "nan")), (x, y, z), values.reshape(shape)))
+    return found
+
+
+def test_xdmf_puts_maps_into_the_x_y_plane(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Every value at its point (x, y, 0), to the last digit (8-byte numbers), at its time."""
+    path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
+    saved(path, slab, ("gap", "pressure"), [2, 4, 6], 4)
+    whole = Slab(MPI.COMM_SELF, NX, NY)
+    with h5py.File(path) as file:
+        found = instants(path.with_suffix(".xdmf"), file)
+        assert [time for time, *_ in found] == [0.2, 0.4]
+        for step, (_, (x, y, z), values) in zip((2, 4), found, strict=True):
+            assert np.array_equal(x, file["x"])
+            assert np.array_equal(y, file["y"])
+            assert z.tolist() == [0.0]
+            assert np.array_equal(values[0], field(whole, step, "pressure"))
+
+
+def test_xdmf_tells_loads_without_duration_apart() -> None:
+    """Maps of one time are one instant to a reader: single solves are told apart by their steps."""
+    text = fields.xdmf("fields.h5", np.array([0.0, 0.0, np.nan]), np.array([1, 2, 3]), (NY, NX), SIZE, ("gap",))
+    times = [time.get("Value") for time in ElementTree.fromstring(text).iter("Time")]
+    assert times == ["1.0", "2.0"]
+
+
 def test_chain_of_long_jobs(comm: MPI.Intracomm, shared_path: Path) -> None:
     """The job of the file is there once; of others that are too long only the facts are kept."""
     path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)

@@ -3,9 +3,11 @@
 import math
 from pathlib import Path
 
+import pytest
+
 from parcontact.physics.ledger import Measures
 from parcontact.record import measures
-from parcontact.record.measures import COLUMNS, MeasuresFile
+from parcontact.record.measures import COLUMNS, LAST, MeasuresFile
 from parcontact.record.row import Row
 
 
@@ -24,11 +26,28 @@ def test_numbers_read_back(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
     found = measures.read(path)
-    assert list(found) == list(COLUMNS)
+    assert list(found) == [*COLUMNS, *LAST]
     assert found["step"] == [0, 1, 2]
     assert found["time"] == [0.0, 0.1, 0.2]
     assert found["pressure"] == [1 / 3] * 3
     assert all(math.isnan(value) for value in found["work"])
+
+
+@pytest.mark.parametrize(
+    ("forces", "signed"), [((-3.0, 0.0), 0.5), ((3.0, 0.0), -0.5), ((0.0, 2.0), 0.0), ((-3.0, 4.0), 0.3), ((0, 0), 0.0)]
+)
+def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: float) -> None:
+    """Over a normal force F the column is -force_x/F, exactly where the force is along x; friction is |force|/F."""
+    friction = 0.5 if any(forces) else 0.0
+    found = Measures(1.0, *forces, friction)
+    assert found.friction_x == pytest.approx(signed, rel=2e-16, abs=0.0)
+    assert math.copysign(1.0, found.friction_x) == (-1.0 if signed < 0.0 else 1.0)
+    file = MeasuresFile(tmp_path / "measures.csv", 1)
+    file.write(Row(1, measures=found, branch_dissipation=(0.1,)))
+    file.close()
+    table = measures.read(tmp_path / "measures.csv")
+    assert list(table)[-2:] == ["dissipated_0", "friction_x"]
+    assert table["friction_x"] == [found.friction_x]
 
 
 def test_cut_back(tmp_path: Path) -> None:
@@ -58,9 +77,9 @@ def test_other_columns(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
     assert measures.cut_back(path, 2, 2) == ""
-    assert list(measures.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1"]
+    assert list(measures.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1", *LAST]
     assert math.isnan(measures.read(path)["dissipated_1"][2])
     assert measures.cut_back(path, 2, 0) == ""
-    assert list(measures.read(path)) == list(COLUMNS)
+    assert list(measures.read(path)) == [*COLUMNS, *LAST]
     written(tmp_path / "split.csv", 2, branches=2)
     assert measures.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]
