@@ -74,7 +74,11 @@ class Bench:
             "material": material,
             "history": history,
             "numerics": numerics,
-            "output": {"fields": ["pressure", "displacement", "gap", "height"], "energy": True, "branch_dissipation": True},
+            "output": {
+                "fields": ["pressure", "displacement", "gap", "height"],
+                "energy": True,
+                "branch_dissipation": True,
+            },
             "checkpoint": {"every": 1, "keep": 1000},
         }
         for key, value in changes.items():

@@ -129,8 +129,8 @@ def test_cut_back_without_going_on(comm: MPI.Intracomm, shared_path: Path) -> No
 def instants(path: Path, file: h5py.File) -> list[tuple[float, tuple[Array, ...], Array]]:
     """What a reader takes from the XDMF text: per instant its time, x, y, z of the points, and the pressures.
 
-    By the standard, meshes of equal spacing have their dimensions as z, y, x, and data lie with x fastest. All values of
-    a mesh must be declared: real numbers are of 4 bytes otherwise.
+    By the standard, meshes of equal spacing have their dimensions as z, y, x, and data lie with x fastest. Numbers are
+    of 4 bytes unless they are declared to be longer.
     """
     found = []
     for grid in [grid for grid in ElementTree.parse(path).iter("Grid") if grid.find("Time") is not None]:
