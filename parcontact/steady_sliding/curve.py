@@ -19,7 +19,7 @@ COLUMNS = (
     "velocity,pressure,force_x,force_y,friction,contact_area,approach,mean_gap,max_pressure,"
     "residual,penetration,operator_calls,seconds"
 )
-LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches, so that nothing before it shifts
+LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
 HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
 
 
@@ -106,7 +106,8 @@ class _Table:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
         forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        self._csv.writerow([speed, m.pressure, *forces, *solve, *point.dissipated, m.friction_x, m.contact_area_corrected])
+        last = (m.friction_x, m.contact_area_corrected)
+        self._csv.writerow([speed, m.pressure, *forces, *solve, *point.dissipated, *last])
         self._file.flush()
         if self._waves:
             for wavelength, share in zip(*shares, strict=True):
