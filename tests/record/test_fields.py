@@ -126,7 +126,7 @@ def test_cut_back_without_going_on(comm: MPI.Intracomm, shared_path: Path) -> No
         assert np.isnan(file["t"][...]).tolist() == [False, False, True]
 
 
-def instants(path: Path, file: h5py.File) -> list[tuple[float, tuple[Array, ...], Array]]:
+def instants(path: Path, file: h5py.File) -> list[tuple[float, tuple[Array, Array, Array], Array]]:
     """What a reader takes from the XDMF text: per instant its time, x, y, z of the points, and the pressures.
 
     By the standard, meshes of equal spacing have their dimensions as z, y, x, and data lie with x fastest. Numbers are
