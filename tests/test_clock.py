@@ -84,7 +84,7 @@ def test_steps_add_up(stages: list[dict[str, Any]], until: float, pressure: floa
         ([{**SLIDE, "distance": 2.5 * GRID.dx}], 2),
         ([{**SLIDE, "distance": 10.5 * GRID.dx, "cells_per_step": 10.5}, {**SLIDE, "distance": 1e-3}], 2),
         ([{**SLIDE, "velocity": [0.1, 0.1], "distance": 1e-3}], 2),
-        ([{**SLIDE, "distance": (1e4 + 1.1e-5) * GRID.dx}], 911),  # a little more than a cell per step
+        ([{**SLIDE, "distance": (1e4 + 9e-6) * GRID.dx}], 1113),  # 9e-10 of a cell more in each step
         ([{"pressure": 1e4, "duration": 1.0, "time_step": {"first": 0.1, "growth": 2.0}}], None),
     ],
 )
