@@ -12,7 +12,7 @@ import numpy as np
 from . import job as jobs
 from .effects import decisions as calls_for
 from .effects.decisions import Decision, Effect
-from .effects.folded_branches import condensed, told_of
+from .effects.folded_branches import describe_folded_branches, fold_branches_of
 from .effects.relaxation import relaxation_of
 from .job import Job
 from .job.timeline import Step
@@ -22,7 +22,7 @@ from .physics import heightfile
 from .physics.body import Elastic, Heights, Zener
 from .physics.convolution import Convolution
 from .physics.energy import ElasticEnergy, ZenerEnergy
-from .physics.folding import Condensed
+from .physics.folding import FoldedBranches
 from .physics.halfspace import HalfSpace
 from .physics.ledger import Ledger
 from .physics.motion import AnyFraction, Path, WholeCells
@@ -78,7 +78,7 @@ class Scene:
 
     frame: Frame
     path: Path
-    condensed: Condensed
+    folded: FoldedBranches
     material: Elastic | Zener
     solver: ContactSolver
     ledger: Ledger
@@ -131,7 +131,7 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     base = frame(job, slab)
     way = AnyFraction if calls_for.part_cells(job).on else WholeCells
     path: Path = way(base.surface, base.dtype)
-    branches = slab.agree(condensed(job, until))
+    branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
     energy = _energy(job, solver, material) if calls_for.energies(job).on else None
@@ -153,7 +153,7 @@ def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
 def facts(built: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
     found = built.frame.roughness
-    told = told_of(built.condensed, relaxation_of(built.job))
+    told = describe_folded_branches(built.folded, relaxation_of(built.job))
     if found is None:
         return told
     return [
@@ -177,7 +177,7 @@ def _surface(job: Job, fft: FFT) -> Surface:
             if isinstance(part, jobs.Cylinder):
                 along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
             shapes.append(Round(part.radius, centre, along, part.profile == "exact"))
-        elif not isinstance(part, jobs.Flat):
+        elif isinstance(part, jobs.Spectral):
             added = _waves(part, fft, grid.size)
             waves = added if waves is None else waves + added
     surface = Surface(slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
@@ -188,7 +188,7 @@ def _surface(job: Job, fft: FFT) -> Surface:
     return surface
 
 
-def _waves(part: jobs.Rough | jobs.Wave | jobs.HeightFile, fft: FFT, size: tuple[float, float]) -> Spectrum:
+def _waves(part: jobs.Spectral, fft: FFT, size: tuple[float, float]) -> Spectrum:
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.HeightFile):
@@ -224,7 +224,7 @@ def _height(surface: Surface) -> float:
     return top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
 
 
-def _material(base: Frame, branches: Condensed) -> Elastic | Zener:
+def _material(base: Frame, branches: FoldedBranches) -> Elastic | Zener:
     if not calls_for.viscoelasticity(base.job).on:
         return Elastic(base.slab, base.prony.modulus_inf)
     integrator = base.job.numerics.integrator

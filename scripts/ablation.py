@@ -22,7 +22,6 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.effects import decisions as calls_for
 from parcontact.job import Job
 from parcontact.job.timeline import Step
 from parcontact.march.step import March
@@ -111,7 +110,7 @@ def job(points: int, **changes: Any) -> Job:
                 "tolerance": 1e-15,
                 "max_iterations": ITERATIONS,
                 "accept_unconverged": True,
-                "accuracy": 0.0,
+                "branch_error": 0.0,
             },
             **changes,
         }
@@ -142,7 +141,7 @@ def stepper(case: Case, points: int, directory: Path) -> Callable[[], None]:
 
 def endless(planned: Job) -> Iterator[Step]:
     """The steps of a job; a single solve is repeated under loads that go up and down."""
-    steps = calls_for.timeline(planned)
+    steps = planned.timeline()
     first = next(iter(steps))
     yield from steps
     for number in itertools.count(2):

@@ -15,7 +15,6 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.effects import decisions as calls_for
 from parcontact.effects.decisions import Effect
 from parcontact.job import Job
 from parcontact.job.timeline import Step
@@ -100,7 +99,7 @@ def lasting(planned: Job) -> Counter[str]:
     solver = bare_solver(base)
     ledger = Ledger(slab, base.surface, base.units)
     earlier, moduli, cells = slab.zeros(), [0.0, 0.0], 0
-    for step in calls_for.timeline(planned):
+    for step in planned.timeline():
         heights = path.at(step.position)
         alpha, effective = body.begin(step.dt, heights)
         now, before = (1.0 + step.growth) * moduli[1] / alpha, step.growth * moduli[0] / alpha
@@ -153,8 +152,8 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
         {"history": [PRESS], "material": RUBBER},
         {"map bytes": 3 * MAP},  # a branch, the displacement, the effective heights
     ),
-    "condensed branches": (
-        {"history": [PRESS], "material": FROZEN, "numerics": {"accuracy": 0.0}},
+    "folded branches": (
+        {"history": [PRESS], "material": FROZEN, "numerics": {"branch_error": 0.0}},
         {"history": [PRESS], "material": FROZEN},
         {"map bytes": -MAP},
     ),
@@ -258,7 +257,7 @@ def test_displacement_control() -> None:
     assert row(planned, "displacement control").on
     assert not row(job(), "displacement control").on
     march = begun(planned)
-    march.advance(next(iter(calls_for.timeline(planned))))
+    march.advance(next(iter(planned.timeline())))
     solver, slab = march.scene.solver, march.scene.slab
     spent = slab.tally["allreduce"]
     solver.p.fill(0.0)

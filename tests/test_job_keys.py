@@ -192,7 +192,9 @@ OTHERS = {
         "5:18: initial.state must be virgin | steady, got 'stedy'; did you mean steady?"
     ),
     "numerics: {tolerance: 1}": "5:23: numerics.tolerance must be a tolerance [-] above 0 and below 1, got 1",
-    "numerics: {accuracy: -1}": "5:22: numerics.accuracy must be an accuracy [-] of zero or more and below 1, got -1",
+    "numerics: {branch_error: -1}": (
+        "5:26: numerics.branch_error must be an error of friction [-] of zero or more and below 1, got -1"
+    ),
     "numerics: {max_iterations: 0}": (
         "5:28: numerics.max_iterations must be a positive whole number of iterations, got 0"
     ),

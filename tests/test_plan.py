@@ -10,9 +10,7 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import __main__
-from parcontact.effects import decisions as calls_for
 from parcontact.job import Job
-from parcontact.job.timeline import Timeline
 from parcontact.march import state
 from parcontact.parallel.slab import Slab
 from parcontact.plan import elsewhere, machine, memory, trial
@@ -103,7 +101,7 @@ def test_rest_that_is_cut_short_is_known(material: Json) -> None:
     dwell = {"pressure": 1e4, "duration": 1.0, "time_step": {"first": 1e-5, "growth": 1.2}}
     planned = job(material=material, history=[dwell, CELLS])
     _, rows = marched(planned)
-    assert len(rows) < len(calls_for.timeline(planned))
+    assert len(rows) < len(planned.timeline())
     assert sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6).steps == len(rows) - 1
 
 
@@ -113,7 +111,7 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
     """They follow each other without a gap, weigh as much as all, and end where all do."""
     stage = {**stage, **({"duration": 1e-2} if "duration" in stage else {"distance": 1e-2})}
     planned = job(history=[stage])
-    timeline = Timeline(planned.history, planned.grid)
+    timeline = planned.timeline()
     whole = list(timeline)
     picked = list(chosen(timeline, range(1, len(timeline) + 1), share))
     assert sum(weight for _, weight in picked) == pytest.approx(len(whole), rel=1e-12)
@@ -188,9 +186,9 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert tried is not None
     assert max(tried.grid.points) <= 1024
     assert tried.grid.size == large.grid.size
-    assert len(calls_for.timeline(tried)) < len(calls_for.timeline(large))
+    assert len(tried.timeline()) < len(large.timeline())
     seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
-    assert Scaling.of(large, [seen], MACHINE).steps == len(calls_for.timeline(large))
+    assert Scaling.of(large, [seen], MACHINE).steps == len(large.timeline())
     ratio = Scaling.of(large, [seen], MACHINE).step(1) / Scaling.of(tried, [seen], MACHINE).step(1)
     assert ratio > large.grid.nx**2 / tried.grid.nx**2
     assert trial.grid_for(job(), 1, 10.0) == job()

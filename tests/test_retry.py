@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from test_restart import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.errors import RunError
-from parcontact.job.timeline import steps
 from parcontact.march import state
 from parcontact.march.failure import StepError
 from parcontact.march.step import March, run
@@ -164,7 +163,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
         assert np.array_equal(march.field(name), old)
     march.scene.solver.max_iterations = 500
     job = march.scene.job
-    run(march, [], islice(steps(job.history, job.grid), 7, None))
+    run(march, [], islice(job.timeline(), 7, None))
     limit = 1e-6 * smooth.row.measures.max_pressure
     np.testing.assert_allclose(march.field("pressure"), smooth.field("pressure"), atol=limit)
     assert march.row.dissipated == pytest.approx(smooth.row.dissipated, rel=1e-6)

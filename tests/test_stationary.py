@@ -12,7 +12,6 @@ from marching import begun, column, marched
 from mpi4py import MPI
 from test_restart import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
 
-from parcontact.job.timeline import Timeline
 from parcontact.march.rest import remaining, steps_to_make
 from parcontact.march.step import March, run
 from parcontact.physics.body import Zener
@@ -36,7 +35,7 @@ def job(*history: dict[str, Any], material: Any = ZENER, **changes: Any) -> dict
 def all_steps(data: dict[str, Any]) -> tuple[March, list[Row]]:
     """Without passing any over."""
     march, found = begun(data), list[Row]()
-    run(march, [lambda now: found.append(now.row)], Timeline(march.scene.job.history, march.scene.job.grid))
+    run(march, [lambda now: found.append(now.row)], march.scene.job.timeline())
     return march, found
 
 
@@ -49,7 +48,7 @@ def test_an_elastic_body_is_solved_once() -> None:
     once, _ = marched(job(push, material=ELASTIC))
     calls = once.scene.slab.tally["operator"]
     march, found = marched(job(DWELL, {**DWELL, "pressure": 1e4}, material=ELASTIC))
-    steps = len(Timeline(march.scene.job.history, march.scene.job.grid))
+    steps = len(march.scene.job.timeline())
     assert [row.step for row in found] == [0, 1, 1 + (steps - 1) // 2, steps]
     assert march.scene.slab.tally["operator"] == calls + 2
     assert [row.iterations for row in found[2:]] == [0, 0]
@@ -65,7 +64,7 @@ def test_a_relaxed_body_jumps_to_the_end() -> None:
     ends = []
     for tolerance in (1e-3, 1e-5):
         march, found = marched(job(DWELL, numerics={"tolerance": tolerance}))
-        total = len(Timeline(march.scene.job.history, march.scene.job.grid))
+        total = len(march.scene.job.timeline())
         assert [row.step for row in found[:-1]] == list(range(len(found) - 1))
         assert found[-1].step == total
         assert found[-1].time == pytest.approx(0.1, rel=1e-12)
@@ -81,7 +80,7 @@ NEVER: list[tuple[str, dict[str, Any]]] = [
     ("a ramp", job({**DWELL, "pressure": {"from": 1e4, "to": 1.01e4}})),
     ("sliding", job({**DWELL, "velocity": 1e-6})),
     ("a fluid", job(DWELL, material=FLUID)),
-    ("slow branches", job(DWELL, material=WIDE, numerics={"accuracy": 0})),
+    ("slow branches", job(DWELL, material=WIDE, numerics={"branch_error": 0})),
     ("fields of every step", job(DWELL, material=ELASTIC, output={"fields": ["pressure"]})),
 ]
 
@@ -90,7 +89,7 @@ NEVER: list[tuple[str, dict[str, Any]]] = [
 def test_all_steps_are_made(why: str, data: dict[str, Any]) -> None:
     march, found = marched(data)
     assert [row.step for row in found] == list(range(len(found)))
-    assert len(found) == len(Timeline(march.scene.job.history, march.scene.job.grid)) + 1
+    assert len(found) == len(march.scene.job.timeline()) + 1
 
 
 def test_nothing_is_asked_where_nothing_can_be_passed_over() -> None:
@@ -116,7 +115,7 @@ def test_what_remains_is_bounded(boundary: str, surface: Any, material: Any, con
     press = {"name": "press", control: deep, "duration": 1e-3, "time_step": 2e-4}
     dwell = {"name": "dwell", control: light, "duration": 0.05, "time_step": {"first": 1e-4, "growth": 1.5}}
     data = job(press, dwell, material=material, surface=surface, grid={**GRID, "boundary": boundary})
-    data["numerics"] = {"tolerance": TIGHT, "integrator": integrator, "accuracy": 0}
+    data["numerics"] = {"tolerance": TIGHT, "integrator": integrator, "branch_error": 0}
     march, predicted, seen = begun(data), list[float](), list[Any]()
     height = march.scene.solver.height
 
@@ -128,7 +127,7 @@ def test_what_remains_is_bounded(boundary: str, surface: Any, material: Any, con
             predicted.append(scale * remaining(now, body, 0.051 - now.row.time))
             seen.append(body.u.copy())
 
-    run(march, [look], Timeline(march.scene.job.history, march.scene.job.grid))
+    run(march, [look], march.scene.job.timeline())
     largest = np.abs(seen[-1]).max()
     factor = 2.0 if control == "pressure" else 1.0
     for instant in range(len(seen)):
@@ -204,7 +203,7 @@ def test_restarts_bit_for_bit(bench: Bench) -> None:
 def test_until_stops_within_a_dwell(bench: Bench) -> None:
     """At the step that reaches it, as without passing over; then it goes on to the end."""
     data, out = dwelling(bench, output={"fields": []}), bench.where / "out"
-    timeline = Timeline(begun(data).scene.job.history, begun(data).scene.job.grid)
+    timeline = begun(data).scene.job.timeline()
     assert bench.run(data, out, until=0.06) == 0
     assert int(rows(out)[-1]["step"]) == timeline.first_reaching(0.06)
     assert bench.run(data, out) == 0
@@ -224,7 +223,7 @@ def test_a_checkpoint_is_not_passed_over(bench: Bench) -> None:
 def test_steps_are_decided_on_one_by_one() -> None:
     """When the last one was made. One that stands for others takes all their time; nothing is extrapolated to it."""
     march = begun(job(DWELL, material=ELASTIC))
-    timeline = Timeline(march.scene.job.history, march.scene.job.grid)
+    timeline = march.scene.job.timeline()
     steps = steps_to_make(march, timeline)
     first = next(steps)
     assert first == timeline[1]
@@ -241,7 +240,7 @@ def test_branches_without_a_map_relax_first() -> None:
     march, found = marched(job(DWELL, material=fast))
     assert isinstance(march.scene.material, Zener)
     assert not march.scene.material.kept
-    assert [row.step for row in found] == [0, 1, 2, len(Timeline(march.scene.job.history, march.scene.job.grid))]
+    assert [row.step for row in found] == [0, 1, 2, len(march.scene.job.timeline())]
     assert found[1].measures.contact_area < 0.9 * found[2].measures.contact_area
     assert found[2].measures.contact_area == found[3].measures.contact_area
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .. import scene
 from ..job import Job
-from ..job.timeline import Step, steps
+from ..job.timeline import Step
 from ..march.step import March
 from ..parallel.slab import Array, Slab
 from ..record.row import Row
@@ -71,7 +71,7 @@ class Bench:
     def begin(self, data: Json) -> March:
         """A march at the start of a job, which is solved to 1e-10 and with all branches unless it says otherwise;
         collective."""
-        numerics = {"tolerance": 1e-10, "accuracy": 0.0, **data.get("numerics", {}), "precision": self.precision}
+        numerics = {"tolerance": 1e-10, "branch_error": 0.0, **data.get("numerics", {}), "precision": self.precision}
         if self.single:
             numerics["tolerance"] = max(numerics["tolerance"], SINGLE_TOLERANCE)
         job = Job.model_validate({**data, "numerics": numerics})
@@ -85,7 +85,7 @@ class Bench:
         """A march at the end of a job, and the row of every instant, the initial one first; collective."""
         march = self.begin(data)
         job, rows = march.scene.job, [march.row]
-        for step in steps(job.history, job.grid, pressure=job.initial.pressure):
+        for step in job.timeline():
             rows.append(march.advance(step))
             self._note(march.row)
             self._always(march, step)

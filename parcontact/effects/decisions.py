@@ -7,10 +7,8 @@ that is off allocates nothing, calls nothing and writes nothing.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .. import job as jobs
-from ..job import Job
-from ..job.timeline import Timeline
-from .folded_branches import condensed
+from ..job import Job, Spectral
+from .folded_branches import fold_branches_of
 from .relaxation import relaxation_of
 
 
@@ -33,9 +31,9 @@ def viscoelasticity(job: Job) -> Effect:
     return Effect("viscoelasticity", count > 0, what if count else "the body has one modulus and no memory")
 
 
-def condensation(job: Job) -> Effect:
-    """Branches far faster or slower than all that happens have no map (`physics/condense.py`)."""
-    name, found = "condensed branches", condensed(job)
+def folded_branches(job: Job) -> Effect:
+    """Branches far faster or slower than all that happens have no map (`physics/folding.py`)."""
+    name, found = "folded branches", fold_branches_of(job)
     if not found.folded:
         return Effect(name, False, found.reason or "no branch is far faster or slower than all that happens")
     kinds = ((found.memoryless, "memoryless"), (found.frozen, "frozen"))
@@ -53,7 +51,7 @@ def isolated(job: Job) -> Effect:
 
 def sliding(job: Job) -> Effect:
     """A surface that moves."""
-    moves = timeline(job).moves
+    moves = job.timeline().moves
     return Effect("sliding", moves, "the surface moves" if moves else "the surface stands in all stages")
 
 
@@ -67,7 +65,7 @@ def _part_cells(job: Job) -> tuple[bool, str]:
         return False, "the surface stands"
     if job.grid.boundary == "free":
         return True, "a free box is not cyclic: the heights are made anew"
-    step = timeline(job).first_between_cells(job.grid)
+    step = job.timeline().first_between_cells(job.grid)
     if step is None:
         return False, "every step is of whole cells along x"
     return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
@@ -75,13 +73,13 @@ def _part_cells(job: Job) -> tuple[bool, str]:
 
 def lasting(job: Job) -> Effect:
     """The last pressure but one, from which the next one is extrapolated."""
-    lasts = timeline(job).lasts
+    lasts = job.timeline().lasts
     return Effect("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
 
 
 def short_rest(job: Job) -> Effect:
     """Once nothing changes any more at rest, one step ends the stage (`stationary.py`)."""
-    stage = next((span.stage.name for span in timeline(job).spans if span.rests), None)
+    stage = next((span.stage.name for span in job.timeline().spans if span.rests), None)
     why = "no stage stands under a constant load with growing time steps"
     return Effect(
         "rest cut short", stage is not None, f"stage {stage!r} stands under a constant load" if stage else why
@@ -131,7 +129,7 @@ def branch_dissipation(job: Job) -> Effect:
 
 def spectrum(job: Job) -> Effect:
     """The waves of the surface: their transform is kept, their moments are taken once, and forces are spectral sums."""
-    waves = any(isinstance(part, jobs.Rough | jobs.Wave | jobs.HeightFile) for part in job.surface)
+    waves = any(isinstance(shape, Spectral) for shape in job.surface)
     why = "the surface has waves or heights from a file" if waves else "all shapes of the surface are in closed form"
     return Effect("surface spectrum", waves, why)
 
@@ -157,11 +155,6 @@ def mixed_precision(job: Job) -> Effect:
 
 
 TABLE: tuple[Decision, ...] = (
-    *(viscoelasticity, condensation, isolated, sliding, part_cells, lasting, short_rest, steady_start, approach),
+    *(viscoelasticity, folded_branches, isolated, sliding, part_cells, lasting, short_rest, steady_start, approach),
     *(mixed_precision, spectrum, energies, energy_memory, branch_dissipation, fields, checkpoints),
 )
-
-
-def timeline(job: Job) -> Timeline:
-    """All steps of a job."""
-    return Timeline(job.history, job.grid, pressure=job.initial.pressure)

@@ -1,4 +1,4 @@
-"""Branch condensation: the time scales of a job and the waves of its surface, and what they leave of its branches."""
+"""Folded branches: which of them need no map, from the time scales of a job and the waves of its surface."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,26 +7,25 @@ import numpy as np
 
 from .. import job as jobs
 from ..job import Grid, Job
-from ..job.timeline import Timeline
-from ..physics.folding import Band, Condensed, Phase, condense, nothing
+from ..physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from ..physics.prony import Prony
 from .relaxation import relaxation_of
 
 
-def condensed(job: Job, until: float = 0.0) -> Condensed:
+def fold_branches_of(job: Job, until: float = 0.0) -> FoldedBranches:
     """Which branches of a job's material need a map, if its last stage goes on to `until` [s]; from the job alone."""
     prony, numerics = relaxation_of(job), job.numerics
     if prony.moduli.size == 0:
-        return nothing(prony, "the body has no branch")
+        return keep_all(prony, "the body has no branch")
     reason = "output.energy counts the energy of every branch" if job.output.energy else ""
-    reason = reason or ("" if numerics.accuracy else "numerics.accuracy is 0")
-    accuracy = 0.0 if reason else numerics.accuracy
+    reason = reason or ("" if numerics.branch_error else "numerics.branch_error is 0")
+    allowed = 0.0 if reason else numerics.branch_error
     start = job.initial.velocity if job.initial.state == "steady" else None
-    found = condense(prony, list(phases(job, until)), list(bands(job)), numerics.integrator, accuracy, start)
+    found = fold_branches(prony, list(phases(job, until)), list(bands(job)), numerics.integrator, allowed, start)
     return replace(found, reason=reason)
 
 
-def told_of(found: Condensed, prony: Prony) -> list[str]:
+def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
     """What a user should know about the branches of a material [Pa, s]: nothing if they are as the job says."""
     count = prony.moduli.size
     if not found.folded:
@@ -39,13 +38,13 @@ def told_of(found: Condensed, prony: Prony) -> list[str]:
     folded = "; ".join(f"{kind} {text}" for kind, text in times.items())
     return [
         f"branches: {len(found.kept)} of {count} have a map, {folded}; friction (at rest: the modulus) is wrong by at "
-        f"most {found.bound:.2g} of itself (numerics.accuracy {found.accuracy:g})"
+        f"most {found.bound:.2g} of itself (numerics.branch_error {found.allowed:g})"
     ]
 
 
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
-    for span in Timeline(job.history, job.grid, until, job.initial.pressure).spans:
+    for span in job.timeline(until).spans:
         first, last = (span.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
         duration = span.ends[span.count] * span.stage.seconds if span.count else 0.0
         yield Phase(duration, first, last, span.stage.velocity, span.jumps)
@@ -53,9 +52,9 @@ def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
 
 def bands(job: Job) -> Iterator[Band]:
     """The waves of a job's surface. Round shapes and files may have every wave from the box to two cells."""
-    grid, only = job.grid, _only(job.grid)
+    grid, only = job.grid, _direction_of_all_waves(job.grid)
     longest = 2 * np.pi / max(grid.size)
-    finest = max(np.pi / min((cell for cell, n in _cells(grid) if n > 1), default=np.inf), longest)
+    finest = max(np.pi / min((cell for cell, n in _cells_and_points(grid) if n > 1), default=np.inf), longest)
     for shape in job.surface:
         if isinstance(shape, jobs.Wave) and any(shape.waves):
             kx, ky = (2 * np.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True))
@@ -69,11 +68,11 @@ def bands(job: Job) -> Iterator[Band]:
             yield Band(longest, finest, finest, only)
 
 
-def _cells(grid: Grid) -> Iterator[tuple[float, int]]:
+def _cells_and_points(grid: Grid) -> Iterator[tuple[float, int]]:
     return zip((grid.dx, grid.dy), grid.points, strict=True)
 
 
-def _only(grid: Grid) -> tuple[float, float] | None:
+def _direction_of_all_waves(grid: Grid) -> tuple[float, float] | None:
     """The direction of all waves on a grid of one line of points; None on a true one."""
     if grid.nx == 1:
         return 0.0, 1.0

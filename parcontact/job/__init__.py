@@ -4,7 +4,7 @@ from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_r
 from .material import Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, JobError, describe, load
 from .sections import Checkpoint, Grid, Numerics, Output
-from .surface import Cylinder, Flat, HeightFile, Rough, Sphere, Wave
+from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
 
 __all__ = [
     "Checkpoint",
@@ -23,6 +23,7 @@ __all__ = [
     "PronyBranch",
     "Ramp",
     "Rough",
+    "Spectral",
     "Sphere",
     "Stage",
     "Steady",

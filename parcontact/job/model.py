@@ -23,6 +23,7 @@ from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
 from .source import Key, Mistake, Source, dump
 from .surface import Rough, Shape
+from .timeline import Timeline
 
 
 class JobError(Exception):
@@ -143,6 +144,10 @@ class Job(Part):
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but will probably disappoint."""
         return tuple(advice.warnings(self))
+
+    def timeline(self, until: float = 0.0) -> Timeline:
+        """All steps of the history; its last stage goes on to `until` [s] if that is later than its end."""
+        return Timeline(self.history, self.grid, until, self.initial.pressure)
 
     def resolved(self) -> str:
         """YAML text with every default filled in; it loads back to an equal job."""

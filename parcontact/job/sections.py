@@ -59,8 +59,8 @@ class Numerics(Part):
     integrator: Literal["exponential", "backward-euler"] = "exponential"
     tolerance: float = Field(default=1e-4, gt=0, lt=1, strict=True, description="a tolerance [-] above 0 and below 1")
     max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
-    accuracy: float = Field(
-        default=1e-3, ge=0, lt=1, strict=True, description="an accuracy [-] of zero or more and below 1"
+    branch_error: float = Field(
+        default=1e-3, ge=0, lt=1, strict=True, description="an error of friction [-] of zero or more and below 1"
     )
     kernel: Literal["spectral", "love"] = "spectral"  # in a free scene: love
     precision: Literal["double", "single", "mixed"] = "double"

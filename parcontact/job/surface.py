@@ -119,5 +119,6 @@ class Flat(Part):
     shape: Literal["flat"] = "flat"
 
 
+Spectral = Rough | Wave | HeightFile  # periodic, and given by their waves; the others are closed forms at every point
 KINDS = {"rough": Rough, "sphere": Sphere, "cylinder": Cylinder, "wave": Wave, "file": HeightFile, "flat": Flat}
 Shape = Annotated[Rough | Sphere | Cylinder | Wave | HeightFile | Flat, PlainValidator(chosen("shape", KINDS))]

@@ -254,11 +254,6 @@ class Timeline:
         return max((span.last for span, _ in same), default=0)
 
 
-def steps(history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None) -> Iterator[Step]:
-    """The steps of a `Timeline`, one after the other."""
-    return iter(Timeline(history, grid, until, pressure))
-
-
 def _jumps(stage: Stage, before: tuple[str, float] | None) -> bool:
     """Whether the stage begins with a jump: an instantaneous stage, another load than before, or another control."""
     if stage.seconds == 0.0:

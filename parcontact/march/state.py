@@ -74,12 +74,12 @@ def _asleep(scene: Scene, contents: Contents) -> list[str]:
         return []
     numbers = [k for k in scene.material.kept if f"material/branch {k}" not in contents.maps]
     for k in numbers:
-        error, accuracy = scene.condensed.memoryless_errors[k], contents.job["numerics"]["accuracy"]
-        if not contents.numbers["material/frozen"][k] and error > accuracy:
+        error, allowed = scene.folded.memoryless_errors[k], contents.job["numerics"].get("branch_error", 0.0)
+        if not contents.numbers["material/frozen"][k] and error > allowed:
             time = scene.frame.prony.relaxation_times[k]
             raise InputError(
                 f"{contents.path} has no map of the branch of relaxation time {time:g} s: its run had no step so short "
-                f"that it mattered to numerics.accuracy = {accuracy:g}, now friction would be wrong by {error:.2g}; "
+                f"that it mattered to numerics.branch_error = {allowed:g}, now friction would be wrong by {error:.2g}; "
                 "keep to longer steps, or start afresh (--restart never)"
             )
     return [f"material/branch {k}" for k in numbers]

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ..job.timeline import Step, Timeline
+from ..job.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
@@ -207,7 +207,7 @@ def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = N
     if timeline is None:
         if done(march, tasks):
             return True
-        timeline = steps_to_make(march, Timeline(job.history, job.grid, pressure=job.initial.pressure))
+        timeline = steps_to_make(march, job.timeline())
     for step in timeline:
         march.advance(step)
         if done(march, tasks):

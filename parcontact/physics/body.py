@@ -13,8 +13,8 @@ so that `A p = alpha u_new + r`, `alpha = G_inf + sum gain_k`, `r = sum decay_k 
 problem of a step is then that of an elastic body of modulus alpha under the effective heights `h + r/alpha` (paper,
 Eq. 9).
 
-Two kinds of branches have no map (`condense` says which and what it costs): of a memoryless one `gain (u_new - u)` is
-all there is, its decay being 0 to the accuracy asked for; a frozen one is the spring `h_k = G_k u`.
+Two kinds of branches have no map (`physics.folding` says which and what it costs): of a memoryless one
+`gain (u_new - u)` is all there is, its decay being 0 to the error allowed; a frozen one is the spring `h_k = G_k u`.
 """
 
 from collections.abc import Collection

@@ -1,6 +1,6 @@
 """Branches that a job cannot tell from springs: which may go without a map, and what that costs at most.
 
-With the notation of `material`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to the
+With the notation of `physics.body`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to the
 stress. Two kinds of branches need no map:
 
     memoryless  far faster than every step: what it remembers of the last step, `decay h`, is dropped, `gain du` stays
@@ -42,7 +42,7 @@ J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter 3; friction in 
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,7 +52,7 @@ from .prony import Integrator, Prony, complex_modulus, relaxation
 
 LENGTHS, DIRECTIONS = 13, 64  # of a band that are looked at
 PER_DECADE = 4  # lengths of growing steps that are looked at
-FOR_FAST = 0.5  # share of the accuracy for memoryless branches: which they are must not depend on how long a job is
+MEMORYLESS_SHARE = 0.5  # of the error is for memoryless branches: which they are must not depend on how long a job is
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,11 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Condensed:
+class FoldedBranches:
     """What becomes of each branch, by its number in the material; plain data.
 
     `bound` is the largest relative error of friction (where the body rests: of the modulus) that all folded branches
-    make together, at most `accuracy`. `memoryless_errors` and `frozen_errors` are what each branch would add to it.
+    make together, at most `allowed`. `memoryless_errors` and `frozen_errors` are what each branch would add to it.
     `reason` says why nothing may be folded, if so.
     """
 
@@ -114,7 +114,7 @@ class Condensed:
     memoryless: tuple[int, ...] = ()
     frozen: tuple[int, ...] = ()
     bound: float = 0.0
-    accuracy: float = 0.0
+    allowed: float = 0.0
     memoryless_errors: tuple[float, ...] = ()
     frozen_errors: tuple[float, ...] = ()
     reason: str = ""
@@ -125,38 +125,41 @@ class Condensed:
         return len(self.memoryless) + len(self.frozen)
 
 
-def nothing(prony: Prony, reason: str) -> Condensed:
-    """Every branch keeps its map."""
-    return Condensed(tuple(range(prony.moduli.size)), reason=reason)
+def keep_all(prony: Prony, reason: str) -> FoldedBranches:
+    """Every branch keeps its map, for that reason."""
+    return FoldedBranches(tuple(range(prony.moduli.size)), reason=reason)
 
 
-def condense(
+def fold_branches(
     prony: Prony,
     phases: Sequence[Phase],
     bands: Sequence[Band],
     integrator: Integrator,
-    accuracy: float,
+    allowed: float,
     start: tuple[float, float] | None = None,
-) -> Condensed:
-    """Which branches of a material (Pa, s, in normal form) a history needs on a surface, to an accuracy of friction.
+) -> FoldedBranches:
+    """Which branches of a material (Pa, s, in normal form) a history needs on a surface, friction being wrong by a
+    share of `allowed` at most.
 
     `start` is the velocity [m/s] of a steady initial state, None for a virgin body: after steady sliding no branch is
-    G u. Memoryless branches are chosen first, within half of the accuracy, and in either kind the cheapest first.
+    G u. Memoryless branches are chosen first, within half of what is allowed, and in either kind the cheapest first.
     """
-    fast, slow = _errors(prony, phases, bands, integrator, start)
+    as_memoryless, as_frozen = _errors(prony, phases, bands, integrator, start)
     count = prony.moduli.size
     if not any(phase.duration for phase in phases) and start is None:
-        fast = np.full(count, np.inf)  # a body that has no time is elastic
-    memoryless, spent = _cheapest(fast, range(count), FOR_FAST * accuracy)
-    frozen, more = _cheapest(slow, (k for k in range(count) if k not in memoryless), accuracy - spent)
-    kept = tuple(k for k in range(count) if k not in memoryless and k not in frozen)
-    return Condensed(kept, memoryless, frozen, spent + more, accuracy, tuple(fast.tolist()), tuple(slow.tolist()))
+        as_memoryless = np.full(count, np.inf)  # a body that has no time is elastic
+    memoryless, spent = _choose_cheapest(as_memoryless, range(count), MEMORYLESS_SHARE * allowed)
+    others = [k for k in range(count) if k not in memoryless]
+    frozen, more = _choose_cheapest(as_frozen, others, allowed - spent)
+    kept = tuple(k for k in others if k not in frozen)
+    errors = tuple(as_memoryless.tolist()), tuple(as_frozen.tolist())
+    return FoldedBranches(kept, memoryless, frozen, spent + more, allowed, *errors)
 
 
 # -- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _cheapest(errors: Array, candidates: Iterable[int], limit: float) -> tuple[tuple[int, ...], float]:
+def _choose_cheapest(errors: Array, candidates: Iterable[int], limit: float) -> tuple[tuple[int, ...], float]:
     """The candidates with the smallest errors, ascending in number, and their sum, which keeps to the limit."""
     chosen: list[int] = []
     spent = 0.0
@@ -179,77 +182,109 @@ def _errors(
     found = [
         errors
         for band in bands or [Band(1.0, 1.0, 1.0, (0.0, 0.0))]  # a flat surface: every phase is one of rest
-        for errors in _Passing(prony, integrator, band, start).errors(phases)
+        for errors in _Waves(prony, integrator, *band.vectors).errors(phases, start)
     ]
-    fast, slow = np.max(found or np.zeros((1, 2, prony.moduli.size)), axis=0, initial=0.0)
-    return fast, slow
+    as_memoryless, as_frozen = np.max(found or np.zeros((1, 2, prony.moduli.size)), axis=0, initial=0.0)
+    return as_memoryless, as_frozen
 
 
-class _Passing:
-    """The waves of a band on their way through the phases; arrays end with an axis of branches."""
+@dataclass(frozen=True)
+class _Past:
+    """What the waves of a band have gone through so far, shape (lengths, directions).
 
-    def __init__(self, prony: Prony, integrator: Integrator, band: Band, start: tuple[float, float] | None) -> None:
-        self.prony, self.integrator = prony, integrator
-        self.kx, self.ky = band.vectors
-        self.time, self.seen = 0.0, np.zeros(self.kx.shape)  # [s], and what the integral of a wave's u is at most [s]
-        self.omega = self.frequency(start or (0.0, 0.0))
-        self.held = self.moving if start else np.zeros((*self.kx.shape, prony.moduli.size))  # |h/u| [Pa] at most
-        self.virgin = start is None
+    `omega` [rad/s] is the frequency at which they pass now; `seen` [s] is what the integral of a wave's u is at most;
+    `held` [Pa], with an axis of branches, is what |h/u| is at most.
+    """
 
-    def errors(self, phases: Sequence[Phase]) -> Iterator[tuple[Array, Array]]:
+    omega: Array
+    held: Array
+    seen: Array
+    time: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Waves:
+    """The waves of a band, with wave vectors (kx, ky) [rad/m], on a body; arrays end with an axis of branches."""
+
+    prony: Prony
+    integrator: Integrator
+    kx: Array
+    ky: Array
+
+    def errors(self, phases: Sequence[Phase], start: tuple[float, float] | None) -> Iterator[tuple[Array, Array]]:
+        """Of each branch in each phase, as a memoryless and as a frozen one; as `fold_branches` says."""
+        past = self.before(start)
         for phase in phases:
-            fast: Array = np.zeros(self.prony.moduli.size)
+            as_memoryless: Array = np.zeros(self.prony.moduli.size)
+            as_frozen = np.zeros_like(as_memoryless) if start is None else np.full_like(as_memoryless, np.inf)
             if phase.jump:
-                fast = self.share(self.held, self.modulus(0.0))
-                self.held = np.broadcast_to(self.prony.moduli, self.held.shape)
-            slow = np.zeros_like(fast) if self.virgin else np.full_like(fast, np.inf)
+                as_memoryless = self.share(past.omega, past.held, self.modulus(0.0))
+                past = replace(past, held=np.broadcast_to(self.prony.moduli, past.held.shape))
             if phase.duration > 0.0:
-                self.omega = self.frequency(phase.velocity)
-                fast = np.maximum(fast, self.fast(phase))
-                slow = slow + self.slow(phase)
-            yield fast, slow
+                as_memoryless = np.maximum(as_memoryless, self.memoryless_error(past, phase))
+                past = self.after(past, phase)
+                as_frozen = as_frozen + self.frozen_error(past)
+            yield as_memoryless, as_frozen
 
-    def frequency(self, velocity: tuple[float, float]) -> Array:
-        return np.abs(self.kx * velocity[0] + self.ky * velocity[1])
+    def before(self, start: tuple[float, float] | None) -> _Past:
+        """In a virgin body, or (start) in steady sliding at a velocity [m/s]."""
+        omega = self.frequency(start or (0.0, 0.0))
+        held = self.steady(omega) if start else np.zeros((*omega.shape, self.prony.moduli.size))
+        return _Past(omega, held, np.zeros(omega.shape))
 
-    @property
-    def moving(self) -> Array:
-        """|h/u| [Pa] of each branch in steady sliding, at most."""
-        return np.asarray(self.prony.moduli * np.minimum(self.omega[..., None] * self.prony.relaxation_times, 1.0))
-
-    def fast(self, phase: Phase) -> Array:
-        passing = self.omega[..., None] > 0.0
-        resting = self.prony.moduli * np.minimum(self.prony.relaxation_times / phase.first, 1.0)
-        before = np.maximum(self.held, np.where(passing, self.moving, resting))
+    @np.errstate(over="ignore")  # infinitely many periods are all right
+    def after(self, past: _Past, phase: Phase) -> _Past:
+        """After a phase that lasts."""
+        omega = self.frequency(phase.velocity)
         decay, gain = self.step(phase.last)
-        self.held = decay * before + np.where(passing, self.moving, gain)
-        return np.max([self.share(self.step(dt)[0] * before, self.modulus(dt)) for dt in phase.steps], axis=0)
+        held = decay * self.most(past, phase) + np.where(omega[..., None] > 0.0, self.steady(omega), gain)
+        swing = np.pi if self.integrator == "backward-euler" else 2.0
+        longest = np.divide(swing, omega, out=np.full_like(omega, np.inf), where=omega > 0.0)
+        seen = past.seen + np.minimum(phase.duration, longest)
+        return _Past(omega, held, seen, past.time + phase.duration)
+
+    def memoryless_error(self, past: _Past, phase: Phase) -> Array:
+        """What a step of the phase may be wrong by without what a branch remembers."""
+        omega, held = self.frequency(phase.velocity), self.most(past, phase)
+        return np.max([self.share(omega, self.step(dt)[0] * held, self.modulus(dt)) for dt in phase.steps], axis=0)
 
     @np.errstate(over="ignore")  # infinitely many relaxation times are all right
-    def slow(self, phase: Phase) -> Array:
-        self.time += phase.duration
-        swing = np.pi if self.integrator == "backward-euler" else 2.0
-        most = np.divide(swing, self.omega, out=np.full_like(self.omega, np.inf), where=self.omega > 0.0)
-        self.seen = self.seen + np.minimum(phase.duration, most)
+    def frozen_error(self, past: _Past) -> Array:
+        """What a branch has relaxed by."""
         tau = self.prony.relaxation_times
-        relaxed = -np.expm1(-self.time / tau)
-        wrong = self.prony.moduli * np.minimum(self.seen[..., None] / tau, relaxed)
-        return self.share(wrong, float(relaxation(self.time, *self.prony)))
+        relaxed = -np.expm1(-past.time / tau)
+        wrong = self.prony.moduli * np.minimum(past.seen[..., None] / tau, relaxed)
+        return self.share(past.omega, wrong, float(relaxation(past.time, *self.prony)))
+
+    def frequency(self, velocity: tuple[float, float]) -> Array:
+        """[rad/s] at which waves pass a point of the body at a velocity [m/s]."""
+        return np.abs(self.kx * velocity[0] + self.ky * velocity[1])
+
+    def steady(self, omega: Array) -> Array:
+        """|h/u| [Pa] of each branch in steady sliding, at most."""
+        return np.asarray(self.prony.moduli * np.minimum(omega[..., None] * self.prony.relaxation_times, 1.0))
+
+    def most(self, past: _Past, phase: Phase) -> Array:
+        """|h/u| [Pa] of each branch at the start of any step of a phase, at most."""
+        omega = self.frequency(phase.velocity)
+        resting = self.prony.moduli * np.minimum(self.prony.relaxation_times / phase.first, 1.0)
+        return np.maximum(past.held, np.where(omega[..., None] > 0.0, self.steady(omega), resting))
 
     def step(self, dt: float) -> tuple[Array, Array]:
+        """`decay` and `gain` of each branch."""
         return coefficients(self.prony, self.integrator, dt)
 
     def modulus(self, dt: float) -> float:
         """The modulus [Pa] of a step."""
         return float(self.prony.modulus_inf + self.step(dt)[1].sum())
 
-    def share(self, wrong: Array, modulus: float) -> Array:
+    def share(self, omega: Array, wrong: Array, modulus: float) -> Array:
         """An error |dM| [Pa] of each wave and branch as a part of friction; waves at rest have `modulus` [Pa]."""
-        moving = complex_modulus(self.omega, *self.prony)
-        size = np.where(self.omega > 0.0, np.abs(moving), modulus)
+        moving = complex_modulus(omega, *self.prony)
+        size = np.where(omega > 0.0, np.abs(moving), modulus)
         error = _over(wrong, size[..., None]).max(axis=(0, 1))
-        if self.omega.any():
-            weight = self.omega[:-1] / self.omega[:-1].max(axis=1, keepdims=True)  # |qx|: w over q v
+        if omega.any():
+            weight = omega[:-1] / omega[:-1].max(axis=1, keepdims=True)  # |qx|: w over q v
             loss = (weight * moving[:-1].imag).sum(axis=1)
             error = error + _over(np.einsum("ij,ijk->ik", weight, wrong[:-1]), loss[:, None]).max(axis=0)
         return np.asarray(error)

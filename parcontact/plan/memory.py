@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import decisions as calls_for
-from ..effects.folded_branches import condensed
+from ..effects.folded_branches import fold_branches_of
 from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..parallel.fft import footprint, transform_name
@@ -66,7 +66,7 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
     if calls_for.lasting(job).on:
         yield Holding("last pressure but one", map_bytes)
     if calls_for.viscoelasticity(job).on:
-        yield Holding("branches", (len(condensed(job).kept) + ZENER) * map_bytes)
+        yield Holding("branches", (len(fold_branches_of(job).kept) + ZENER) * map_bytes)
     if calls_for.energy_memory(job).on:
         yield Holding("energy memory", (relaxation_of(job).moduli.size + ZENER) * cells * 8)
 
@@ -77,7 +77,7 @@ def saved(job: Job) -> int:
     if calls_for.lasting(job).on:
         maps += 1
     if calls_for.viscoelasticity(job).on:
-        maps += 1 + len(condensed(job).kept)
+        maps += 1 + len(fold_branches_of(job).kept)
     if calls_for.energy_memory(job).on:
         doubles = 1 + relaxation_of(job).moduli.size
     return points * (maps * _precision(job).itemsize + doubles * 8) + (maps + doubles) * job.grid.ny * 4

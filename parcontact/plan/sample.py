@@ -80,7 +80,7 @@ class Sample:
         """What this says of the same job on another grid: its number of steps may be another one in each stage."""
         if job.grid == self.job.grid:
             return self
-        spans = calls_for.timeline(job).spans
+        spans = job.timeline().spans
         stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(self.stages, spans, strict=True))
         return replace(self, stages=tuple(stages))
 
@@ -96,7 +96,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
     if calls_for.steady_start(job).on:
         steadystart.begin(march)
     building = time.perf_counter() - began
-    stages = tuple(_try(march, calls_for.timeline(job), seconds))
+    stages = tuple(_try(march, job.timeline(), seconds))
     took = time.perf_counter() - began
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO - slab.tally["map bytes at most"]
     return Sample(job, slab.comm.size, starting, building, took, slab.agree(resident), stages)

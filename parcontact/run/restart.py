@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 from ..errors import InputError
 from ..job import HeightFile, Job, Stage
 from ..job.table import plain
-from ..job.timeline import Step, Timeline
+from ..job.timeline import Step
 from ..parallel.slab import Slab
 from ..record import checkpoint
 from ..record.checkpoint import Contents
@@ -111,7 +111,7 @@ def another_past(contents: Contents, job: Job) -> str:
     """Which of the steps already made would be another one in this job, or ''; those to come may be others."""
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
-    old, new = (Timeline(stages, job.grid, until, job.initial.pressure) for stages in (history, job.history))
+    old, new = (each.timeline(until) for each in (job.model_copy(update={"history": history}), job))
     count = min(number, len(old), len(new))
     for step in range(old.shared(new) + 1, count + 1):
         if difference := next(_apart(old[step], new[step]), ""):

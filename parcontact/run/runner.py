@@ -43,7 +43,7 @@ def run(job: Job, slab: Slab, options: Options) -> int:
     directory = Directory(job.output.directory, slab)
     with Signals().noted() as signals, directory.claimed():
         origin, warnings = restart.choose(job, slab, directory, options.restart)
-        timeline = Timeline(job.history, job.grid, options.until or 0.0, job.initial.pressure)
+        timeline = job.timeline(options.until or 0.0)
         _refuse_no_end(timeline, options.until)
         if origin and (reason := _nothing_to_do(origin, timeline, options.until)):
             if slab.root and not options.quiet:

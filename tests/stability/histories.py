@@ -44,7 +44,7 @@ def back_and_forth(periods: int, contact: str, modulus_inf: float = 1e6) -> Job:
             "branches": [{"modulus": modulus, "relaxation_time": tau} for modulus, tau in BRANCHES],
         },
         "history": [{"pressure": pressure}, *(ways * periods)],
-        "numerics": {"tolerance": 1e-12, "accuracy": 0.0},
+        "numerics": {"tolerance": 1e-12, "branch_error": 0.0},
         "output": {"energy": True},
     }
     return Job.model_validate(data)

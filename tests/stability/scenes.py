@@ -21,7 +21,7 @@ MOST_POINTS = 576
 class Sketch:
     """A job whose surface is a map of heights [m], and maybe a shape of its own; `offset` [m] is added to all of them.
 
-    Without `energy` branches that the job cannot tell from springs are folded, as far as numerics.accuracy allows.
+    Without `energy` branches that the job cannot tell from springs are folded, as far as numerics.branch_error allows.
     """
 
     heights: Map
@@ -148,6 +148,6 @@ def sketch(dice: Random, stages: int = 6) -> Sketch:
         "integrator": dice.choice(["exponential", "exponential", "backward-euler"]),
         "kernel": "love" if boundary == "free" else dice.choice(["spectral", "spectral", "love"]),
         "precision": dice.choice(["double"] * 9 + ["mixed"]),
-        "accuracy": dice.choice([0.0, 1e-3]),
+        "branch_error": dice.choice([0.0, 1e-3]),
     }
     return Sketch(surface, size, boundary, body, history, numerics, energy=dice.random() < 0.7, shape=own)

@@ -42,7 +42,7 @@ def job(
             {**load, "duration": 1e-2, "time_step": {"first": 1e-5, "growth": 5.0}},
             {name: 0.7 * value, "duration": 1e-3, "velocity": [20 * size, 7 * size], "time_step": 2.5e-4},
         ],
-        "numerics": {"accuracy": 0.0, **numerics},
+        "numerics": {"branch_error": 0.0, **numerics},
         "output": {"energy": True},
     }
 
@@ -83,7 +83,7 @@ SCENE = Sketch(
         {"pressure": 0.0, "duration": 1.0, "time_step": 0.5},
         {"approach": -1e-6},
     ),
-    numerics={"tolerance": 1e-10, "accuracy": 0.0},
+    numerics={"tolerance": 1e-10, "branch_error": 0.0},
 )
 
 
@@ -230,10 +230,10 @@ def test_a_fluid_under_a_load_for_ages_says_why_it_fails(tmp_path: Path) -> None
 
 def test_a_fluid_long_at_rest(tmp_path: Path) -> None:
     """Nothing is left of its modulus, by which the errors of folded branches are measured: all keep their maps."""
-    data = job(noise(2.0**-20), tmp_path, {"approach": -1e-7}, accuracy=1e-3)
+    data = job(noise(2.0**-20), tmp_path, {"approach": -1e-7}, branch_error=1e-3)
     data["material"] = {"model": "zener", "modulus_inf": 0.0, "branches": [{"modulus": 1e6, "relaxation_time": 1e-6}]}
     data["history"] = [{"approach": -1e-7}, {"approach": -1e-7, "duration": 1e3, "time_step": 1e2}]
     data["output"]["energy"] = False
     march, rows = marched(data)
-    assert march.scene.condensed.bound <= 1e-3
+    assert march.scene.folded.bound <= 1e-3
     assert rows[-1].measures.pressure < 1e-10 * rows[1].measures.pressure

@@ -30,8 +30,8 @@ def twin(dice: Random, of: Sketch) -> Twin:
 
 def folded(dice: Random, of: Sketch) -> Twin:
     """With a map for every branch, if it did without some; without some, if it had all."""
-    numerics = {**of.numerics, "accuracy": 0.0 if of.numerics["accuracy"] else 1e-3}
-    return Twin("accuracy", replace(of, numerics=numerics), lambda p: p)
+    numerics = {**of.numerics, "branch_error": 0.0 if of.numerics["branch_error"] else 1e-3}
+    return Twin("branch_error", replace(of, numerics=numerics), lambda p: p)
 
 
 def offset(dice: Random, of: Sketch) -> Twin:

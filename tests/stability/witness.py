@@ -60,7 +60,7 @@ class Witness:
     def see(self) -> "Witness":
         """To the end; collective."""
         job = self.march.scene.job
-        timeline = clock.Timeline(job.history, job.grid)
+        timeline = job.timeline()
         try:
             run(self.march, [lambda march: self._note(timeline, march.row)])
         except RunError as error:
@@ -163,7 +163,7 @@ def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> fl
     That is for one solve; what a history adds is much less than this bound leaves. If one of them has folded branches,
     displacements are wrong by the bound that it gives, times the largest length, and gaps with them.
     """
-    folded, largest = abs(one.march.scene.condensed.bound - other.march.scene.condensed.bound), 0.0
+    folded, largest = abs(one.march.scene.folded.bound - other.march.scene.folded.bound), 0.0
     for step in one.pressures.keys() & other.pressures.keys():
         p, q = one.pressures[step], told(other.pressures[step])
         certified, by_folding = one.blurs[step]

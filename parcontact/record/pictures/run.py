@@ -53,7 +53,7 @@ class Run:
     def timeline(self) -> Timeline:
         """What the job says about each step."""
         last = float(self._columns["time"][-1])
-        return Timeline(self.job.history, self.job.grid, last, self.job.initial.pressure)
+        return self.job.timeline(last)
 
     @property
     def stages(self) -> NDArray[np.int64]:

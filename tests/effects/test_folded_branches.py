@@ -14,10 +14,9 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 
 from parcontact import job, scene
-from parcontact.effects.folded_branches import bands, condensed, phases
+from parcontact.effects.folded_branches import bands, fold_branches_of, phases
 from parcontact.errors import InputError
 from parcontact.job import Job
-from parcontact.job.timeline import steps
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Zener
 from parcontact.physics.folding import Band, Phase
@@ -88,8 +87,8 @@ def test_bands_of_surfaces() -> None:
 
 def test_folded_branches_have_no_map_and_friction_is_within_the_bound() -> None:
     """Three of four branches: as many maps less, nothing else more; friction differs, but within the bound."""
-    (fewer, new), (whole, old) = (marched(sliding(numerics={"accuracy": accuracy})) for accuracy in (1e-2, 0.0))
-    found = fewer.scene.condensed
+    (fewer, new), (whole, old) = (marched(sliding(numerics={"branch_error": allowed})) for allowed in (1e-2, 0.0))
+    found = fewer.scene.folded
     assert (found.kept, found.memoryless, found.frozen) == ((1,), (0,), (2, 3))
     tallies = whole.scene.slab.tally, fewer.scene.slab.tally
     assert tallies[0]["map bytes"] - tallies[1]["map bytes"] == 3 * 8 * NX * NY
@@ -106,21 +105,21 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     A wave that passes misses 2/(w tau) < 2 % of the branch at most, one along the tracks 22 %.
     """
     slide = {**SLIDE, "pressure": pressure, "distance": 5e-3}
-    numerics = {"accuracy": 0.0, "tolerance": 1e-7}
+    numerics = {"branch_error": 0.0, "tolerance": 1e-7}
     marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
     base = marches[1].scene.frame
     marches[1].scene.material = Zener(base.slab, base.prony, "exponential", base.dtype, frozen=[1])
-    timeline = list(steps(base.job.history, base.job.grid))
+    timeline = list(base.job.timeline())
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
     wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]
-    assert 0.05 < wrong / marches[0].scene.condensed.frozen_errors[1] < 1.0
+    assert 0.05 < wrong / marches[0].scene.folded.frozen_errors[1] < 1.0
 
 
 def test_nothing_to_fold_costs_nothing() -> None:
     """All counts and all rows are those of a run that must not fold."""
-    runs = [marched(sliding(times=(MIDDLE,), numerics={"accuracy": accuracy})) for accuracy in (1e-3, 0.0)]
+    runs = [marched(sliding(times=(MIDDLE,), numerics={"branch_error": allowed})) for allowed in (1e-3, 0.0)]
     tallies = [march.scene.slab.tally for march, _ in runs]
-    assert runs[0][0].scene.condensed.folded == 0
+    assert runs[0][0].scene.folded.folded == 0
     assert tallies[0] == tallies[1]
     for name in ("friction", "contact_area", "max_pressure"):
         assert_array_equal(column(runs[0][1], name), column(runs[1][1], name))
@@ -128,7 +127,7 @@ def test_nothing_to_fold_costs_nothing() -> None:
 
 def test_energies_keep_every_branch() -> None:
     found = begun(sliding(output={"energy": True})).scene
-    assert found.condensed.folded == 0
+    assert found.folded.folded == 0
     assert scene.facts(found)[0] == "branches: all 4 have a map: output.energy counts the energy of every branch"
 
 
@@ -136,21 +135,21 @@ def test_a_steady_start_freezes_nothing() -> None:
     """The memoryless branch has no map to fill."""
     start = {"state": "steady", "velocity": 0.2, "pressure": 1e5}
     fewer, whole = (
-        begun(sliding(initial=start, numerics={"tolerance": 1e-6, "accuracy": accuracy})).scene
-        for accuracy in (1e-3, 0.0)
+        begun(sliding(initial=start, numerics={"tolerance": 1e-6, "branch_error": allowed})).scene
+        for allowed in (1e-3, 0.0)
     )
-    assert (fewer.condensed.memoryless, fewer.condensed.frozen) == ((0,), ())
+    assert (fewer.folded.memoryless, fewer.folded.frozen) == ((0,), ())
     assert isinstance(fewer.material, Zener)
     assert isinstance(whole.material, Zener)
     assert_array_equal(fewer.material.branches, whole.material.branches[1:])
 
 
 def test_script() -> None:
-    """What scripts/condensation.py marches, on a grid so small that it says nothing about friction."""
-    script = load_script("condensation")
-    runs = [script.sliding(64, accuracy, 1e-1) for accuracy in (0.0, 1e-3)]
+    """What scripts/folded_branches.py marches, on a grid so small that it says nothing about friction."""
+    script = load_script("folded_branches")
+    runs = [script.sliding(64, allowed, 1e-1) for allowed in (0.0, 1e-3)]
     assert [len(rows) for rows in script.together(runs)] == [33, 33]
-    assert [len(run.scene.condensed.kept) for run in runs] == [12, 5]
+    assert [len(run.scene.folded.kept) for run in runs] == [12, 5]
     assert script.memory_pass(runs[0]) > 0.0
 
 
@@ -191,7 +190,7 @@ def place(comm: MPI.Intracomm, shared_path: Path) -> Place:
 @pytest.mark.mpi
 def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
     """Two pieces are the whole, and no map of a folded branch is in the checkpoint."""
-    content = data(numerics={"accuracy": 1e-2})
+    content = data(numerics={"branch_error": 1e-2})
     place.run(content, "whole")
     place.run(content, until=1e-3)
     place.run(content)
@@ -203,8 +202,8 @@ def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
 @pytest.mark.mpi
 def test_a_longer_run_wakes_frozen_branches(place: Place) -> None:
     """In twice the time the slow branch is G u no more. Its map is made, and friction is that of a run that always had
-    it: within the accuracy, and not the same."""
-    content = data(numerics={"accuracy": 1.5e-3})
+    it: within the error allowed, and not the same."""
+    content = data(numerics={"branch_error": 1.5e-3})
     place.run(content)
     before = place.maps(13)
     place.run(content, until=5e-3)
@@ -231,13 +230,13 @@ def test_a_body_that_had_no_time_wakes_when_it_gets_some(place: Place) -> None:
     assert_allclose(found, expected, atol=1e-9 * np.max(np.abs(expected)))
 
 
-def test_a_lower_accuracy_wakes_all_and_a_higher_one_folds(place: Place) -> None:
+def test_a_smaller_error_wakes_all_and_a_larger_one_folds(place: Place) -> None:
     """Either way the run goes on; the branch that had no memory starts again with none."""
-    place.run(data(numerics={"accuracy": 1e-2}), until=1e-3)
-    place.run(data(numerics={"accuracy": 0.0}), until=2e-3)
+    place.run(data(numerics={"branch_error": 1e-2}), until=1e-3)
+    place.run(data(numerics={"branch_error": 0.0}), until=2e-3)
     assert sum("branch" in name for name in place.maps(11)) == 4
-    place.run(data(numerics={"accuracy": 1e-2}))
-    place.run(data(numerics={"accuracy": 0.0}), "whole")
+    place.run(data(numerics={"branch_error": 1e-2}))
+    place.run(data(numerics={"branch_error": 0.0}), "whole")
     assert sum("branch" in name for name in place.maps(13)) == 1
     found, expected = (np.array([float(text) for text in place.friction(name)]) for name in ("out", "whole"))
     assert 0.0 < np.max(np.abs(found - expected)) / expected[-1] < 1e-2
@@ -252,8 +251,8 @@ def test_steps_too_short_for_a_branch_without_memory_are_refused(place: Place) -
 
 
 def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
-    Place(MPI.COMM_SELF, tmp_path).run(data(numerics={"accuracy": 1e-2}), until=2e-4)
+    Place(MPI.COMM_SELF, tmp_path).run(data(numerics={"branch_error": 1e-2}), until=2e-4)
     log = (tmp_path / "out" / "run.log").read_text()
-    bound = condensed(sliding(numerics={"accuracy": 1e-2})).bound
+    bound = fold_branches_of(sliding(numerics={"branch_error": 1e-2})).bound
     assert "branches: 1 of 4 have a map, memoryless 1e-06 s; frozen 3, 10000 s; " in log
-    assert f"wrong by at most {bound:.2g} of itself (numerics.accuracy 0.01)" in log
+    assert f"wrong by at most {bound:.2g} of itself (numerics.branch_error 0.01)" in log

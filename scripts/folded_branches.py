@@ -1,6 +1,6 @@
-"""What numerics.accuracy saves, and what it costs: the surface of jobs/velocity_step.yaml slides at 3 m/s over 0.5 mm.
+"""What numerics.branch_error saves and costs: the surface of jobs/velocity_step.yaml slides at 3 m/s over 0.5 mm.
 
-    .venv/bin/python scripts/condensation.py [points]
+    .venv/bin/python scripts/folded_branches.py [points]
 
 A virgin body of the twelve-branch compound, one cell per step. Columns:
 
@@ -21,7 +21,6 @@ from pathlib import Path
 from mpi4py import MPI
 
 from parcontact import job, scene
-from parcontact.job.timeline import steps
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, Zener
@@ -29,21 +28,20 @@ from parcontact.record.row import Row
 
 JOB = Path(__file__).parents[1] / "jobs" / "velocity_step.yaml"
 SLIDE = "history=[{pressure: 1.0e5, velocity: 3.0, distance: 5.0e-4, cells_per_step: 1}]"
-ACCURACIES = (0.0, 1e-5, 1e-4, 1e-3, 1e-2)
+ERRORS = (0.0, 1e-5, 1e-4, 1e-3, 1e-2)
 PASSES = 20
 
 
-def sliding(points: int, accuracy: float, tolerance: float) -> March:
+def sliding(points: int, allowed: float, tolerance: float) -> March:
     """The run before its first step."""
-    numerics = [f"numerics.accuracy={accuracy!r}", f"numerics.tolerance={tolerance!r}"]
+    numerics = [f"numerics.branch_error={allowed!r}", f"numerics.tolerance={tolerance!r}"]
     slide = job.load(JOB, [f"grid.points={points}", "initial={state: virgin}", "output={}", SLIDE, *numerics])
     return March(scene.build(slide, Slab(MPI.COMM_SELF, points, points)))
 
 
 def together(runs: list[March]) -> list[list[Row]]:
     """The rows of runs that take their steps in turn."""
-    first = runs[0].scene.job
-    timeline = steps(first.history, first.grid)
+    timeline = runs[0].scene.job.timeline()
     return [list(rows) for rows in zip(*([run.advance(step) for run in runs] for step in timeline), strict=True)]
 
 
@@ -61,21 +59,21 @@ def memory_pass(run: March) -> float:
 
 
 def main(points: int) -> None:
-    exact = together([sliding(points, accuracy, 1e-8) for accuracy in ACCURACIES])
-    runs = [sliding(points, accuracy, 1e-4) for accuracy in ACCURACIES]
+    exact = together([sliding(points, allowed, 1e-8) for allowed in ERRORS])
+    runs = [sliding(points, allowed, 1e-4) for allowed in ERRORS]
     usual = together(runs)
     whole = [row.measures.friction for row in exact[0]]
     passes = [memory_pass(run) for run in runs]
     spent = [sum(row.seconds for row in rows[1:]) for rows in usual]
     calls = [sum(row.operator_calls for row in rows) for rows in usual]
     print(
-        f"{'accuracy':>9}{'maps':>6}" + "".join(f"{name:>9}" for name in ("bound", "error", "memory", "time", "calls"))
+        f"{'allowed':>9}{'maps':>6}" + "".join(f"{name:>9}" for name in ("bound", "error", "memory", "time", "calls"))
     )
-    for n, accuracy in enumerate(ACCURACIES):
-        found = runs[n].scene.condensed
+    for n, allowed in enumerate(ERRORS):
+        found = runs[n].scene.folded
         error = max(abs(row.measures.friction - mu) for row, mu in zip(exact[n], whole, strict=True)) / whole[-1]
         ratios = passes[n] / passes[0], spent[n] / spent[0], calls[n] / calls[0]
-        print(f"{accuracy:9g}{len(found.kept):6}{found.bound:9.1e}{error:9.1e}" + "".join(f"{r:9.3f}" for r in ratios))
+        print(f"{allowed:9g}{len(found.kept):6}{found.bound:9.1e}{error:9.1e}" + "".join(f"{r:9.3f}" for r in ratios))
 
 
 if __name__ == "__main__":

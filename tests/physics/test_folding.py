@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, Zener
-from parcontact.physics.folding import Band, Condensed, Phase, condense, nothing
+from parcontact.physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from parcontact.physics.prony import Integrator, Prony, complex_modulus, creep, normal_form
 from parcontact.theory import full_contact
 
@@ -34,7 +34,7 @@ def slide(seconds: float, dt: float, velocity: float = 1.0, jump: bool = False) 
     return Phase(seconds, dt, dt, (velocity, 0.0), jump)
 
 
-def frozen(prony: Prony, found: Condensed) -> Prony:
+def frozen(prony: Prony, found: FoldedBranches) -> Prony:
     """The material with its frozen branches as springs."""
     others = [k for k in range(prony.moduli.size) if k not in found.frozen]
     spring = prony.modulus_inf + float(prony.moduli[list(found.frozen)].sum())
@@ -53,7 +53,7 @@ def test_friction_of_a_wave_with_frozen_branches(rest: float, duration: float) -
     the bound is of the right size although it is also one for partial contact.
     """
     start = (Phase(rest, rest, rest, (0.0, 0.0), jump=True),) if rest else ()
-    found = condense(DECADES, [*start, slide(duration, 1e-9, jump=not rest)], [WAVE], "exponential", 0.2)
+    found = fold_branches(DECADES, [*start, slide(duration, 1e-9, jump=not rest)], [WAVE], "exponential", 0.2)
     t = np.linspace(0.0, duration, 400)
     whole, fewer = (
         full_contact.load_rest_slide_modulus(t, rest, 1.0, *body).imag for body in (DECADES, frozen(DECADES, found))
@@ -66,7 +66,7 @@ def test_friction_of_a_wave_with_frozen_branches(rest: float, duration: float) -
 
 def test_creep_with_frozen_branches() -> None:
     """At rest the bound is one of the modulus, and of the creep compliance too, which the contact follows."""
-    found = condense(DECADES, [Phase(100.0, 1e-9, 1.0, (0.0, 0.0), jump=True)], [WAVE], "exponential", 0.01)
+    found = fold_branches(DECADES, [Phase(100.0, 1e-9, 1.0, (0.0, 0.0), jump=True)], [WAVE], "exponential", 0.01)
     t = np.geomspace(1e-3, 100.0, 200)
     wrong = np.max(np.abs(creep(t, *frozen(DECADES, found)) / creep(t, *DECADES) - 1.0))
     assert len(found.frozen) == 2
@@ -122,7 +122,7 @@ def test_stress_of_a_wave_without_the_memory_of_a_branch(history: str, integrato
     displacements, size = HISTORIES[history]
     half = dt * steps / 2
     phases = [slide(half, dt, jump=history == "from a jump"), slide(half, dt, jump=history == "jump on the way")]
-    errors = np.array(condense(DECADES, phases, [WAVE], integrator, 1.0).memoryless_errors)
+    errors = np.array(fold_branches(DECADES, phases, [WAVE], integrator, 1.0).memoryless_errors)
     modulus = complex_modulus(1.0, *DECADES)
     moments = displacements(dt, steps)
     whole = stresses(Zener(POINT, DECADES, integrator), moments)
@@ -138,7 +138,7 @@ def test_stress_of_a_wave_without_the_memory_of_a_branch(history: str, integrato
 def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
     """A displacement that is held: the step after the jump lacks exp(-z) of the branch, over the step's modulus."""
     dt = 1e-4
-    errors = condense(DECADES, [Phase(1.0, dt, dt, (0.0, 0.0), jump=True)], [WAVE], "exponential", 1.0)
+    errors = fold_branches(DECADES, [Phase(1.0, dt, dt, (0.0, 0.0), jump=True)], [WAVE], "exponential", 1.0)
     held = [(0.0, 1.0), (dt, 1.0), (dt, 1.0)]
     whole, fewer = (stresses(Zener(POINT, DECADES, "exponential", memoryless=fast), held) for fast in ([], [0]))
     assert whole[0] == fewer[0]
@@ -155,7 +155,7 @@ def test_steps_that_outgrow_stiffer_branches() -> None:
     moments = [(dt, float(time)) for dt, time in zip(steps, np.cumsum(steps), strict=True)]
     moduli = [whole.begin(dt, Heights(np.zeros((1, 1))))[0] for dt in steps]
     wrong = np.abs(stresses(fewer, moments) - stresses(whole, moments)) / moduli / np.cumsum(steps)
-    found = condense(prony, [Phase(moments[-1][1], 1.0, 1e7, (0.0, 0.0), jump=False)], [WAVE], "exponential", 0.5)
+    found = fold_branches(prony, [Phase(moments[-1][1], 1.0, 1e7, (0.0, 0.0), jump=False)], [WAVE], "exponential", 0.5)
     assert 0.05 < wrong.max() <= found.memoryless_errors[1]
     assert 1 not in found.memoryless
 
@@ -166,7 +166,7 @@ def test_steps_that_outgrow_stiffer_branches() -> None:
 def test_tyre_at_three_metres_per_second() -> None:
     """Half a millimetre at one cell of 2 um per step: five of twelve decades of relaxation times play."""
     phases = [slide(5e-4 / 3, 1e-3 / 512 / 3, 3.0, jump=True)]
-    found = condense(TYRE, phases, [ROAD], "exponential", 1e-3)
+    found = fold_branches(TYRE, phases, [ROAD], "exponential", 1e-3)
     assert found.memoryless == (0, 1)
     assert found.kept == (2, 3, 4, 5, 6)
     assert found.frozen == (7, 8, 9, 10, 11)
@@ -175,28 +175,28 @@ def test_tyre_at_three_metres_per_second() -> None:
     assert found.bound <= 1e-3
 
 
-@pytest.mark.parametrize("accuracy", [1e-7, 1e-4, 1.5e-4, 3.3e-4, 4.1e-4, 1e-2])
-def test_errors_add_up_to_the_accuracy_at_most(accuracy: float) -> None:
+@pytest.mark.parametrize("allowed", [1e-7, 1e-4, 1.5e-4, 3.3e-4, 4.1e-4, 1e-2])
+def test_errors_add_up_to_what_is_allowed_at_most(allowed: float) -> None:
     """Half of it at most is for memoryless branches; one branch more of either kind would be too much."""
     phases = [slide(5e-4 / 3, 1e-3 / 512 / 3, 3.0, jump=True)]
-    found = condense(TYRE, phases, [ROAD], "exponential", accuracy)
+    found = fold_branches(TYRE, phases, [ROAD], "exponential", allowed)
     fast, slow = (np.array(errors) for errors in (found.memoryless_errors, found.frozen_errors))
-    assert fast[list(found.memoryless)].sum() <= accuracy / 2 < fast[: len(found.memoryless) + 1].sum()
+    assert fast[list(found.memoryless)].sum() <= allowed / 2 < fast[: len(found.memoryless) + 1].sum()
     kept = list(found.kept)
-    assert found.bound <= accuracy < found.bound + slow[kept].min()
+    assert found.bound <= allowed < found.bound + slow[kept].min()
 
 
-def test_no_accuracy_no_folding() -> None:
-    found = condense(TYRE, [slide(1e-9, 1e-9)], [ROAD], "exponential", 0.0)
+def test_no_error_allowed_no_folding() -> None:
+    found = fold_branches(TYRE, [slide(1e-9, 1e-9)], [ROAD], "exponential", 0.0)
     assert found.folded == 0
     assert found.kept == tuple(range(12))
-    assert nothing(TYRE, "why").kept == found.kept
+    assert keep_all(TYRE, "why").kept == found.kept
 
 
 @pytest.mark.parametrize("count", [0, 3])
 def test_a_body_that_has_no_time_is_elastic(count: int) -> None:
     instants = [Phase(0.0, 0.0, 0.0, (0.0, 0.0), jump=True)] * count
-    found = condense(TYRE, instants, [ROAD], "exponential", 1e-3)
+    found = fold_branches(TYRE, instants, [ROAD], "exponential", 1e-3)
     assert found.frozen == tuple(range(12))
     assert found.bound == 0.0
 
@@ -204,8 +204,8 @@ def test_a_body_that_has_no_time_is_elastic(count: int) -> None:
 def test_two_jumps_at_one_instant_wake_what_has_no_memory() -> None:
     """After one jump a branch holds all of its stress when the next comes, however fast it is."""
     later = slide(1e-3, 1e-6, 1.0)
-    one = condense(TYRE, [Phase(0.0, 0.0, 0.0, (0.0, 0.0), True), later], [ROAD], "exponential", 1e-3)
-    two = condense(TYRE, [*[Phase(0.0, 0.0, 0.0, (0.0, 0.0), True)] * 2, later], [ROAD], "exponential", 1e-3)
+    one = fold_branches(TYRE, [Phase(0.0, 0.0, 0.0, (0.0, 0.0), True), later], [ROAD], "exponential", 1e-3)
+    two = fold_branches(TYRE, [*[Phase(0.0, 0.0, 0.0, (0.0, 0.0), True)] * 2, later], [ROAD], "exponential", 1e-3)
     assert one.memoryless == (0, 1)
     assert two.memoryless == ()
 
@@ -213,14 +213,14 @@ def test_two_jumps_at_one_instant_wake_what_has_no_memory() -> None:
 def test_after_steady_sliding_nothing_is_frozen() -> None:
     """Its branches are not G u: those slower than everything have relaxed."""
     phases = [slide(5e-4 / 3, 1e-3 / 512 / 3, 3.0)]
-    found = condense(TYRE, phases, [ROAD], "exponential", 1e-3, start=(3.0, 0.0))
+    found = fold_branches(TYRE, phases, [ROAD], "exponential", 1e-3, start=(3.0, 0.0))
     assert found.frozen == ()
     assert found.memoryless == (0, 1)
 
 
 def test_a_longer_job_has_the_same_memoryless_branches() -> None:
     """So that --until never asks for what a memoryless branch remembered."""
-    chosen = [condense(TYRE, [slide(t, 1e-6, 3.0)], [ROAD], "exponential", 1e-3) for t in (1e-4, 1e-2, 1.0, 100.0)]
+    chosen = [fold_branches(TYRE, [slide(t, 1e-6, 3.0)], [ROAD], "exponential", 1e-3) for t in (1e-4, 1e-2, 1.0, 100.0)]
     assert {found.memoryless for found in chosen} == {(0, 1)}
     assert [len(found.frozen) for found in chosen] == [5, 3, 1, 0]
 
@@ -228,6 +228,6 @@ def test_a_longer_job_has_the_same_memoryless_branches() -> None:
 @pytest.mark.parametrize("bands", [[], [Band(1.0, 1.0, 1.0, (0.0, 1.0))]])
 def test_waves_that_never_pass_are_at_rest(bands: list[Band]) -> None:
     """A flat surface, or ridges along the way, give no friction: the modulus is judged."""
-    assert condense(TYRE, [slide(1.0, 1e-6)], bands, "exponential", 1e-3) == condense(
+    assert fold_branches(TYRE, [slide(1.0, 1e-6)], bands, "exponential", 1e-3) == fold_branches(
         TYRE, [slide(1.0, 1e-6, 0.0)], [WAVE], "exponential", 1e-3
     )
