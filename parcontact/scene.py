@@ -5,7 +5,6 @@ Each effect is one object handed to the march; an effect that a job does not cal
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,15 +12,16 @@ from . import job as jobs
 from .effects import decisions as calls_for
 from .effects.decisions import Decision, Effect
 from .effects.folded_branches import describe_folded_branches, fold_branches_of
+from .effects.follower import Follower
 from .effects.relaxation import relaxation_of
 from .job import Job
-from .job.timeline import Step
 from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
 from .physics import heightfile
-from .physics.body import Elastic, Heights, Zener
+from .physics.body import Elastic, Zener
 from .physics.convolution import Convolution
-from .physics.energy import ElasticEnergy, ZenerEnergy
+from .physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
+from .physics.entries import Remembers
 from .physics.folding import FoldedBranches
 from .physics.halfspace import HalfSpace
 from .physics.ledger import Ledger
@@ -32,9 +32,6 @@ from .physics.shapes import Round, Shape
 from .physics.surface import Surface, single_wave
 from .physics.units import Units
 from .solve.contact import ContactSolver
-
-Follower = Callable[[Any, Step], None]  # an effect that is told of every step: called with the march and the step made
-
 
 FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
@@ -84,7 +81,17 @@ class Scene:
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
     lasts: bool
-    followers: list[Follower] = field(default_factory=list)
+    followers: dict[str, Follower] = field(default_factory=dict)
+
+    @property
+    def parts(self) -> dict[str, Remembers]:
+        """What has a memory, by the names that checkpoints know them by."""
+        parts: dict[str, Remembers] = {"material": self.material}
+        if self.energy is not None:
+            parts["energy"] = self.energy
+            if isinstance(self.energy, ZenerEnergy) and isinstance(self.energy.inverse, ElasticPressure):
+                parts["memory"] = self.energy.inverse
+        return parts | self.followers
 
     @property
     def job(self) -> Job:
@@ -100,7 +107,8 @@ class Scene:
 
 
 FURTHER: tuple[tuple[Decision, Callable[[Scene], Follower]], ...] = (
-    # one line for each effect that follows the steps: what decides on it, what makes it for a scene
+    # one line for each effect that follows the steps: what decides on it, what makes it for a scene; in
+    # checkpoints it has the name that the decision gives it
 )
 
 
@@ -134,10 +142,10 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
-    energy = _energy(job, solver, material) if calls_for.energies(job).on else None
+    energy = _energy(base, solver, material) if calls_for.energies(job).on else None
     ledger = Ledger(slab, base.surface, base.units)
     scene = Scene(base, path, branches, material, solver, ledger, energy, calls_for.lasting(job).on)
-    scene.followers += [make(scene) for decide, make in FURTHER if decide(job).on]
+    scene.followers = {decide(job).name: make(scene) for decide, make in FURTHER if decide(job).on}
     return scene
 
 
@@ -244,19 +252,11 @@ def _preconditioner(base: Frame) -> Convolution:
     return base.half_space.inverse(fft)
 
 
-def _energy(job: Job, solver: ContactSolver, material: Elastic | Zener) -> ElasticEnergy | ZenerEnergy:
-    slab = solver.slab
+def _energy(base: Frame, solver: ContactSolver, material: Elastic | Zener) -> ElasticEnergy | ZenerEnergy:
+    slab, grid, units = base.slab, base.job.grid, base.units
+    unit = units.pressure * units.height * grid.dx * grid.dy
     if isinstance(material, Elastic):
-        return ElasticEnergy(slab)
-    if not calls_for.energy_memory(job).on:
-        inverse = solver.preconditioner
-        return ZenerEnergy(slab, material, lambda p, dt, du: inverse.apply(du, solver.w))
-    memory = Zener(slab, material.prony, material.integrator)
-
-    def creep(p: Array, dt: float, du: Array) -> Array:
-        """What `A^-1 u` has grown by: it answers to the pressure at each point as u does to `A p`."""
-        memory.begin(dt, Heights(memory.u))
-        memory.commit(p, Heights(memory.u))
-        return memory.increment
-
-    return ZenerEnergy(slab, material, creep, memory)
+        return ElasticEnergy(slab, unit)
+    if calls_for.energy_memory(base.job).on:
+        return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)
+    return ZenerEnergy(slab, material, AppliedInverse(solver.preconditioner, lambda: solver.w), unit)

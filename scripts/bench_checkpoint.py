@@ -37,8 +37,9 @@ def measure(chosen: argparse.Namespace) -> bool:
 
     from parcontact.job.sections import Checkpoint
     from parcontact.parallel.slab import Slab
+    from parcontact.physics.entries import Entry
     from parcontact.record import checkpoint
-    from parcontact.record.checkpoint import Entry, Facts
+    from parcontact.record.checkpoint import Facts
     from parcontact.record.provenance import Link, Provenance
 
     comm = MPI.COMM_WORLD

@@ -16,14 +16,15 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.effects.decisions import Effect
+from parcontact.effects.follower import Instant
 from parcontact.job import Job
-from parcontact.job.timeline import Step
-from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import Elastic, Material, Zener
+from parcontact.physics.entries import Entry, Saved
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
+from parcontact.physics.units import Units
 from parcontact.record import fields, measures
 from parcontact.run import runner
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
@@ -279,16 +280,21 @@ def test_a_new_effect(monkeypatch: pytest.MonkeyPatch) -> None:
         def __init__(self, built: scene.Scene) -> None:
             self.seen: list[int] = []
 
-        def __call__(self, march: March, step: Step) -> None:
-            assert march.row.step == step.number
-            self.seen.append(step.number)
+        def follow(self, instant: Instant) -> None:
+            assert np.all(instant.pressure >= 0.0)
+            self.seen.append(instant.step.number)
 
-    assert begun(job(title="mine")).scene.followers == []
+        def entries(self, units: Units) -> dict[str, Entry]:
+            return {}
+
+        def restore(self, saved: Saved) -> None: ...
+
+    assert begun(job(title="mine")).scene.followers == {}
     monkeypatch.setattr(scene, "FURTHER", ((titled, Follower),))
     off, on = job(history=[PRESS]), job(history=[PRESS], title="mine")
     assert [row(planned, "a new one").on for planned in (off, on)] == [False, True]
-    assert marched(off)[0].scene.followers == []
-    assert [follower.seen for follower in marched(on)[0].scene.followers] == [[1, 2, 3, 4, 5]]  # type: ignore[attr-defined]
+    assert marched(off)[0].scene.followers == {}
+    assert [each.seen for each in marched(on)[0].scene.followers.values()] == [[1, 2, 3, 4, 5]]  # type: ignore[attr-defined]
 
 
 # -- what is written --------------------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from mpi4py import MPI
 
 from parcontact import __main__
 from parcontact.job import Job
-from parcontact.march import state
 from parcontact.parallel.slab import Slab
 from parcontact.plan import elsewhere, machine, memory, trial
 from parcontact.plan.sample import Sample, Stage, chosen, sample
@@ -69,7 +68,7 @@ def test_memory(comm: MPI.Intracomm, name: str) -> None:
     march, _ = marched(planned, comm=comm)
     slab = march.scene.slab
     assert memory.total(planned, comm.size, comm.rank) == slab.tally["map bytes"]
-    maps = [np.asarray(entry.value) for entry in state.entries(march).values() if entry.is_map]
+    maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
     saved = sum(rows.nbytes + 4 * len(rows) for rows in maps)
     assert sum(slab.from_all(saved)) == memory.saved(planned)
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from test_restart import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.errors import RunError
-from parcontact.march import state
 from parcontact.march.failure import StepError
 from parcontact.march.step import March, run
 from parcontact.physics.convolution import Convolution
@@ -120,7 +119,7 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
 
 def remembered(march: March) -> dict[str, NDArray[Any]]:
     """What a step must leave alone when it fails."""
-    return {name: np.array(entry.value) for name, entry in state.entries(march).items()}
+    return {name: np.array(entry.value) for name, entry in march.entries().items()}
 
 
 @pytest.mark.parametrize("material", [ELASTIC, ZENER])

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from parcontact.march.step import March
 from parcontact.physics.body import Zener
-from parcontact.physics.energy import ZenerEnergy
+from parcontact.physics.energy import ElasticPressure, ZenerEnergy
 from parcontact.record.row import Row
 from parcontact.theory import lee_radok, westergaard
 
@@ -357,9 +357,10 @@ def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
         assert isinstance(energy, ZenerEnergy)
         assert isinstance(body, Zener)
         body.settle()
-        if energy.memory is not None:
-            energy.memory.settle()
-            assert_allclose(applied(march, energy.memory.u), body.u, rtol=0, atol=1e-12 * np.abs(body.u).max())
+        if isinstance(energy.inverse, ElasticPressure):
+            memory = energy.inverse.body
+            memory.settle()
+            assert_allclose(applied(march, memory.u), body.u, rtol=0, atol=1e-12 * np.abs(body.u).max())
         maps = [body.u, *body.branches]
         inverses = [inverse(march, index) for index in range(len(maps))]
         weights = [body.prony.modulus_inf, *(1.0 / body.prony.moduli)]
@@ -385,8 +386,9 @@ def inverse(march: March, index: int) -> np.ndarray:
     body, energy = scene.material, scene.energy
     assert isinstance(energy, ZenerEnergy)
     assert isinstance(body, Zener)
-    if energy.memory is not None:
-        return [energy.memory.u, *energy.memory.branches][index]
+    if isinstance(energy.inverse, ElasticPressure):
+        memory = energy.inverse.body
+        return [memory.u, *memory.branches][index]
     field = [body.u, *body.branches][index]
     return scene.solver.preconditioner.apply(field, np.empty_like(field))
 

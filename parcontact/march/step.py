@@ -3,21 +3,26 @@
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from ..effects.follower import Instant
 from ..job.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
-from ..physics.body import Zener
-from ..physics.energy import ElasticEnergy, ZenerEnergy
+from ..physics.body import Elastic, Zener
+from ..physics.energy import Pressed
+from ..physics.entries import Entry, Remembers, Saved
+from ..physics.units import Units
+from ..record.checkpoint import Contents
 from ..record.row import Row
 from ..scene import Scene, solver_on
 from ..solve import retry
 from ..solve.contact import Approach, Contact, MeanPressure
-from . import failure
+from . import failure, state
 from .failure import StepError
 from .rest import steps_to_make
 
@@ -59,7 +64,9 @@ class March:
         measures = self.scene.ledger.measures(contact.p, alpha, contact.u, effective, contact.d, step.position)
         self.scene.material.commit(contact.u, heights)
         self.alpha_old, self.alpha = self.alpha, alpha
-        self._account(step, contact)
+        if self.scene.energy is not None:
+            before = None if self.p_old is None else Pressed(self.p_old, self.alpha_old)
+            self.scene.energy.advance(step.dt, Pressed(contact.p, alpha), before, contact.u)
         slid = math.dist(step.position, self.position)
         self.position = step.position
         self._u, self.d = contact.u, contact.d
@@ -75,9 +82,40 @@ class March:
             seconds=time.perf_counter() - began,
             remark=remark,
         )
-        for follow in self.scene.followers:
-            follow(self, step)
+        if self.scene.followers:
+            instant = Instant(step, contact.p, alpha, self._displacement, slid, measures)
+            for follower in self.scene.followers.values():
+                follower.follow(instant)
         return self.row
+
+    def entries(self) -> dict[str, Entry]:
+        """Everything remembered after the last step, by names `part/name`; maps are the run's own, not copies."""
+        return state.entries(self._parts, self.scene.units)
+
+    def restore(self, contents: Contents) -> None:
+        """Go on from a checkpoint, before the first step; collective. Raises InputError for one that does not fit."""
+        state.restore(self._parts, self.scene, contents, self.scene.slab)
+        work, stored, lost, split = self._energies()
+        self.row = replace(
+            self.row,
+            step=contents.step,
+            time=contents.time,
+            work=work,
+            stored=stored,
+            dissipated=lost,
+            branch_dissipation=split,
+        )
+        if isinstance(self.scene.material, Elastic):
+            self._u = self.scene.solver.operator.apply(self.p, self.scene.solver.u)
+
+    @property
+    def _parts(self) -> dict[str, Remembers]:
+        return {"clock": _Clock(self), "contact": _Pressures(self), **self.scene.parts}
+
+    @property
+    def _displacement(self) -> Array:
+        material = self.scene.material
+        return material.u if isinstance(material, Zener) else self._u
 
     # -- the parts of a step ------------------------------------------------------------------------------------------
 
@@ -162,20 +200,12 @@ class March:
             self.p_old.fill(0.0)
         self._u = solver.operator.apply(solver.p, solver.u)
 
-    def _account(self, step: Step, contact: Contact) -> None:
-        energy = self.scene.energy
-        if isinstance(energy, ZenerEnergy):
-            energy.advance(step.dt, contact.p, self.alpha, self.p_old, self.alpha_old)
-        elif isinstance(energy, ElasticEnergy):
-            energy.advance(contact.p, self.alpha, contact.u)
-
     def _energies(self) -> tuple[float, float, float, tuple[float, ...]]:
         """Work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for."""
-        energy, units, grid = self.scene.energy, self.scene.units, self.scene.job.grid
+        energy = self.scene.energy
         if energy is None:
             return math.nan, math.nan, math.nan, ()
-        unit = units.pressure * units.height * grid.dx * grid.dy
-        balance = energy.balance
+        balance, unit = energy.balance, energy.unit
         lost = tuple(float(value) * unit for value in balance.dissipated)
         return balance.work * unit, balance.stored * unit, math.fsum(lost), lost
 
@@ -187,7 +217,7 @@ class March:
         scene, units = self.scene, self.scene.units
         if name == "pressure":
             return self.p * (self.alpha * units.pressure)
-        u = scene.material.u if isinstance(scene.material, Zener) else self._u
+        u = self._displacement
         if name == "displacement":
             return u * units.height
         base, offset = scene.path.at(self.position).parts
@@ -195,6 +225,50 @@ class March:
         if name == "height":
             return heights * units.height + scene.frame.surface.datum
         return (u - heights - self.d) * units.height
+
+
+class _Clock:
+    """Where a run is: its step and time are said by the checkpoint itself."""
+
+    def __init__(self, march: March) -> None:
+        self._march = march
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        march = self._march
+        return {
+            "distance": Entry(march.row.distance, 1.0, "m"),
+            "position": Entry(np.array(march.position), 1.0, "m"),
+        }
+
+    def restore(self, saved: Saved) -> None:
+        x, y = saved["position"].tolist()
+        self._march.position = (x, y)
+        self._march.row = replace(self._march.row, distance=float(saved["distance"]))
+
+
+class _Pressures:
+    """Pressures, over the modulus of their step. The earlier one is kept by no history of single solves."""
+
+    def __init__(self, march: March) -> None:
+        self._march = march
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        march, strain = self._march, units.height / units.length
+        earlier = {} if march.p_old is None else {"earlier pressure": Entry(march.p_old, strain, "1", optional=True)}
+        return {
+            "pressure": Entry(march.p, strain, "1"),
+            "modulus": Entry(march.alpha, units.modulus, "Pa"),
+            "earlier modulus": Entry(march.alpha_old, units.modulus, "Pa"),
+            "approach": Entry(march.d, units.height, "m"),
+            **earlier,
+        }
+
+    def restore(self, saved: Saved) -> None:
+        march = self._march
+        march.alpha, march.alpha_old = float(saved["modulus"]), float(saved["earlier modulus"])
+        march.d = float(saved["approach"])
+        if march.p_old is not None and "earlier pressure" not in saved:
+            march.p_old.fill(0.0)
 
 
 def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = None) -> bool:

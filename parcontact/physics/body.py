@@ -26,7 +26,9 @@ from numpy.typing import DTypeLike
 
 from ..parallel.slab import Array, Slab, allocate
 from . import loops
+from .entries import Entry, Saved
 from .prony import Prony
+from .units import Units
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,13 @@ class Elastic:
 
     def commit(self, displacement: Array, heights: Heights) -> None:
         """Nothing to remember."""
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """None."""
+        return {}
+
+    def restore(self, saved: Saved) -> None:
+        """Nothing to restore."""
 
 
 @dataclass(frozen=True)
@@ -171,17 +180,27 @@ class Zener:
         share = -np.expm1(-self.elapsed(seconds)[self.kept])
         return share, self._spring + float(self.prony.moduli[self.kept] @ (1.0 - share))
 
-    def state(self) -> dict[str, Array]:
-        """What a restart needs."""
-        self.settle()
-        maps = {f"branch {k}": branch for k, branch in zip(self.kept, self.branches, strict=True)}
-        frozen = np.array([float(k not in self._moving) for k in range(len(self.prony.moduli))])
-        return {"displacement": self.u, "frozen": frozen, **maps}
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """The displacement and the branch maps (those of branches that had none when a checkpoint was written are
+        restored without), which branches are frozen, and the branches themselves."""
+        return {
+            **self.memory(units.height, "m", units.modulus * units.height, "Pa m"),
+            "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),
+            "relaxation times": Entry(self.prony.relaxation_times, 1.0, "s", given=True),
+        }
 
-    def restore(self, state: dict[str, Array]) -> None:
-        """Go on from a `state`; a branch without a map there wakes up: of a frozen one it is `G_k u`, else 0."""
-        self.u[...] = state["displacement"]
+    def memory(self, unit: float, symbol: str, branch_unit: float, branch_symbol: str) -> dict[str, Entry]:
+        """The entries that change, with the units of the displacement and of the branch maps."""
+        self.settle()
+        frozen = np.array([float(k not in self._moving) for k in range(len(self.prony.moduli))])
+        maps = zip(self.kept, self.branches, strict=True)
+        branches = {f"branch {k}": Entry(branch, branch_unit, branch_symbol, optional=True) for k, branch in maps}
+        return {"displacement": Entry(self.u, unit, symbol), "frozen": Entry(frozen), **branches}
+
+    def restore(self, saved: Saved) -> None:
+        """A branch that has no map in `saved` begins: one that was frozen then as `G_k u`, else as 0."""
+        self.u[...] = saved["displacement"]
         for k, branch in zip(self.kept, self.branches, strict=True):
-            asleep = self.prony.moduli[k] * state["frozen"][k]
-            branch[...] = state[f"branch {k}"] if f"branch {k}" in state else asleep * self.u
+            spring = self.prony.moduli[k] * saved["frozen"][k]
+            branch[...] = saved[f"branch {k}"] if f"branch {k}" in saved else spring * self.u
         self._pending = self._still

@@ -13,12 +13,16 @@ first order in the time step.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .body import Zener
+from .body import Heights, Zener
+from .entries import Entry, Saved
+from .prony import Prony
+from .units import Units
 
 SMALL = 1e-2  # z below which differences of exponentials are summed as series, here to ten digits
 
@@ -30,6 +34,19 @@ class Balance:
     work: float = 0.0
     stored: float = 0.0
     dissipated: Array = field(default_factory=lambda: np.zeros(0))
+
+
+class Pressed(NamedTuple):
+    """The pressure `modulus p` at an instant, with its map p."""
+
+    p: Array
+    modulus: float
+
+
+class Inverse(Protocol):
+    """Displacement -> pressure of an elastic body of modulus 1; collective."""
+
+    def apply(self, field: Array, out: Array) -> Array: ...
 
 
 def dissipation_weights(z: Array) -> tuple[Array, Array, Array]:
@@ -59,46 +76,86 @@ def bend_weights(z: Array) -> tuple[Array, Array]:
 
 
 class ElasticEnergy:
-    """Energies of a body without memory: all work is stored."""
+    """Energies of a body without memory: all work is stored. `unit` [J] is that of all energies here."""
 
-    def __init__(self, slab: Slab) -> None:
-        self.slab = slab
+    def __init__(self, slab: Slab, unit: float = 1.0) -> None:
+        self.slab, self.unit = slab, unit
         self.balance = Balance()
 
-    def advance(self, p: Array, alpha: float, u: Array) -> None:
-        """After a solve for the pressure `alpha p` and the displacement u; one reduction; collective."""
-        self.balance.work = self.balance.stored = 0.5 * alpha * self.slab.sum(loops.dot(p, u))[0]
+    def advance(self, dt: float, now: Pressed, before: Pressed | None, u: Array) -> None:
+        """After a solve for a pressure and the displacement u; one reduction; collective."""
+        self.balance.work = self.balance.stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """Nothing: the work follows from the contact."""
+        return {}
+
+    def restore(self, saved: Saved) -> None:
+        """Nothing to restore."""
+
+
+class AppliedInverse:
+    """`A^-1 du` by an operator K that is the inverse of A; `scratch()` lends a map until the next solve."""
+
+    def __init__(self, inverse: Inverse, scratch: Callable[[], Array]) -> None:
+        self._inverse, self._scratch = inverse, scratch
+
+    def advance(self, dt: float, p: Array, du: Array) -> Array:
+        """`A^-1 du`; collective."""
+        return self._inverse.apply(du, self._scratch())
+
+
+class ElasticPressure:
+    """`v = A^-1 u` where the inverse of A is not at hand: the pressure that held u on an elastic body of modulus 1.
+
+    A acts on points and the relaxation on times, so that they commute: with `h_k = A m_k` the law of the body,
+
+        A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     becomes at every point
+          p = G_inf v + sum_k m_k,     dm_k/dt = G_k dv/dt - m_k/tau_k.
+
+    So v is the displacement of a second `Zener` body, whose every point obeys on its own to the pressure there.
+    """
+
+    def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
+        self.body = Zener(slab, prony, integrator)
+
+    def advance(self, dt: float, p: Array, du: Array) -> Array:
+        """What v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`; local to this rank."""
+        self.body.begin(dt, Heights(self.body.u))
+        self.body.commit(p, Heights(self.body.u))
+        return self.body.increment
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """As of a body, for strains in place of displacements."""
+        strain = units.height / units.length
+        return self.body.memory(strain, "1", units.modulus * strain, "Pa")
+
+    def restore(self, saved: Saved) -> None:
+        self.body.restore(saved)
 
 
 class ZenerEnergy:
-    """Energies of a `Zener` body, advanced after each committed step.
-
-    `creep(p, dt, du)` gives `w = A^-1 du` of the step just committed; `memory` is what it remembers, if anything.
-    """
+    """Energies of a `Zener` body, advanced after each committed step; `unit` [J] is that of all energies here."""
 
     def __init__(
-        self,
-        slab: Slab,
-        material: Zener,
-        creep: Callable[[Array, float, Array], Array],
-        memory: Zener | None = None,
+        self, slab: Slab, material: Zener, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
     ) -> None:
-        self.slab, self.material, self.creep, self.memory = slab, material, creep, memory
+        self.slab, self.material, self.inverse, self.unit = slab, material, inverse, unit
         count = len(material.prony.moduli)
         self.balance = Balance(dissipated=np.zeros(count))
         self._spring, self._branches = 0.0, np.zeros(count)  # <u, A^-1 u> and <h_k, A^-1 h_k>
 
-    def advance(self, dt: float, p: Array, alpha: float, p_old: Array | None, alpha_old: float) -> None:
-        """After a step to pressure `alpha p` from `alpha_old p_old`; one reduction; collective."""
+    def advance(self, dt: float, now: Pressed, before: Pressed | None, u: Array) -> None:
+        """After a step to the pressure `now` from `before` (None: as in a jump); one reduction; collective."""
         material, balance = self.material, self.balance
         moduli, du = material.prony.moduli, material.increment
-        w = self.creep(p, dt, du)
+        w = self.inverse.advance(dt, now.p, du)
         sums = [loops.dot(branch, w) for branch in material.branches]
-        work = loops.work(p, alpha, p if p_old is None else p_old, alpha_old, du)
+        work = loops.work(*now, *(before or now), du)
         *products, own, total, work = self.slab.sum(*sums, loops.dot(du, w), loops.dot(material.u, w), work)
-        crossed, before = np.array(products), self._branches
+        crossed, past = np.array(products), self._branches
         decay, gain = material.coefficients(dt)
-        self._branches = decay**2 * before + 2 * decay * gain * crossed + gain**2 * own
+        self._branches = decay**2 * past + 2 * decay * gain * crossed + gain**2 * own
         self._spring += 2 * total - own
         stored = 0.5 * (material.prony.modulus_inf * self._spring + float(np.sum(self._branches / moduli)))
         z = material.elapsed(dt)
@@ -106,28 +163,28 @@ class ZenerEnergy:
             balance.work += stored - balance.stored
         elif material.integrator == "exponential":
             balance.work += work + float(np.sum(_weighted(bend_weights(z), crossed, moduli * own)))
-            balance.dissipated += _weighted(dissipation_weights(z), before / moduli, crossed, moduli * own)
+            balance.dissipated += _weighted(dissipation_weights(z), past / moduli, crossed, moduli * own)
         else:
             balance.work += work
             balance.dissipated += z * self._branches / moduli
         balance.stored = stored
 
-    def state(self) -> dict[str, Array | float]:
-        """What a restart needs, in the run's units, besides `memory`."""
-        balance = self.balance
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """The balance, and the sums over the maps that it goes on from."""
+        balance, spring = self.balance, units.height**2 / units.length
         return {
-            "work": balance.work,
-            "stored": balance.stored,
-            "dissipated": balance.dissipated,
-            "spring": self._spring,
-            "branches": self._branches,
+            "work": Entry(balance.work, self.unit, "J"),
+            "stored": Entry(balance.stored, self.unit, "J"),
+            "dissipated": Entry(balance.dissipated, self.unit, "J"),
+            "spring": Entry(self._spring, spring, "m"),
+            "branches": Entry(self._branches, units.modulus**2 * spring, "Pa^2 m"),
         }
 
-    def restore(self, state: dict[str, Array | float]) -> None:
-        """Go on from a `state`."""
-        work, stored = float(state["work"]), float(state["stored"])
-        self.balance = Balance(work, stored, np.array(state["dissipated"], dtype=np.float64))
-        self._spring, self._branches = float(state["spring"]), np.array(state["branches"], dtype=np.float64)
+    def restore(self, saved: Saved) -> None:
+        """The balance and the sums."""
+        work, stored, spring = (float(saved[name]) for name in ("work", "stored", "spring"))
+        self.balance = Balance(work, stored, np.array(saved["dissipated"], dtype=np.float64))
+        self._spring, self._branches = spring, np.array(saved["branches"], dtype=np.float64)
 
 
 def _weighted(weights: tuple[Array, ...], *terms: Array) -> Array:

@@ -28,17 +28,3 @@ class Units:
     def pressure(self) -> float:
         """Of pressures [Pa]: what moves the half space by `height` over `length`."""
         return self.modulus * self.height / self.length
-
-    @property
-    def area(self) -> float:
-        return self.length**2
-
-    @property
-    def tangential_force(self) -> float:
-        """Of a pressure times a slope over an area [N]."""
-        return self.pressure * self.height / self.length * self.area
-
-    @property
-    def energy(self) -> float:
-        """Of a pressure times a displacement over an area [J]."""
-        return self.pressure * self.height * self.area

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, RunError
 from ..parallel.slab import Array, Slab
+from ..physics.entries import Entry
 from . import hdf5, layout
 from .provenance import Link, Provenance, read_chain
 
@@ -31,23 +32,6 @@ FORMAT = 1
 TITLE = "parcontact checkpoint, format "
 SEAL = 4096  # bytes set aside for it
 SUMS = "checksums"
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Something remembered: this rank's rows of a map (two dimensions), or numbers; `unit` is the SI value of 1."""
-
-    value: NDArray[Any] | float
-    unit: float = 1.0
-    symbol: str = "1"
-
-    @property
-    def is_map(self) -> bool:
-        return np.ndim(self.value) == 2
-
-    @property
-    def nbytes(self) -> int:
-        return np.asarray(self.value).nbytes
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from ..effects import decisions as calls_for
 from ..errors import InputError, RunError
 from ..job import Job, Rough
 from ..job.timeline import Timeline, reached
-from ..march import state
 from ..march import step as march
 from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab
+from ..physics.entries import Entry
 from ..record import checkpoint, plans
-from ..record.checkpoint import Entry, Facts
+from ..record.checkpoint import Facts
 from ..record.directory import Directory
 from ..record.provenance import Link, Provenance, extended
 from ..record.recorder import Recorder
@@ -53,7 +53,7 @@ def run(job: Job, slab: Slab, options: Options) -> int:
         built = scene.build(job, slab, options.until or 0.0)
         marching = March(built)
         if origin:
-            state.restore(marching, origin.contents, slab)
+            marching.restore(origin.contents)
         elif calls_for.steady_start(job).on:
             steadystart.begin(marching)
         plans.keep(job, slab)
@@ -127,7 +127,7 @@ class _Journey:
         self.console = recorder.console
         self.first, self.saved, self.failed = marching.row.step, -1, False
         self.plain = restart.plain_job(self.job) if self.slab.root else {}
-        self.watch.state_bytes = sum(entry.nbytes for entry in state.entries(marching).values()) * self.slab.comm.size
+        self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
         self.stop = ""
         self.began, self.saving = time.monotonic(), 0.0
 
@@ -187,7 +187,7 @@ class _Journey:
         began, row = time.monotonic(), self.march.row
         path = self.directory.checkpoint(row.step)
         facts = Facts(row.step, row.time, self.plain, self.provenance)
-        entries = {**state.entries(self.march), "plans/all": Entry(plans.gathered(self.slab))}
+        entries = {**self.march.entries(), "plans/all": Entry(plans.gathered(self.slab))}
         try:
             self.recorder.sync()
             checkpoint.write(path, self.slab, facts, entries)

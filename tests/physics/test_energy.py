@@ -7,7 +7,15 @@ from numpy.testing import assert_allclose
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import Heights, Zener
-from parcontact.physics.energy import Balance, ElasticEnergy, ZenerEnergy, bend_weights, dissipation_weights
+from parcontact.physics.energy import (
+    AppliedInverse,
+    Balance,
+    ElasticEnergy,
+    Pressed,
+    ZenerEnergy,
+    bend_weights,
+    dissipation_weights,
+)
 from parcontact.physics.prony import Integrator, Prony, complex_modulus
 
 BODY = Prony(0.3, np.array([0.5, 2.0, 1.0]), np.array([0.05, 0.4, 1e2]))
@@ -33,13 +41,21 @@ def test_weights_at_the_ends_are_finite(z: float) -> None:
     assert_allclose(bend_weights(np.array(z)), [-0.5, 0.5 / z] if z > 1 else [0.0, z / 12], rtol=1e-15)
 
 
+class Identity:
+    """The inverse of an operator that is 1."""
+
+    def apply(self, field: Array, out: Array) -> Array:
+        out[...] = field
+        return out
+
+
 class Driven:
     """Four points of a body whose displacements are prescribed, and its energy."""
 
     def __init__(self, integrator: Integrator) -> None:
         slab = Slab(MPI.COMM_SELF, 4, 1)
         self.zener = Zener(slab, BODY, integrator)
-        self.energy = ZenerEnergy(slab, self.zener, lambda p, dt, du: du)
+        self.energy = ZenerEnergy(slab, self.zener, AppliedInverse(Identity(), slab.empty))
         self.p, self.alpha = slab.zeros(), 1.0
 
     def to(self, u: Array, dt: float) -> Balance:
@@ -47,7 +63,7 @@ class Driven:
         alpha, effective = self.zener.begin(dt, heights)
         p = effective.copy()
         self.zener.commit(p, heights)
-        self.energy.advance(dt, p, alpha, self.p, self.alpha)
+        self.energy.advance(dt, Pressed(p, alpha), Pressed(self.p, self.alpha), u)
         self.p, self.alpha = p, alpha
         return self.energy.balance
 
@@ -153,11 +169,11 @@ def test_sums_go_over_all_ranks(comm: MPI.Intracomm) -> None:
     p += 2.0
     u += 3.0
     elastic = ElasticEnergy(slab)
-    elastic.advance(p, 0.5, u)
+    elastic.advance(0.0, Pressed(p, 0.5), None, u)
     assert elastic.balance.work == elastic.balance.stored == 0.5 * 0.5 * 6.0 * 12
     zener = Zener(slab, BODY, "exponential")
-    energy = ZenerEnergy(slab, zener, lambda p, dt, du: du)
+    energy = ZenerEnergy(slab, zener, AppliedInverse(Identity(), slab.empty))
     alpha, effective = zener.begin(0.0, Heights(u))
     zener.commit(effective.copy(), Heights(u))
-    energy.advance(0.0, effective, alpha, None, 0.0)
+    energy.advance(0.0, Pressed(effective, alpha), None, u)
     assert_allclose(energy.balance.stored, 0.5 * 12 * 9 * (BODY.modulus_inf + BODY.moduli.sum()), rtol=1e-14)

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Elastic, Heights, Zener
 from parcontact.physics.prony import Integrator, Prony, creep, normal_form, relaxation, zener_to_prony
+from parcontact.physics.units import Units
 
 POINT = Slab(MPI.COMM_SELF, 1, 1)
 MICRON = 1e-6
@@ -225,7 +226,7 @@ def test_beginning_again_with_another_step(integrator: Integrator) -> None:
 def test_state_restores_the_same_digits() -> None:
     first, second = body(TWO), body(TWO)
     push(first, 1.0, 1e-3)
-    second.restore({name: value.copy() for name, value in first.state().items()})
+    second.restore({name: np.array(entry.value) for name, entry in first.entries(Units(1.0, 1.0, 1.0)).items()})
     assert push(first, 2.0, 1e-4) == push(second, 2.0, 1e-4)
 
 

@@ -11,8 +11,9 @@ from mpi4py import MPI
 
 from parcontact.errors import InputError, RunError
 from parcontact.parallel.slab import Slab
+from parcontact.physics.entries import Entry
 from parcontact.record import checkpoint, info
-from parcontact.record.checkpoint import Contents, Entry, Facts
+from parcontact.record.checkpoint import Contents, Facts
 from parcontact.record.provenance import Link, Provenance
 
 NX, NY = 6, 9

@@ -61,9 +61,9 @@ class Periods:
         if march.row.step > 1 and (march.row.step - 1) % PERIOD == 0:
             material = march.scene.material
             assert isinstance(material, Zener)
-            branches = [value for name, value in material.state().items() if name.startswith("branch")]
+            material.settle()
             units = march.scene.units
-            maps = [march.field("displacement"), *(units.modulus * units.height * value for value in branches)]
+            maps = [march.field("displacement"), *(units.modulus * units.height * value for value in material.branches)]
             self.states.append(np.array(maps))
             self.rows.append(march.row)
 
