@@ -6,6 +6,7 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -36,13 +37,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         _refuse_alone(world)
         options = _parser().parse_args(words)
-        return int(options.act(options, world))
+        return _leave_code(int(options.act(options, world)), world)
     except (InputError, job.JobError, RunError) as error:
         code = FAILED if isinstance(error, RunError) else BAD_INPUT
         text = str(error) if isinstance(error, job.JobError) else f"parcontact: {error}"
         return _end_together(world, text, code)
     except (Exception, KeyboardInterrupt) as error:
         _end_all(world, error)
+
+
+def _leave_code(code: int, world: MPI.Intracomm) -> int:
+    """Root leaves the exit code in the file that PARCONTACT_EXIT_FILE names, for launchers that end with their own."""
+    if world.rank == 0 and (path := os.environ.get("PARCONTACT_EXIT_FILE")):
+        with suppress(OSError):
+            Path(path).write_text(f"{code}\n")
+    return code
 
 
 def _end_together(world: MPI.Intracomm, text: str, code: int) -> int:
@@ -55,7 +64,7 @@ def _end_together(world: MPI.Intracomm, text: str, code: int) -> int:
             print(f"{text} (on rank {world.rank} of {world.size} alone)", file=sys.stderr, flush=True)
             world.Abort(code)
         time.sleep(1e-3)
-    return code
+    return _leave_code(code, world)
 
 
 def _end_all(world: MPI.Intracomm, error: BaseException) -> NoReturn:

@@ -2,7 +2,6 @@
 
 import csv
 import os
-import subprocess
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -227,42 +226,3 @@ def test_help(main: Main) -> None:
     code, said, _ = main("run", "--help")
     for option in ("--restart", "--until", "--wall", "--out", "--quiet", "--set"):
         assert option in said
-
-
-SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
-STUBS = {  # each command tells what it was asked for
-    "mpirun": 'echo "mpirun $* until ${SLURM_JOB_END_TIME:-}${PARCONTACT_END_TIME:-}" >> said; exit $CODE',
-    "squeue": "date --iso-8601=seconds --date @2000000000",
-    "qstat": 'echo "    Resource_List.walltime = 01:00:08"',
-    "sbatch": 'echo "sbatch $*" >> said',
-    "qsub": 'echo "qsub $*" >> said',
-    "date": 'if [ "$*" = +%s ]; then echo 1000; else exec /bin/date "$@"; fi',
-}
-BATCH = {
-    "slurm.sh": ({"SLURM_JOB_ID": "7", "SLURM_NTASKS": "2"}, ["job.yaml", "--quiet"], "2000000000"),
-    "pbs.sh": ({"PBS_JOBID": "7", "JOB": "job.yaml --quiet"}, [], "4608"),
-}
-
-
-@pytest.mark.parametrize("script", BATCH)
-@pytest.mark.parametrize("code", [0, 1, 2, 3])
-def test_batch_scripts(tmp_path: Path, script: str, code: int) -> None:
-    """They hand the end of the job on to the program, and submit the next job exactly when that says: run again."""
-    variables, words, end = BATCH[script]
-    for name, text in STUBS.items():
-        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
-        (tmp_path / name).chmod(0o755)
-    (tmp_path / "nodes").write_text("a\na\n")
-    where = {"SLURM_SUBMIT_DIR": str(tmp_path), "PBS_O_WORKDIR": str(tmp_path), "PBS_NODEFILE": str(tmp_path / "nodes")}
-    path = {"PATH": f"{tmp_path}:/usr/bin:/bin", "PARCONTACT_BIN": str(tmp_path), "CODE": str(code)}
-    command = ["bash", str(SCRIPTS / script), *words]
-    done = subprocess.run(command, cwd=tmp_path, env={**variables, **where, **path}, capture_output=True, text=True)
-    assert done.stderr == ""
-    assert done.returncode == (0 if code == 3 else code)
-    said = (tmp_path / "said").read_text().splitlines()
-    assert said[0] == f"mpirun -n 2 {tmp_path}/parcontact job.yaml --quiet until {end}"
-    again = {
-        "slurm.sh": f"sbatch {SCRIPTS / script} job.yaml --quiet",
-        "pbs.sh": f"qsub -v JOB=job.yaml --quiet,PARCONTACT_BIN={tmp_path} {SCRIPTS / script}",
-    }
-    assert said[1:] == ([again[script]] if code == 3 else [])
