@@ -10,10 +10,11 @@ from marching import JOBS, PRONY, SLS, column, example, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from rubbers import relaxation
 
 from parcontact.march.step import March
 from parcontact.parallel.fft import BLOCK_BYTES
-from parcontact.physics.prony import Integrator, relaxation
+from parcontact.physics.prony import Integrator
 from parcontact.record import measures
 from parcontact.record.row import Row
 from parcontact.theory import full_contact

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from rubbers import complex_modulus
 
 from parcontact import job as jobs
 from parcontact import scene
@@ -12,7 +13,6 @@ from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.prony import complex_modulus
 from parcontact.solve import steady
 from parcontact.steady_sliding.sliding import Point, SteadySliding
 from parcontact.theory import cylinder_sliding, full_contact

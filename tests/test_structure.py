@@ -65,3 +65,14 @@ def test_no_module_needs_itself() -> None:
 @pytest.mark.parametrize("module", [module for module in MODULES if room(module) not in KNOW_MPI])
 def test_only_some_rooms_know_mpi(module: str) -> None:
     assert "mpi4py" not in {room(name) for name in imports(module)}
+
+
+COMPARE = {"doctor", "record", "__main__"}  # rooms that set closed forms beside results; nothing computes with them
+
+
+def test_theory_stands_alone() -> None:
+    """The oracle has nothing of ours but the moduli of a Prony series, and only what compares with it imports it."""
+    theirs = {name for module, names in OURS.items() if room(module) == "theory" for name in names}
+    assert {name for name in theirs if room(name) != "theory"} <= {"physics.prony"}
+    users = {room(module) for module, names in OURS.items() if "theory" in map(room, names)}
+    assert users - {"theory"} <= COMPARE

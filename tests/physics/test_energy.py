@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from rubbers import complex_modulus
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import Heights, Zener
@@ -16,7 +17,7 @@ from parcontact.physics.energy import (
     bend_weights,
     dissipation_weights,
 )
-from parcontact.physics.prony import Integrator, Prony, complex_modulus
+from parcontact.physics.prony import Integrator, Prony
 
 BODY = Prony(0.3, np.array([0.5, 2.0, 1.0]), np.array([0.05, 0.4, 1e2]))
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)

@@ -7,11 +7,12 @@ import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from rubbers import complex_modulus
 
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, Zener
 from parcontact.physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
-from parcontact.physics.prony import Integrator, Prony, complex_modulus, creep, normal_form
+from parcontact.physics.prony import Integrator, Prony, creep, normal_form
 from parcontact.theory import full_contact
 
 Array = NDArray[np.float64]

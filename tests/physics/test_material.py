@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from rubbers import relaxation
 
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Elastic, Heights, Zener
-from parcontact.physics.prony import Integrator, Prony, creep, normal_form, relaxation, zener_to_prony
+from parcontact.physics.prony import Integrator, Prony, creep, normal_form, zener_to_prony
 from parcontact.physics.units import Units
 
 POINT = Slab(MPI.COMM_SELF, 1, 1)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from rubbers import complex_modulus
 from scipy.integrate import quad
 
 from parcontact.errors import InputError
@@ -14,7 +15,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics import wake
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.love import love as elastic
-from parcontact.physics.prony import Prony, complex_modulus, creep_spectrum
+from parcontact.physics.prony import Prony, creep_spectrum
 
 from .maps import gathered, random_map
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rubbers import TWELVE_DECADES, ZENER, complex_modulus, relaxation
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
-from parcontact.physics.prony import Integrator, Prony, complex_modulus, discrete_modulus, relaxation
+from parcontact.physics.prony import Integrator, Prony, discrete_modulus
 from parcontact.theory import full_contact
-
-from .materials import TWELVE_DECADES, ZENER
 
 K, HEIGHT, MEAN = 2 * np.pi / 0.25e-3, 0.5e-6, 0.2e6  # wave number (rad/m), amplitude (m), mean pressure (Pa)
 ALONG, ACROSS = np.array([K]), np.array([0.0])  # kx and ky of one wave along x

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rubbers import TWELVE_DECADES, complex_modulus
 from scipy.integrate import cumulative_simpson, simpson
 from scipy.special import erf
 
-from parcontact.physics.prony import complex_modulus
 from parcontact.theory import full_contact, persson
 from parcontact.theory.full_contact import Waves
-
-from .materials import TWELVE_DECADES
 
 K_LONG, K_SHORT, SLOPE = 2 * np.pi * 4 / 1e-3, 2 * np.pi * 128 / 1e-3, 0.02  # rad/m, rad/m, root mean square
 PRESSURE = 0.1e6  # Pa

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rubbers import ZENER
 from scipy.integrate import quad
 
 from parcontact.theory import westergaard
-
-from .materials import ZENER
 
 AMPLITUDE, WAVELENGTH = 0.5e-6, 0.25e-3  # m
 WAVE = (AMPLITUDE, WAVELENGTH, 2.75e6)  # and the shear modulus (Pa)

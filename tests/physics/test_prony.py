@@ -1,10 +1,16 @@
-"""Relaxation, creep, complex and discrete moduli against tables, each other and a march of a single point."""
+"""Relaxation, creep, complex and discrete moduli against tables, differential equations, integrals and a march.
+
+The march is that of a single point, by the recursions of the two integrators.
+"""
 
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+import rubbers
 from numpy.testing import assert_allclose
+from rubbers import TWELVE_DECADES, ZENER
+from scipy.integrate import quad, solve_ivp
 
 from parcontact.physics.prony import (
     Integrator,
@@ -18,8 +24,6 @@ from parcontact.physics.prony import (
     relaxation_integral,
     zener_to_prony,
 )
-
-from .materials import TWELVE_DECADES, ZENER
 
 Drive = Callable[[float], float]
 
@@ -53,6 +57,61 @@ class Point:
         stiffness = self.material.modulus_inf + gain.sum()
         self.displace((pressure + gain.sum() * self.displacement - keep @ self.memory) / stiffness, dt)
         return self.displacement
+
+
+# equations and integrals
+
+BODY = Prony(0.4, np.array([2.0, 0.5, 1.5]), np.array([0.03, 0.4, 5.0]))
+TIMES = np.array([0.0, 0.01, 0.1, 1.0, 3.0, 10.0])
+
+
+def stress_after_a_step(strain_rate: float, strain: float) -> np.ndarray:
+    """Stresses at TIMES of springs and dashpots, by a solver of `dh/dt = G du/dt - h/tau`; to 1e-9 of the largest."""
+
+    def rates(t: float, h: np.ndarray) -> np.ndarray:
+        return BODY.moduli * strain_rate - h / BODY.relaxation_times
+
+    tight = {"rtol": 1e-11, "atol": 1e-13}
+    h = solve_ivp(rates, (0.0, TIMES[-1]), BODY.moduli * strain, "DOP853", TIMES, **tight).y
+    return np.asarray(BODY.modulus_inf * (strain + strain_rate * TIMES) + h.sum(axis=0))
+
+
+def test_relaxation_solves_the_equation_of_the_branches() -> None:
+    assert_allclose(relaxation(TIMES, *BODY), stress_after_a_step(0.0, 1.0), rtol=1e-8)
+    assert_allclose(relaxation_integral(TIMES, *BODY), stress_after_a_step(1.0, 0.0), rtol=1e-8, atol=1e-12)
+
+
+def test_creep_solves_the_equation_of_the_branches() -> None:
+    """Of unit stress: `G_inf du/dt + sum dh/dt = 0`, with the rates above; the solver is asked for 1e-11."""
+    glass = BODY.modulus_inf + BODY.moduli.sum()
+
+    def rates(t: float, state: np.ndarray) -> np.ndarray:
+        rate = np.sum(state[1:] / BODY.relaxation_times) / glass
+        return np.array([rate, *(BODY.moduli * rate - state[1:] / BODY.relaxation_times)])
+
+    start = np.array([1.0, *BODY.moduli]) / glass
+    u = solve_ivp(rates, (0.0, TIMES[-1]), start, "DOP853", TIMES, rtol=1e-11, atol=1e-13).y[0]
+    assert_allclose(creep(TIMES, *BODY), u, rtol=1e-8)
+
+
+@pytest.mark.parametrize("omega", [0.1, 1.0, 40.0, -3.0])
+def test_complex_modulus_is_a_fourier_integral(omega: float) -> None:
+    """`G_inf + i omega int_0^inf (G(t) - G_inf) exp(-i omega t) dt` by quadrature of oscillations, to 1e-8."""
+
+    def memory(t: float) -> float:
+        return float(rubbers.relaxation(t, *BODY)) - BODY.modulus_inf
+
+    even, odd = (quad(memory, 0, np.inf, weight=kind, wvar=abs(omega), limlst=500)[0] for kind in ("cos", "sin"))
+    expected = BODY.modulus_inf + 1j * omega * (even - 1j * np.sign(omega) * odd)
+    assert_allclose(complex_modulus(omega, *BODY), expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("material", [BODY, ZENER, TWELVE_DECADES])
+def test_functions_are_what_they_are_defined_as(material: Prony) -> None:
+    """Term by term, to rounding; the tests of `theory` compare with these definitions."""
+    times, omega = np.geomspace(1e-10, 1e4, 29), np.geomspace(1e-6, 1e10, 33)
+    assert_allclose(relaxation(times, *material), rubbers.relaxation(times, *material), rtol=1e-14)
+    assert_allclose(complex_modulus(omega, *material), rubbers.complex_modulus(omega, *material), rtol=1e-13)
 
 
 # tables for one Zener branch
