@@ -253,6 +253,8 @@ def _check(options: argparse.Namespace, world: MPI.Intracomm) -> int:
     loaded = _load(options, world)
     if world.rank == 0:
         print(job.describe(loaded))
+        if loaded.included:
+            print(f"\n{loaded.included}")
         for warning in loaded.warnings:
             print(f"warning: {warning}")
     return DONE

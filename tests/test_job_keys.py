@@ -215,11 +215,10 @@ OTHERS = {
     ),
     "checkpoint: {keep: 0}": "5:20: checkpoint.keep must be a positive whole number of checkpoints, got 0",
     "steady: {velocities: '1:2'}": (
-        "5:22: steady.velocities must be numbers or a range first:last:count like 1e-3:1e2:31, both positive, got '1:2'"
+        "5:22: steady.velocities must be numbers or a range first:last:count like 1e-3:1e2:31, got '1:2'"
     ),
     "steady: {velocities: 0:2:3}": (
-        "5:22: steady.velocities must be numbers or a range first:last:count like 1e-3:1e2:31, both positive, "
-        "got '0:2:3'"
+        "5:22: steady.velocities must be a range first:last:count with first and last positive, got '0:2:3'"
     ),
     "steady: {velocities: [1, -2]}": (
         "5:26: steady.velocities.1 must be positive speeds [m/s]: a list, or first:last:count, got -2"

@@ -171,9 +171,9 @@ def write(path: str, text: str) -> None:
     Path(path).write_text(text, encoding="utf-8")
 
 
-def test_include_by_name_from_a_folder_above() -> None:
-    write("materials/rubber.yaml", COMPOUND)
-    job = job_of(with_material("{include: rubber, poisson: 0.4}"), path="paper/figures/fig.yaml")
+def test_include_by_name() -> None:
+    write("paper/materials/rubber.yaml", COMPOUND)
+    job = job_of(with_material("{include: rubber, poisson: 0.4}"), path="paper/fig.yaml")
     assert (job.material.model, job.material.poisson, job.material.modulus_inf) == ("zener", 0.4, 1e6)
     assert [branch.modulus for branch in job.material.branches] == [3e6, 2e6]
     assert "include" not in job.resolved()
@@ -246,13 +246,13 @@ def test_included_files_that_are_no_material(content: str, mistake: str) -> None
 def test_an_include_that_is_not_there() -> None:
     must = "material.include must name a material file"
     assert mistakes_of(with_material("{include: rubbr}")) == [
-        f"job.yaml:3:21: {must}, got 'rubbr' (looked for materials/rubbr.yaml from the job file upwards, and "
-        "among the program's own: synthetic_tyre)"
+        f"job.yaml:3:21: {must}, got 'rubbr' (looked for rubbr.yaml and materials/rubbr.yaml beside the "
+        "job file, and among the program's own: synthetic_tyre)"
     ]
     assert mistakes_of(with_material("{include: no/m.yaml, poisson: 9}")) == [
         f"job.yaml:3:21: {must}, got 'no/m.yaml' (looked from the job file)"
     ]
     assert mistakes_of(SMALL, "material.include=3") == [
-        f"--set material.include=3: {must}, got 3 (looked for materials/3.yaml from the job file upwards, and "
-        "among the program's own: synthetic_tyre)"
+        f"--set material.include=3: {must}, got 3 (a name or a path; among the "
+        "program's own: synthetic_tyre)"
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, NoReturn
 
@@ -11,6 +12,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from .source import Key
 
+MAX_WORD = 40  # characters of a word that may be a misspelt one
 AT_VALUE, AT_KEY = "at value", "at key"  # the types of our errors within pydantic
 
 
@@ -42,8 +44,19 @@ def quote(value: Any) -> str:
     """A value as it is shown after "got"."""
     if value is None or isinstance(value, dict):
         return "nothing" if value is None else "a mapping"
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    text = str(value).lower() if isinstance(value, bool) else _BOUNDED.repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _bounded() -> reprlib.Repr:
+    """A `repr` that never writes out all of something large."""
+    bounded = reprlib.Repr()
+    bounded.maxlist = bounded.maxtuple = bounded.maxdict = bounded.maxset = 60
+    bounded.maxstring = bounded.maxlong = bounded.maxother = 500
+    return bounded
+
+
+_BOUNDED = _bounded()
 
 
 def choices(words: Iterable[str]) -> str:
@@ -53,6 +66,8 @@ def choices(words: Iterable[str]) -> str:
 
 def did_you_mean(word: Any, words: Iterable[str]) -> str:
     """The ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
+    if len(str(word)) > MAX_WORD:
+        return ""
     known = {candidate.lower(): candidate for candidate in words}
     close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.65)
     return f"; did you mean {known[close[0]]}?" if close else ""

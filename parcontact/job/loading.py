@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from .fault import quote
-from .source import Key, Mistake, Place, Source, parse, read
+from .source import Key, Mistake, Place, Source, shorten
+from .yamltext import parse, read, read_with_content
 
 MATERIAL: Key = ("material",)
 INCLUDE: Key = ("material", "include")
@@ -22,25 +24,42 @@ class Override(NamedTuple):
     place: Place
 
 
-def read_job(path: Path, overrides: tuple[str, ...]) -> Source:
-    """The source of a job with its overrides and its included material."""
+class Included(NamedTuple):
+    """A file that a job includes: its absolute path, and the SHA-256 of what was read from it."""
+
+    path: Path
+    sha256: str
+
+    def __str__(self) -> str:
+        return f"material: included from {self.path} (SHA-256 {self.sha256})"
+
+
+def read_job(path: Path, overrides: tuple[str, ...]) -> tuple[Source, Included | None]:
+    """The source of a job with its overrides and its included material, and the file of that."""
     source = read(path, str(path))
     if () in source.broken:
         source.data = None
     parsed = [_parse(text, source) for text in overrides]
     wanted = [override for override in parsed if override is not None]
     early = [override for override in wanted if override.path in (MATERIAL, INCLUDE)]
+    before = tuple(_given(source))
     for override in early:
         _apply(source, override)
-    _include(source, path)
+    included = _include(source, path, () if "include" in before else before)
     for override in wanted:
         if override not in early:
             _apply(source, override)
-    return source
+    return source, included
+
+
+def _given(source: Source) -> dict[str, Any]:
+    """The keys of the material as the job file has them."""
+    found = source.data.get("material") if isinstance(source.data, dict) else None
+    return found if isinstance(found, dict) else {}
 
 
 def _parse(text: str, source: Source) -> Override | None:
-    place = Place(f"--set {text}")
+    place = Place(f"--set {shorten(text)}")
     name, equals, value = text.partition("=")
     keys = [key.strip() for key in name.split(".")]
     if not equals or not all(keys):
@@ -99,29 +118,37 @@ def _step(source: Source, node: Any, name: str | int, path: Key, override: Overr
     return None
 
 
-def _include(source: Source, job: Path) -> None:
-    """Replaces `material: {include: name, ...}` by the keys of the included file and those given beside it."""
-    beside = source.data.get("material") if isinstance(source.data, dict) else None
-    if not isinstance(beside, dict) or beside.get("include") is None:
-        return
+def _include(source: Source, job: Path, own: tuple[str, ...]) -> Included | None:
+    """Replaces `material: {include: name, ...}` by the keys of the included file and those given beside it.
+
+    `own` are the keys of a material that the job file describes without an include.
+    """
+    beside = _given(source)
+    if beside.get("include") is None:
+        return None
     name = beside.pop("include")
+    place = source.place(INCLUDE)
     found = _find(name, job)
-    if found is None:
-        own = ", ".join(sorted(path.stem for path in OURS.glob("*.yaml")))
-        upwards = f"for materials/{name}.yaml from the job file upwards, and among the program's own: {own}"
-        where = "from the job file" if _is_path(name) else upwards
-        sentence = f"material.include must name a material file, got {quote(name)} (looked {where})"
-        source.mistakes.append(Mistake(source.place(INCLUDE), sentence))
+    if isinstance(found, str):
+        source.mistakes.append(
+            Mistake(place, f"material.include must name a material file, got {quote(name)} ({found})")
+        )
         source.broken.add(MATERIAL)
-        return
-    included = _unwrapped(read(found, _shown(found)))
+        return None
+    content, included = read_with_content(found, _shown(found))
+    included = _unwrapped(included)
     if not isinstance(included.data, dict):
         if () not in included.broken:
             included.mistakes.append(Mistake(included.place(()), "must be one mapping with the keys of a material"))
         included.broken.add(())
         included.data = {}
+    if hidden := [key for key in own if key in included.data and key in beside]:
+        sentence = f"has no effect on {', '.join(hidden)}, which the job gives itself"
+        advice = f"use --set material={{include: {name}}} to replace the material"
+        source.mistakes.append(Mistake(place, f"{sentence}; {advice}"))
     source.data["material"] = {**included.data, **beside}
     _merge_places(source, included, beside)
+    return Included(found.absolute(), hashlib.sha256(content).hexdigest())
 
 
 def _merge_places(source: Source, included: Source, beside: dict[str, Any]) -> None:
@@ -147,18 +174,25 @@ def _is_path(name: Any) -> bool:
     return isinstance(name, str) and name.endswith((".yaml", ".yml"))
 
 
-def _find(name: Any, job: Path) -> Path | None:
-    """The file that an include means: a path from the job file, or the first materials/<name>.yaml on the way up, or a
-    compound that comes with the program."""
-    if not isinstance(name, str):
-        return None
+def _find(name: Any, job: Path) -> Path | str:
+    """The file that an include means, or else where it was looked for: a path from the job file; a name in the job's
+    own directory, in materials/ there, or among the compounds that come with the program."""
     directory = job.absolute().parent
-    if _is_path(name):
-        candidates = [directory / Path(name).expanduser()]
-    else:
-        candidates = [folder / "materials" / f"{name}.yaml" for folder in (directory, *directory.parents)]
-        candidates.append(OURS / f"{name}.yaml")
-    return next((candidate for candidate in candidates if candidate.is_file()), None)
+    own = f"among the program's own: {', '.join(sorted(path.stem for path in OURS.glob('*.yaml')))}"
+    if not isinstance(name, str):
+        return f"a name or a path; {own}"
+    try:
+        if _is_path(name):
+            candidates, where = [directory / Path(name).expanduser()], "looked from the job file"
+        else:
+            file = f"{name}.yaml"
+            candidates = [directory / file, directory / "materials" / file, OURS / file]
+            where = f"looked for {shorten(name)}.yaml and materials/{shorten(name)}.yaml beside the job file, and {own}"
+        return next(
+            (candidate for candidate in candidates if candidate.is_file() and candidate != job.absolute()), where
+        )
+    except (OSError, RuntimeError) as error:  # a name that is too long, a user that does not exist
+        return shorten(getattr(error, "strerror", None) or str(error))
 
 
 def _shown(path: Path) -> str:

@@ -14,16 +14,20 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
-from . import advice, table
+from . import advice, limits, table
 from .fault import Fault, faults_of
 from .history import Initial, Stage, Steady
-from .loading import read_job
+from .loading import Included, read_job
 from .material import Elastic, Material, Zener
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
-from .source import Key, Mistake, Source, dump
+from .source import Key, Mistake, Source, shorten
 from .surface import Rough, Shape
 from .timeline import Timeline
+from .yamltext import dump
+
+MANY_MISTAKES = 40  # more are not shown one by one
+SHOWN_MISTAKES = 20  # of so many
 
 
 class JobError(Exception):
@@ -97,6 +101,7 @@ class Job(Part):
     steady: Steady | None = None
 
     _path: Path = PrivateAttr(default=Path("job.yaml"))
+    _included: Included | None = PrivateAttr(default=None)
 
     rules = (
         Rule(("grid", "numerics"), _kernel_fits),
@@ -105,6 +110,12 @@ class Job(Part):
         Rule(("history", "steady"), _some_history),
         Rule(("history", "initial"), _some_load),
         Rule(("initial", "material"), _steady_at_rest),
+        Rule(("grid",), limits.of_grid),
+        Rule(("grid", "surface"), limits.of_surface),
+        Rule(("material",), limits.of_material),
+        Rule(("grid", "material", "history"), limits.of_loads),
+        Rule(("grid", "material", "initial", "steady"), limits.of_states),
+        Rule(("grid", "history"), limits.of_steps),
     )
 
     @classmethod
@@ -120,9 +131,9 @@ class Job(Part):
         return data
 
     def model_post_init(self, context: Any) -> None:
-        """Keeps the path of the job file."""
+        """Keeps the path of the job file, and that of its material."""
         if isinstance(context, Context):
-            self._path = context.path
+            self._path, self._included = context.path, context.included
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Job) and dict(self) == dict(other)
@@ -134,6 +145,11 @@ class Job(Part):
     def path(self) -> Path:
         """The job file (absolute)."""
         return self._path
+
+    @property
+    def included(self) -> Included | None:
+        """The file from which the material comes, if it is not in the job file."""
+        return self._included
 
     @property
     def directory(self) -> Path:
@@ -166,30 +182,38 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
 
 def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Job:
     """Reads a job file; `overrides` are texts like `grid.points=512`. Raises JobError with every mistake."""
-    source = read_job(Path(path), tuple(overrides))
+    source, included = read_job(Path(path), tuple(overrides))
     if () not in source.broken:
         try:
-            job = Job.model_validate(source.data, context=Context(Path(path).absolute()))
+            job = Job.model_validate(source.data, context=Context(Path(path).absolute(), included))
             if not source.mistakes:
                 return job
         except ValidationError as error:
             source.mistakes += _mistakes(source, error)
     ordered = sorted(source.mistakes, key=lambda mistake: (mistake.place.origin != str(path), mistake.place))
-    raise JobError(list(dict.fromkeys(map(str, ordered))))
+    raise JobError(_first(list(dict.fromkeys(map(str, ordered)))))
+
+
+def _first(mistakes: list[str]) -> list[str]:
+    """All mistakes, or the first of them and a count where they are more than anybody reads."""
+    if len(mistakes) <= MANY_MISTAKES:
+        return mistakes
+    return [*mistakes[:SHOWN_MISTAKES], f"... and {len(mistakes) - SHOWN_MISTAKES} more mistakes"]
 
 
 def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
     """The faults that the sections found, at their places; not those about data that could not be read."""
+    untrusted = source.untrusted()
     for fault in faults_of(error):
         path = source.written(fault.path)
-        if any(path[: len(broken)] == broken[: len(path)] for broken in source.broken):
+        if path in untrusted or source.within_broken(path):
             continue
         place = source.key_place(path) if fault.at_key else source.place(path)
         yield Mistake(place, f"{_name(path)} {fault.predicate}")
 
 
 def _name(path: Key) -> str:
-    return ".".join(map(str, path)) or "the job"
+    return ".".join(shorten(str(step)) for step in path) or "the job"
 
 
 def describe(job: Job) -> str:

@@ -18,13 +18,17 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from .fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
+from .loading import Included
+from .source import shorten
 
 
 @dataclass(frozen=True)
 class Context:
-    """What a section may need to know about the job file: its absolute path."""
+    """What a section may need to know about the job file: its absolute path, and the file of its material if it
+    includes one."""
 
     path: Path
+    included: Included | None = None
 
 
 class Rule(NamedTuple):
@@ -66,7 +70,8 @@ class Part(BaseModel):
             return data
         if not isinstance(data, dict):
             refuse(Fault(f"must be a mapping of keys, got {quote(data)}"))
-        given = {key: value for key, value in data.items() if value is not None}  # an empty value is an absent key
+        known = cls.words()  # an empty value is an absent key, but no excuse for one that there is not
+        given = {key: value for key, value in data.items() if value is not None or key not in known}
         attempt = Attempt(cls, given, cls.filled(dict(given), info.context), info.context)
         faults = list(attempt.faults(handler))
         if faults:
@@ -127,7 +132,7 @@ class Attempt:
 
     def unknown(self, word: str) -> str:
         """What to say about a key that the part does not have."""
-        words = self.kind.words()
+        words, word = self.kind.words(), shorten(word)
         what = f"is not a key of {self.kind.label}" if self.kind.label else "is not a known key"
         return what + (did_you_mean(word, words) or f"; there are {', '.join(words)}")
 
@@ -153,7 +158,9 @@ class Attempt:
         if not wrong:
             return self.validated(_annotated(field), self.filled[name])
         item, *more = get_args(field.annotation) or (None,)
-        if more != [...] or not all(len(loc) > 1 and isinstance(loc[1], int) for loc in wrong):
+        if more != [...] or not isinstance(self.filled.get(name), list):
+            return WRONG
+        if not all(len(loc) > 1 and isinstance(loc[1], int) for loc in wrong):
             return WRONG
         bad = {loc[1] for loc in wrong}
         return tuple(None if i in bad else self.validated(item, value) for i, value in enumerate(self.filled[name]))

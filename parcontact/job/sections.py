@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from .fault import Fault
 from .part import Context, Part, Rule
-from .values import Count, Flag, Positive, both, listed
+from .values import Count, Flag, Positive, both, from_home, listed
 
 
 class Grid(Part):
@@ -76,16 +76,16 @@ def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
         yield Fault("needs energy: true", ("branch_dissipation",))
 
 
-def _no_repeats(fields: tuple[str, ...]) -> Iterator[Fault]:
+def _no_repeats(fields: tuple[str | None, ...]) -> Iterator[Fault]:
     for index, name in enumerate(fields):
-        if name in fields[:index]:
+        if name is not None and name in fields[:index]:
             yield Fault(f"names {name} a second time", ("fields", index))
 
 
 class Output(Part):
     """What is written, where, and how often. A relative directory starts at the working directory."""
 
-    directory: Path = Field(
+    directory: Annotated[Path, AfterValidator(from_home)] = Field(
         default=Path("out"), description="the path of a directory (text)"
     )  # default: out/<job file stem>
     fields: Annotated[tuple[FieldName, ...], BeforeValidator(listed)] = Field(

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from .fault import Fault, refuse
 from .part import Context, Part, Rule, chosen
-from .values import Natural, Positive, Real, Whole
+from .values import Positive, Real, Seed, Whole, from_home
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
@@ -46,7 +46,7 @@ class Rough(Part):
     rms_slope: Annotated[Positive | None, Field(description="a positive rms slope [-]")] = None
     rms_height: Annotated[Positive | None, Field(description="a positive rms height [m]")] = None
     psd_constant: Annotated[Positive | None, Field(description="a positive spectral constant [m^4]")] = None
-    seed: Annotated[Natural, Field(description="a whole number of zero or more")] = 0
+    seed: Annotated[Seed, Field(description="a whole number of zero or more")] = 0
     amplitudes: Literal["random", "fixed"] = "random"
 
     one_of = (("rms_slope", "rms_height", "psd_constant"),)
@@ -93,10 +93,12 @@ class Wave(Part):
 
 def _surface_file(path: Path, info: ValidationInfo) -> Path:
     """The absolute path of a file of heights; relative ones start at the job file."""
-    path = path.expanduser()
+    path = from_home(path)
     found = (info.context.path.parent if info.context else Path.cwd()) / path
     if path.suffix not in FILE_KINDS:
         refuse(Fault(f"must end in {' or '.join(FILE_KINDS)}, got {str(path)!r}"))
+    if found.exists() and not (found.is_file() or found.is_dir()):
+        refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
     if not found.is_file():
         refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
     return found

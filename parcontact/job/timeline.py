@@ -9,9 +9,11 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from .history import GeometricStep, Ramp, Stage
+from .limits import first_step
 from .sections import Grid
 
 ROUND_OFF = 1e-9  # relative: a duration this close to a whole number of steps is one
+MANY = 10**12  # steps of a stage, of which one is too little to be told from the end
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
 
@@ -39,16 +41,6 @@ class Step(NamedTuple):
         return self.dt == 0.0
 
 
-def time_step(stage: Stage, grid: Grid) -> float:
-    """The (first) time step [s] that a stage asks for, before steps are fitted to its end."""
-    if stage.cells_per_step is not None:
-        cell = math.hypot(stage.velocity[0] / stage.speed * grid.dx, stage.velocity[1] / stage.speed * grid.dy)
-        return stage.cells_per_step * cell / stage.speed
-    if isinstance(stage.time_step, GeometricStep):
-        return stage.time_step.first
-    return stage.time_step or 0.0
-
-
 def reached(time: float, until: float) -> bool:
     """Whether a time is the one asked for, or later."""
     return time >= until * (1.0 - ROUND_OFF)
@@ -67,14 +59,19 @@ class Fractions:
     def __getitem__(self, index: int) -> float:
         """The end of step `index`, from 1; 0 is the start of the stage."""
         if index > self.count:
-            return 1.0 + (index - self.count) * (1.0 - self[self.count - 1])
+            return 1.0 + (index - self.count) * self.last
         if self.growth == 1.0 or index == self.count:
             return index / self.count
         return math.expm1(index * math.log(self.growth)) / math.expm1(self.count * math.log(self.growth))
 
+    @property
+    def last(self) -> float:
+        """How much the last step is of the stage; more than nothing, however many there are."""
+        return max(1.0 - self[self.count - 1], 1.0 / self.count) if self.count > MANY else 1.0 - self[self.count - 1]
+
     def beyond(self, until: float) -> int:
         """How many more steps it takes to reach the fraction `until`."""
-        step = 1.0 - self[self.count - 1]
+        step = self.last
         more = max(0, math.ceil((until * (1.0 - ROUND_OFF) - 1.0) / step) - 1)
         while not reached(self[self.count + more], until):
             more += 1
@@ -85,7 +82,7 @@ def divided(stage: Stage, grid: Grid) -> Fractions:
     """The steps of a stage: none is longer than asked for, and an instantaneous stage has none."""
     if stage.seconds == 0.0:
         return Fractions(0)
-    steps = stage.seconds / time_step(stage, grid)
+    steps = stage.seconds / first_step(stage, grid)
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     if growth == 1.0:
         return Fractions(max(1, math.ceil(steps * (1.0 - ROUND_OFF))))
@@ -242,7 +239,10 @@ class Timeline:
             worst = abs(start - round(start)) + abs(each - round(each)) * span.count
             if span.ends.growth == 1.0 and not span.stage.velocity[1] and worst < WHOLE / 2:
                 continue
-            for step in (span.step(number) for number in range(span.before + span.jumps + 1, span.last + 1)):
+            first = span.before + span.jumps + 1
+            if span.ends.growth == 1.0 and not span.stage.velocity[1] and (off := abs(each - round(each))):
+                first += max(0, int((WHOLE - abs(start - round(start))) / off) - 2)  # none before can be that far off
+            for step in (span.step(number) for number in range(first, span.last + 1)):
                 cells = step.position[0] / grid.dx
                 if step.position[1] != 0.0 or abs(cells - round(cells)) >= WHOLE:
                     return step

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from .fault import Fault, quote, refuse
+from .source import shorten
+
+MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
+MOST_SEED = 2**128 - 1
+LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
 
 
 def _whole(value: Any) -> Any:
@@ -27,11 +35,33 @@ def listed(value: Any) -> Any:
     return value if isinstance(value, list | tuple) else (value,)
 
 
+def _countable(value: int) -> int:
+    if abs(value) > MOST:
+        refuse(Fault(f"must be at most {MOST}, got {quote(value)}"))
+    return value
+
+
+def _seed(value: int) -> int:
+    if value > MOST_SEED:
+        refuse(Fault(f"must be at most 2^128 - 1, got {quote(value)}"))
+    return value
+
+
+def from_home(path: Path) -> Path:
+    """A path whose leading ~ or ~user is replaced; one that names nobody, or is too long for any file, is a fault."""
+    if len(str(path)) > LONGEST_NAME or any(len(part.encode()) > 255 for part in path.parts):
+        refuse(Fault(f"must be the name of a file, got {len(str(path))} characters, {shorten(str(path), 40)!r}"))
+    try:
+        return path.expanduser()
+    except RuntimeError:
+        refuse(Fault(f"must be the name of a file, got {str(path)!r}: there is no such user"))
+
+
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
-Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole)]
-Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole)]
-Natural = Annotated[int, Field(strict=True, ge=0), BeforeValidator(_whole)]
+Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(_countable)]
+Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(_countable)]
+Seed = Annotated[int, Field(strict=True, ge=0), BeforeValidator(_whole), AfterValidator(_seed)]
 Flag = Annotated[bool, Field(strict=True)]
 Vector = Annotated[tuple[Real, Real], BeforeValidator(along_x)]

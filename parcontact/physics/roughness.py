@@ -65,13 +65,19 @@ class Roughness:
             return float(np.sqrt(self.psd_constant / (size[0] * size[1])))
         raise ValueError("one of rms_slope, rms_height and psd_constant is needed")
 
+    def _key(self, index_x: int) -> list[int]:
+        """Of the stream of the waves with one wavenumber along x; a seed of more than 64 bits is hashed with it."""
+        if self.seed < 2**64:
+            return [self.seed, index_x]
+        return np.random.SeedSequence([self.seed, index_x]).generate_state(2, np.uint64).tolist()
+
     def _random(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
         """Complex random amplitudes of mean square 1 (modulus 1 if they are fixed) for the waves within the limits."""
         waves = np.zeros(fft.shape, dtype=np.complex128)
         last_x, last_y = (int(length / self.short_wavelength) for length in size)
         index_y = _alternating(min(last_y, (fft.my - 1) // 2))
         for column, index_x in enumerate(range(fft.columns.start, min(fft.columns.stop, last_x + 1))):
-            stream = np.random.Generator(np.random.Philox(key=[self.seed, index_x]))
+            stream = np.random.Generator(np.random.Philox(key=self._key(index_x)))
             phase, square = stream.random((index_y.size, 2)).T
             modulus = np.sqrt(-np.log1p(-square)) if self.random_amplitudes else 1.0
             amplitude = modulus * np.exp(2j * np.pi * phase)

@@ -43,10 +43,12 @@ class Link:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a file is to say of its origin: the chain of runs up to the present one, and the seeds of its roughness."""
+    """What a file is to say of its origin: the chain of runs up to the present one, the seeds of its roughness, and the
+    file that its job includes."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
+    included: str = ""
 
     def write(self, file: h5py.File) -> None:
         """Attributes of the file: program, resolved job (YAML), chain (JSON), ranks, seeds, libraries, references."""
@@ -55,7 +57,10 @@ class Provenance:
         file.attrs["job"] = now.job
         file.attrs.create("chain", _fixed(self.chain, now.job))
         file.attrs["ranks"] = now.ranks
-        file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64)
+        small = all(seed < 2**63 for seed in self.seeds)
+        file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64) if small else [str(seed) for seed in self.seeds]
+        if self.included:
+            file.attrs["included"] = self.included
         versions = {name: metadata.version(name) for name in LIBRARIES}
         versions = {"python": platform.python_version(), "hdf5": h5py.version.hdf5_version, **versions}
         file.attrs["libraries"] = json.dumps(versions)

@@ -55,11 +55,11 @@ class Recorder:
 
     def _begin_fields(self, job: Job, provenance: Provenance, total: int, after: int | None) -> FieldsFile | None:
         path, output = self.path / "fields.h5", job.output
-        steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), *([total] if total else [])})
-        if not calls_for.fields(job).on or not steps:
+        if not calls_for.fields(job).on or not total:
             if after is not None:
                 fields.cut_back(path, self.slab, after)
             return None
+        steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), total})
         file = FieldsFile(path, self.slab, job.grid.size, output.fields, steps)
         if after is None:
             file.make(provenance)

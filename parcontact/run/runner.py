@@ -89,7 +89,8 @@ def _nothing_to_do(origin: Origin, timeline: Timeline, until: float | None) -> s
 def _provenance(job: Job, slab: Slab, origin: Origin | None) -> Provenance:
     link = Link(job.resolved(), slab.comm.size, origin.contents.step if origin else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough))
-    return Provenance(extended(origin.contents.chain if origin else (), link), seeds)
+    chain = extended(origin.contents.chain if origin else (), link)
+    return Provenance(chain, seeds, str(job.included) if job.included else "")
 
 
 def _begin(
@@ -135,6 +136,8 @@ class _Journey:
         grid, ranks = self.job.grid, "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
         title = self.job.title or self.job.path.stem
         self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
+        if self.job.included:
+            self.console.say(str(self.job.included))
         for fact in scene.facts(self.march.scene):
             self.console.say(fact)
         if origin:

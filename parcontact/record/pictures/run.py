@@ -6,13 +6,12 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import yaml
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ...errors import InputError
-from ...job import Job
+from ...job import Job, yamltext
 from ...job.timeline import Timeline
 from ...parallel.slab import Array
 from .. import hdf5, measures
@@ -92,10 +91,10 @@ class Fields:
 def _job(path: Path) -> Job:
     """The resolved job; its files of heights need not be there any more."""
     try:
-        data = yaml.safe_load(path.read_text())
+        data = yamltext.parse(path.read_bytes(), str(path)).data
         data["surface"] = [{"shape": "flat"} if shape["shape"] == "file" else shape for shape in data["surface"]]
         return Job.model_validate(data)
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValidationError) as error:
+    except (OSError, KeyError, TypeError, ValidationError) as error:
         raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
 
 
