@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..physics import prony as viscoelastic
-from ..theory import full_contact, hertz, jgh, persson, westergaard
+from ..theory import full_contact, hertz, jgh, persson, persson_rings, westergaard
 from .bench import Bench
 from .jobs import GLASSY, HEIGHT, MEAN, PRONY, RADIUS, RELAXATION, WAVELENGTH, K, flat, sphere, wave, zener
 
@@ -107,13 +107,15 @@ def closed_by_load(bench: Bench) -> None:
     stage = {"pressure": 1e6, "velocity": velocity, "distance": 5 * WAVELENGTH, "cells_per_step": 1}
     _, rows = bench.march(wave([stage], points=(points, points), surface=surface, initial=start))
     x, y, share = np.array(WAVES).T
-    exact = viscoelastic.complex_modulus(K * x * velocity, *PRONY)
-    discrete = viscoelastic.discrete_modulus(K * x * velocity, WAVELENGTH / points / velocity, *PRONY)
+    rings = persson_rings.rings_of_surface(full_contact.Waves((share * HEIGHT).astype(complex), K * x, K * y))
+    omega = rings.waves.kx * velocity
+    exact = viscoelastic.complex_modulus(omega, *PRONY)
+    discrete = viscoelastic.discrete_modulus(omega, WAVELENGTH / points / velocity, *PRONY)
     for what, row, modulus in (("force", rows[0], exact), ("force of steps", rows[-1], discrete)):
-        forces = full_contact.traction(share * HEIGHT, K * x, K * y, modulus) * WAVELENGTH**2
+        forces = full_contact.traction(*rings.waves, modulus) * WAVELENGTH**2
         bench.expect_all(what, [row.measures.force_x, row.measures.force_y], forces, 1e-8)
-        along = (1e6, share * HEIGHT, K * x, K * y, velocity, 0.0, modulus)
         for gamma in (0.0, 1.0):
             friction = -row.measures.force_x / (1e6 * WAVELENGTH**2)
-            bench.expect("friction", friction, float(persson.friction_coefficient(*along, gamma)), 1e-8)
+            expected = persson.friction_coefficient(1e6, rings, velocity, 0.0, modulus, gamma)
+            bench.expect("friction", friction, float(expected), 1e-8)
     bench.expect("area", min(row.measures.contact_area for row in rows), 1.0, 0.0)
