@@ -19,7 +19,7 @@ from .run import runner, watch
 from .steady_sliding import curve
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # and runner.AGAIN
-VERBS = ("run", "steady", "check", "plan", "info", "plot", "doctor")
+VERBS = ("run", "steady", "check", "plan", "theory", "info", "plot", "doctor")
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # say how many were started
 STAGGER = 0.5  # seconds for which other ranks let root report an error that all of them have
 PATIENCE = 5.0  # seconds for which a rank that ends with an error waits for the others to do so too
@@ -152,6 +152,15 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--sample", type=Path, help=argparse.SUPPRESS)  # by which a plan starts others
     plan.set_defaults(act=_plan)
 
+    theory = verbs.add_parser("theory", help="say what Persson's theory predicts for a job, into theory.csv")
+    _job_arguments(theory)
+    text = "factor that corrects friction in partial contact, 0 to 1 (1: not at all; default: 0.45)"
+    theory.add_argument("--gamma", metavar="G", type=_share, default=0.45, help=text)
+    text = "waves of the job's spectrum (continuum, the default), or those of the surface in its box (lattice)"
+    theory.add_argument("--waves", choices=("continuum", "lattice"), default="continuum", help=text)
+    theory.add_argument("--quiet", action="store_true", help="print only warnings and errors")
+    theory.set_defaults(act=_theory)
+
     info = verbs.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
     info.add_argument("file", type=Path)
     info.set_defaults(act=_info)
@@ -194,6 +203,13 @@ def _network(text: str) -> tuple[float, float]:
     if len(values) != 2 or min(values) <= 0.0:
         raise argparse.ArgumentTypeError(f"must be seconds of a message and bytes per second, got {text!r}")
     return values[0], values[1]
+
+
+def _share(text: str) -> float:
+    with suppress(ValueError):
+        if 0.0 <= float(text) <= 1.0:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
 
 
 def _wall(text: str) -> float:
@@ -275,6 +291,15 @@ def _plan(options: argparse.Namespace, world: MPI.Intracomm) -> int:
     for line in making.plan(loaded, slab, Slab(MPI.COMM_SELF, 1, 1), wanted, started):
         if world.rank == 0:
             print(line, flush=True)
+    return DONE
+
+
+def _theory(options: argparse.Namespace, world: MPI.Intracomm) -> int:
+    from . import prediction
+
+    loaded = _load(options, world)
+    everyone, alone = (Slab(comm, *loaded.grid.points) for comm in (world, MPI.COMM_SELF))
+    prediction.run(loaded, everyone, alone, options.gamma, options.waves, options.quiet)
     return DONE
 
 

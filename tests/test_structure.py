@@ -21,7 +21,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"scene"},
     {"march"},
     {"steady_sliding"},
-    {"run", "plan"},
+    {"run", "plan", "prediction"},
     {"doctor"},
     {"__main__"},
 ]

@@ -6,7 +6,7 @@ within a ring follows from the polynomial through the points of its panel, so th
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -20,6 +20,7 @@ PANEL_POINTS = 10  # of Gauss' rule
 HALVINGS = 14  # of panels towards the longest wave
 PANEL_LOGARITHM = 1.0  # of the wave numbers at the ends of a panel: at most this far apart
 PANEL_PHASE = 12.0  # rad by which the phases of waves at the ends of a panel may differ
+MAX_PHASE = 400.0  # rad by which the shortest wave may move: 64 000 waves; after longer slides old phases are lost
 QUADRANT_ANGLES = 24  # of waves whose phases all agree
 ANGLES_STEP = 8  # more of them come by so many
 
@@ -34,6 +35,11 @@ class Rings:
     waves: Waves
     starts: NDArray[np.intp]
     share: Array
+
+    def scaled(self, factor: float) -> "Rings":
+        """The same surface with heights that are larger by a factor."""
+        amplitude, kx, ky = self.waves
+        return replace(self, waves=Waves(factor * amplitude, kx, ky))
 
     def sums(self, values: Array) -> Array:
         """Values of waves, shape (..., waves), summed over each ring: shape (..., rings)."""
@@ -52,7 +58,8 @@ def rings_of_surface(waves: Waves) -> Rings:
     k = np.hypot(waves.kx, waves.ky)
     order = np.argsort(k)
     starts = np.flatnonzero(np.diff(k[order], prepend=-np.inf) > EQUAL * k.max(initial=0.0))
-    return Rings(Waves(*(part[order] for part in waves)), starts, np.array([[0.5]]))
+    amplitude, kx, ky = waves
+    return Rings(Waves(amplitude[order], kx[order], ky[order]), starts, np.array([[0.5]]))
 
 
 def rings_of_spectrum(
@@ -66,11 +73,12 @@ def rings_of_spectrum(
     """Waves that stand for an isotropic spectrum Phi(k) in m^4 between two wave numbers (rad/m).
 
     `distance` (m) is how far the surface will be moved while the body remembers where it was: neighbouring waves of the
-    sums must not go out of phase. `kinks` (rad/m) are wave numbers where Phi is not smooth. Each panel is divided into
-    `refinement` ones, each angle into as many, to see what the sums err by.
+    sums must not go out of phase, as far as MAX_PHASE. `kinks` (rad/m) are wave numbers where Phi is not smooth. Each
+    panel is divided into `refinement` ones, each angle into as many, to see what the sums err by.
     """
     logarithm = np.log(largest / smallest)
     nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
+    distance = min(distance, MAX_PHASE / largest)
     edges = _edges(smallest, logarithm, distance, kinks, refinement)
     half = np.diff(edges)[:, None] / 2
     x = (edges[:-1, None] + half * (1 + nodes)).ravel()

@@ -1,0 +1,164 @@
+"""What Persson's theory predicts for a job with one rough surface: friction and contact area at each instant."""
+
+import csv
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from . import job as jobs
+from . import scene
+from .effects.relaxation import relaxation_of
+from .errors import InputError
+from .job import Job
+from .job.timeline import Span, Timeline
+from .parallel.slab import Slab
+from .physics.prony import Prony
+from .physics.roughness import Roughness
+from .record import hdf5
+from .theory import full_contact, persson_rings
+from .theory.persson_history import Leg, Memory, follow
+from .theory.persson_rings import Rings
+
+COLUMNS = ("time", "distance", "pressure", "friction", "contact_area")
+FILE = "theory.csv"
+WavesOf = Literal["continuum", "lattice"]
+
+
+class Instant(NamedTuple):
+    """One row of theory.csv: s, m, Pa, and two ratios."""
+
+    time: float
+    distance: float
+    pressure: float
+    friction: float
+    contact_area: float
+
+
+def run(job: Job, everyone: Slab, alone: Slab, gamma: float, waves: WavesOf, quiet: bool) -> None:
+    """Write theory.csv into the output directory of the job, on root, of which `alone` is the slab; collective."""
+    problem = ""
+    if everyone.root:
+        try:
+            path = write(job, predict(job, alone, gamma, waves))
+            if not quiet:
+                print(f"Persson's theory, gamma {gamma:g}, {waves} of waves: {path}", flush=True)
+        except InputError as error:
+            problem = str(error)
+    if problem := everyone.agree(problem):
+        raise InputError(problem)
+
+
+def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Instant]:
+    """The rows for a job, the initial state first; `slab` must be that of one rank.
+
+    The waves are those of the job's spectrum as an unbounded surface has them (`continuum`), or those of the very
+    surface in the box (`lattice`). Raises InputError for jobs that the theory does not know.
+    """
+    _refuse_unknown(job)
+    timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)
+    rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, timeline)
+    memory = Memory(rings, _material(job))
+    if job.initial.state == "steady":
+        memory.slide_for_ever(job.initial.velocity)
+    return _rows(job, timeline, memory, gamma)
+
+
+def write(job: Job, rows: Iterator[Instant]) -> Path:
+    """The rows as theory.csv in the output directory of the job; returns its path."""
+    path = job.output.directory / FILE
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with hdf5.replaced(path) as part, part.open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(COLUMNS)
+            writer.writerows([repr(float(value)) for value in row] for row in rows)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
+    return path
+
+
+def _refuse_unknown(job: Job) -> None:
+    if not job.history:
+        raise InputError("history: the theory needs a history; `parcontact steady` is for steady sliding")
+    if job.grid.boundary == "free":
+        raise InputError("grid.boundary: the theory is that of a periodic surface, got free")
+    for index, stage in enumerate(job.history):
+        if stage.control == "approach":
+            raise InputError(f"history.{index}.approach: the theory needs a pressure [Pa] or a force [N]")
+
+
+# -- the waves --------------------------------------------------------------------------------------------------------
+
+
+def _lattice(job: Job, slab: Slab) -> Rings:
+    exact = job.model_copy(update={"numerics": job.numerics.model_copy(update={"precision": "double"})})
+    frame = scene.frame(exact, slab)
+    heights = frame.units.height * frame.surface.heights((0.0, 0.0), slab.empty(np.float64))
+    try:
+        return persson_rings.rings_of_surface(full_contact.waves(heights, *job.grid.size))
+    except ValueError as error:
+        raise InputError(f"surface: {error}") from None
+
+
+def _continuum(job: Job, timeline: Timeline) -> Rings:
+    """The spectrum between the limits of the job, of which the box holds nothing longer than its longer side."""
+    rough = [part for part in job.surface if isinstance(part, jobs.Rough)]
+    if len(rough) != 1 or any(not isinstance(part, jobs.Rough | jobs.Flat) for part in job.surface):
+        raise InputError("surface: the theory needs one rough surface and nothing else; --waves lattice takes any")
+    (part,) = rough
+    longest = min(part.long_wavelength, max(job.grid.size))
+    k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
+    shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
+    limits = (k_long, k_short, _longest_slide(timeline), (k_rolloff,))
+    unit = persson_rings.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)
+    amplitude, kx, ky = unit.waves
+    power = np.abs(amplitude) ** 2 / 2
+    if part.rms_slope is not None:
+        factor = part.rms_slope / math.sqrt(np.sum(power * (kx**2 + ky**2)))
+    elif part.rms_height is not None:
+        factor = part.rms_height / math.sqrt(np.sum(power))
+    else:
+        factor = math.sqrt(part.psd_constant or 0.0)
+    return unit.scaled(factor)
+
+
+def _longest_slide(timeline: Timeline) -> float:
+    """How far the surface is moved in any stage [m]: so long its old waves and its new ones interfere."""
+    return max((math.dist(span.origin, span.position(span.ends.count)) for span in timeline.spans), default=0.0)
+
+
+# -- the history ------------------------------------------------------------------------------------------------------
+
+
+def _material(job: Job) -> Prony:
+    """The incompressible body that is as stiff as the job's half space, to which nu is a factor."""
+    series, factor = relaxation_of(job), 0.5 / (1.0 - job.material.poisson)
+    return Prony(factor * series.modulus_inf, factor * series.moduli, series.relaxation_times)
+
+
+def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterator[Instant]:
+    pressure = job.initial.pressure or 0.0
+    first = Leg(job.initial.velocity, 0.0, np.zeros(1), np.array([pressure]))
+    touched = job.initial.state == "steady"
+    legs = [first]
+    for span in timeline.spans:
+        leg = _leg(job, span)
+        touched = touched or bool(np.any(leg.pressures > 0.0))
+        legs.append(leg if touched else leg._replace(duration=0.0))  # a body that is not touched remembers nothing
+    start, slid = [0.0, *(span.start for span in timeline.spans)], 0.0
+    for leg, time, found in zip(legs, start, follow(memory, legs, gamma), strict=True):
+        distances = slid + math.hypot(*leg.velocity) * leg.instants
+        slid = float(distances[-1])
+        friction = found.friction(leg.pressures)
+        yield from map(Instant, time + leg.instants, distances, leg.pressures, friction, found.contact_area)
+
+
+def _leg(job: Job, span: Span) -> Leg:
+    """A stage: the jump of its load, if it begins with one, and its steps."""
+    fractions = np.array([*([0.0] if span.jumps else []), *(span.ends[index] for index in range(1, span.count + 1))])
+    area = job.grid.lx * job.grid.ly if span.stage.control == "force" else 1.0
+    pressures = np.array([span.load.at(min(fraction, 1.0)) for fraction in fractions]) / area
+    return Leg(span.stage.velocity, span.stage.seconds, fractions * span.stage.seconds, pressures)

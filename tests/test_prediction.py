@@ -1,0 +1,165 @@
+"""`parcontact theory`: the job's waves, history and material in Persson's theory."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import RunParcontact
+from marching import JOBS, PRONY, SLS, column, marched
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact import prediction
+from parcontact.__main__ import main
+from parcontact.errors import InputError
+from parcontact.job import Job
+from parcontact.parallel.slab import Slab
+from parcontact.physics.prony import complex_modulus
+from parcontact.theory import full_contact
+
+ROUGH: dict[str, Any] = {
+    "shape": "rough",
+    "hurst": 0.9,
+    "long_wavelength": 2.5e-4,
+    "short_wavelength": 1.25e-4,
+    "rms_slope": 0.01,
+}
+WAVE = {"shape": "wave", "amplitude": 0.5e-6, "waves": [4, 0]}
+HISTORY: list[dict[str, Any]] = [
+    {"pressure": 0.0, "duration": 1e-4, "time_step": 5e-5},
+    {"pressure": {"from": 0.0, "to": 2e5}, "duration": 1e-3, "time_step": 2.5e-4},
+    {"force": 0.2, "velocity": 0.04, "distance": 1e-4, "cells_per_step": 1},
+    {"pressure": 2e5, "duration": 1e-3, "time_step": {"first": 1e-5, "growth": 3.0}},
+    {"pressure": 1e5, "velocity": -0.04, "duration": 1e-3, "time_step": 5e-4},
+]
+
+
+def job(**changes: Any) -> Job:
+    grid = {"points": 16, "size": 1e-3}
+    return Job.model_validate({"grid": grid, "surface": [WAVE], "material": SLS, "history": HISTORY, **changes})
+
+
+def predicted(job: Job, waves: prediction.WavesOf = "lattice", gamma: float = 0.45) -> list[prediction.Instant]:
+    return list(prediction.predict(job, Slab(MPI.COMM_SELF, *job.grid.points), gamma, waves))
+
+
+def test_instants_are_those_of_the_run() -> None:
+    """Time, distance and pressure of each row; jumps of the load have rows of their own."""
+    one = job(history=[*HISTORY[:3], {**HISTORY[3], "time_step": 1e-4}, HISTORY[4]])
+    found, (_, rows) = predicted(one), marched(one)
+    assert_allclose([row.time for row in found], [row.time for row in rows], rtol=1e-12)
+    assert_allclose([row.distance for row in found], [row.distance for row in rows], rtol=1e-9, atol=1e-18)
+    assert_allclose([row.pressure for row in found], column(rows, "pressure"), rtol=1e-3)
+    assert sum(row.contact_area == 0.0 for row in found) == sum(row.pressure == 0.0 for row in found) == 3
+
+
+def test_full_contact_is_that_of_the_run() -> None:
+    """In full contact the theory is exact: friction of every row, to what the run's short steps err by.
+
+    The pressure is high enough from the first row of the slide on. Cells are short: 64 a wave, 1 % of a radian of loss.
+    """
+    slide = [{"pressure": 4e5, "velocity": 0.04, "distance": 2.5e-4, "cells_per_step": 1}]
+    stop = {"pressure": 4e5, "duration": 1e-3, "time_step": 1e-4}
+    one = job(grid={"points": [256, 1], "size": 1e-3}, history=[*slide, stop], numerics={"tolerance": 1e-6})
+    found, (_, rows) = predicted(one), marched(one)
+    exact = column(rows, "friction")
+    assert_allclose([row.friction for row in found], exact, atol=2e-3 * exact.max())
+    assert exact.max() > 4e-4
+    assert min(row.contact_area for row in found[1:]) > 1.0 - 1e-9
+
+
+@pytest.mark.parametrize("gamma", [0.0, 1.0])
+def test_steady_start_and_poisson(gamma: float) -> None:
+    """The first row is the steady state; nu is a factor of all moduli."""
+    material = {**SLS, "poisson": 0.2}
+    stage = {"pressure": 4e5, "velocity": 0.04, "duration": 1e-3, "time_step": 5e-4}
+    start = {"state": "steady", "velocity": 0.04, "pressure": 4e5}
+    found = predicted(job(material=material, initial=start, history=[stage]), gamma=gamma)
+    k = 2 * np.pi * 4 / 1e-3
+    exact = k**2 * 0.5e-6**2 * complex_modulus(0.04 * k, *PRONY).imag / 4e5 * 0.5 / 0.8
+    assert_allclose([row.friction for row in found], exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize("amount", [{"rms_slope": 0.01}, {"rms_height": 3e-7}, {"psd_constant": 1e-21}])
+def test_continuum_and_lattice(amount: dict[str, float]) -> None:
+    """In full contact friction depends on the spectrum only: a box with many waves of fixed amplitudes is near it.
+
+    5 %: the box has 8 to 16 waves along each side, whose number in a ring differs from its area by some per cent.
+    """
+    rough: dict[str, Any] = {"shape": "rough", "hurst": 0.9, "amplitudes": "fixed", **amount}
+    rough |= {"long_wavelength": 1.25e-4, "short_wavelength": 6.25e-5}
+    stage = {"pressure": 1e8, "velocity": 0.04, "distance": 1e-3, "cells_per_step": 32}
+    one = job(surface=[rough, {"shape": "flat"}], grid={"points": 64, "size": 1e-3}, history=[stage])
+    lattice, continuum = (predicted(one, waves)[-1] for waves in ("lattice", "continuum"))
+    assert lattice.contact_area == continuum.contact_area == 1.0
+    assert_allclose(lattice.friction, continuum.friction, rtol=0.05)
+
+
+def test_steady_friction_of_the_continuum() -> None:
+    """A plateau, then a power law: the steady sum in full contact against Simpson's rule over k and the angle."""
+    k = np.linspace(1.0, 4.0, 1001) * 2 * np.pi / 1e-3
+    rough = {"shape": "rough", "hurst": 0.5, "long_wavelength": 1e-3, "rolloff_wavelength": 5e-4}
+    rough |= {"short_wavelength": 2.5e-4, "psd_constant": 1e-21}
+    angle = (np.arange(200) + 0.5) / 200 * np.pi / 2
+    density = 1e-21 * np.maximum(k / k[333], 1.0) ** -3.0
+    loss = complex_modulus(0.04 * k[:, None] * np.cos(angle), *PRONY).imag
+    exact = np.trapezoid(density * 2 * k**3 * np.mean(loss * np.cos(angle), axis=1), k) / (2 * np.pi) / 1e6
+    stage = {"pressure": 1e6, "velocity": 0.04, "duration": 1.0, "time_step": 1.0}
+    start = {"state": "steady", "velocity": 0.04, "pressure": 1e6}
+    found = predicted(job(surface=[rough], history=[stage], initial=start), "continuum")
+    assert_allclose(found[0].friction, exact, rtol=3e-3)  # the trapezoids, of which one holds the kink
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"history": [{"approach": 1e-6}]}, "history.0.approach"),
+        ({"surface": [WAVE]}, "one rough surface"),
+        ({"surface": [ROUGH, ROUGH]}, "one rough surface"),
+        ({"grid": {"points": 16, "size": 1e-3, "boundary": "free"}}, "grid.boundary"),
+        ({"history": [], "steady": {"velocities": [1.0], "pressures": [1e5]}}, "parcontact steady"),
+    ],
+)
+def test_jobs_that_the_theory_does_not_know(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        predicted(job(**changes), "continuum")
+
+
+def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """On two ranks it writes one table, also into the directory of a run that is there."""
+    small = ["--set", "grid.points=64", "--set", "surface.0.short_wavelength=1e-4"]
+    done = run_parcontact(["theory", JOBS / "velocity_step.yaml", *small, "--gamma", "1", "--out", "here"], ranks=2)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == ["Persson's theory, gamma 1, continuum of waves: here/theory.csv"]
+    with (tmp_path / "here" / "theory.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    assert tuple(table[0]) == prediction.COLUMNS
+    assert float(table[-1]["distance"]) == pytest.approx(4.32e-4)
+    assert [path.name for path in (tmp_path / "here").iterdir()] == ["theory.csv"]
+
+
+def test_a_directory_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"theory.csv cannot be written"):
+        prediction.write(job(output={"directory": str(tmp_path / "file" / "x")}), iter([]))
+
+
+def test_gamma_is_a_share(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["theory", "job.yaml", "--gamma", "2"])
+    assert "must be a number from 0 to 1, got '2'" in capsys.readouterr().err
+
+
+def test_full_contact_of_a_lattice_is_exact() -> None:
+    """The very surface in the box, steady, for any gamma: to rounding."""
+    stage = {"pressure": 1e8, "velocity": 0.04, "duration": 1e-3, "time_step": 1e-3}
+    start = {"state": "steady", "velocity": 0.04, "pressure": 1e8}
+    one = job(surface=[{**WAVE, "waves": [3, 2]}, WAVE], history=[stage], initial=start)
+    x, y = np.arange(16) / 16, np.arange(16)[:, None] / 16
+    heights = 0.5e-6 * (np.cos(2 * np.pi * 4 * x) + np.cos(2 * np.pi * (3 * x + 2 * y)))
+    waves = full_contact.waves(heights, 1e-3, 1e-3)
+    exact = np.hypot(*full_contact.traction(*waves, complex_modulus(0.04 * waves.kx, *PRONY))) / 1e8
+    for gamma in (0.0, 0.45):
+        assert_allclose(predicted(one, gamma=gamma)[0].friction, exact, rtol=1e-10)
