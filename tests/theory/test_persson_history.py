@@ -5,13 +5,13 @@ import tracemalloc
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rubbers import TWELVE_DECADES, ZENER
 
 from parcontact.theory import full_contact, persson
 from parcontact.theory.full_contact import Waves
 from parcontact.theory.persson_history import CHUNK, Leg, Memory, Outcome, follow
 from parcontact.theory.persson_rings import Rings, rings_of_spectrum, rings_of_surface
 
-from .materials import TWELVE_DECADES, ZENER
 from .test_persson import K_LONG, K_SHORT, PRESSURE, spectrum
 
 WAVES = Waves(np.array([0.5e-6, 0.2e-6 + 0.1e-6j]), np.array([25132.741, 30000.0]), np.array([0.0, -4e4]))
