@@ -1,21 +1,57 @@
-"""Compiled loops: one decorator for all of them.
+"""Compiled loops: one decorator for those over rows, one for functions of points.
 
-Sums may be reordered to use vector units; NaN and infinity keep their meaning, so that a solver sees them.
+Sums may be reordered to use vector units; NaN and infinity keep their meaning, so that a solver sees them. Machine code
+is kept in a private directory, so that only a first run waits for the compiler; where there is none, every run does.
 """
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 
+from . import private
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+OPTIONS: dict[str, Any] = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
 
 
 def loop(function: Function) -> Function:
-    """Compile a loop over this rank's rows; kept on disk where there is a place, so that only a first run waits."""
-    compiler = partial(numba.njit, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+    """Compile a loop over this rank's rows."""
+    return cast(Function, _compiled(lambda kept: numba.njit(cache=kept, **OPTIONS)(function)))
+
+
+def pointwise(function: Function) -> Function:
+    """Compile a function of numbers for all points of arrays."""
+    return cast(Function, _compiled(lambda kept: numba.vectorize(cache=kept)(function)))
+
+
+def cache_path(compiled: Any) -> Path | None:
+    """The directory in which machine code is kept, if any."""
+    dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a loop, or of a function of points
+    kept: Any = getattr(dispatcher, "_cache", None) or dispatcher.cache
+    path = kept.cache_path
+    return Path(path) if path else None
+
+
+def _compiled(compiler: Callable[[bool], Any]) -> Any:
+    """What `compiler(kept)` makes, with its machine code kept if there is a private place for it."""
+    place = _place()
+    if place is None:
+        return compiler(False)
+    config: Any = numba.config
+    others, config.CACHE_DIR = config.CACHE_DIR, str(place)  # where numba looks first while it decorates
     try:
-        return cast(Function, compiler(cache=True)(function))
-    except RuntimeError:  # numba may write neither beside the code nor into a home directory
-        return cast(Function, compiler()(function))
+        compiled = compiler(True)
+    except RuntimeError:
+        return compiler(False)
+    finally:
+        config.CACHE_DIR = others
+    path = cache_path(compiled)
+    return compiled if path and path.is_relative_to(place) else compiler(False)  # numba has other places, for all
+
+
+@cache
+def _place() -> Path | None:
+    return private.directory("compiled")

@@ -13,6 +13,7 @@ import yaml
 from conftest import RunParcontact
 
 from parcontact import __main__
+from parcontact.command import words
 from parcontact.run import watch
 
 JOB: dict[str, Any] = {
@@ -116,17 +117,17 @@ def test_bad_input(main: Main, tmp_path: Path, words: Sequence[str], message: st
 def test_bad_input_is_told_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     """By root alone."""
     job(tmp_path / "job.yaml", grid={"points": [16, 12], "size": -1.0})
-    for words in (["job.yaml"], ["--wrong"]):
-        told = run_parcontact(words, ranks=2)
+    for line in (["job.yaml"], ["--wrong"]):
+        told = run_parcontact(line, ranks=2)
         assert told.returncode == 2
-        assert told.stderr.count("grid.size" if words == ["job.yaml"] else "usage:") == 1
+        assert told.stderr.count("grid.size" if line == ["job.yaml"] else "usage:") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
 
 
-def test_ranks_that_are_alone(run_parcontact: RunParcontact, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ranks_that_are_alone(run_parcontact: RunParcontact, outside_mpi: dict[str, str], tmp_path: Path) -> None:
     """A launcher of another MPI starts ranks that do not see each other: each of them refuses."""
     job(tmp_path / "job.yaml")
-    monkeypatch.setenv("PMI_SIZE", "2")
+    outside_mpi["PMI_SIZE"] = "2"
     alone = run_parcontact(["job.yaml"], ranks=0)
     assert alone.returncode == 2
     assert "2 ranks were started but each finds itself alone" in alone.stderr
@@ -187,7 +188,7 @@ def test_wall_limit_of_a_chain(main: Main, tmp_path: Path) -> None:
     [("90", 90.0), ("2:30", 150.0), ("01:00:00", 3600.0), ("1-12:00:00", 129600.0), ("100:00:00", 360000.0)],
 )
 def test_wall_times(text: str, seconds: float) -> None:
-    assert __main__._wall(text) == seconds
+    assert words.wall_seconds(text) == seconds
 
 
 def test_end_of_a_batch_job() -> None:

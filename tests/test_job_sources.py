@@ -253,6 +253,5 @@ def test_an_include_that_is_not_there() -> None:
         f"job.yaml:3:21: {must}, got 'no/m.yaml' (looked from the job file)"
     ]
     assert mistakes_of(SMALL, "material.include=3") == [
-        f"--set material.include=3: {must}, got 3 (a name or a path; among the "
-        "program's own: synthetic_tyre)"
+        f"--set material.include=3: {must}, got 3 (a name or a path; among the program's own: synthetic_tyre)"
     ]

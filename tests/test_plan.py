@@ -196,7 +196,6 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
 def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As a user reads it; nothing is written."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     text = "grid: {points: 32, size: 1.0e-3}\nsurface: {shape: sphere, radius: 1.0e-2}\n"
     text += "material: {model: elastic, shear_modulus: 1.0e6}\nhistory: [{pressure: 1.0e4}]\n"
     (tmp_path / "job.yaml").write_text(text)
@@ -208,7 +207,7 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     assert "scaling ends at" in said
     assert "tried: 1 steps on 1 rank in" in said
     assert ("tried: 1 steps on 2 ranks in" in said) == (machine.cores() > 1)  # by two processes started for it
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cache", "job.yaml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["job.yaml"]
 
 
 @pytest.mark.parametrize("words", [["--ranks", "0"], ["--ranks", "two"], ["--network", "1"], ["--cores", "-1"]])

@@ -1,8 +1,9 @@
 """A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
 
+from ..errors import JobError
 from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_range
 from .material import Elastic, PronyBranch, Zener, ZenerBranch
-from .model import Job, JobError, describe, load
+from .model import Job, describe, load
 from .sections import Checkpoint, Grid, Numerics, Output
 from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationError
 
+from ..errors import JobError
 from . import advice, limits, table
 from .fault import Fault, faults_of
 from .history import Initial, Stage, Steady
@@ -28,14 +29,6 @@ from .yamltext import dump
 
 MANY_MISTAKES = 40  # more are not shown one by one
 SHOWN_MISTAKES = 20  # of so many
-
-
-class JobError(Exception):
-    """A job that cannot be run; `mistakes` are sentences, each beginning with file:line:column."""
-
-    def __init__(self, mistakes: Sequence[str]):
-        super().__init__("\n".join(mistakes))
-        self.mistakes = list(mistakes)
 
 
 def _kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:

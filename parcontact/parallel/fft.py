@@ -13,11 +13,11 @@ on several ranks what it sends, which is less than another one.
 from functools import cached_property
 
 import numpy as np
-import pyfftw
-from mpi4py import MPI
 from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
+from .fftw import pyfftw
+from .mpi import MPI
 from .slab import Array, Slab, allocate, deal
 
 Spectrum = NDArray[np.complexfloating]

@@ -1,7 +1,6 @@
 """Moving whole rows of a map, from one rank to another where they have to."""
 
 import numpy as np
-from mpi4py.util import dtlib
 
 from .slab import Array, Slab
 
@@ -14,6 +13,8 @@ def roll(slab: Slab, field: Array, count: int, out: Array) -> Array:
         out[count:] = field[: ny - count]
         out[:count] = field[ny - count :]
         return out
+    from mpi4py.util import dtlib
+
     kind = dtlib.from_numpy_dtype(field.dtype).Create_contiguous(slab.nx).Commit()
     to = [_arriving(mine, theirs, count, ny) for theirs in slab.dealt]
     come = [_arriving(theirs, mine, count, ny) for theirs in slab.dealt]

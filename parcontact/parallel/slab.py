@@ -9,10 +9,10 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
-import pyfftw
-from mpi4py import MPI
 from numpy.typing import DTypeLike, NDArray
 
+from .fftw import pyfftw
+from .mpi import MPI
 from .tally import Tally
 
 T = TypeVar("T")

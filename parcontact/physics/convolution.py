@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-import pyfftw
 from numpy.typing import NDArray
 
 from ..parallel.fft import FFT
+from ..parallel.fftw import pyfftw
 from ..parallel.slab import Array
 
 

@@ -7,10 +7,9 @@ For a shear modulus of 1 (A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377; 
 
 import math
 
-import numba
 import numpy as np
-from scipy.special import erf
 
+from ..compiled import pointwise
 from ..parallel.fft import FFT
 from ..parallel.slab import Array
 from .convolution import wavenumbers
@@ -27,7 +26,7 @@ def love(x: Array, y: Array, dx: float, dy: float, poisson: float = 0.5) -> Arra
     return np.asarray(over_cell(x, y, dx, dy)) * (1.0 - poisson) / (2 * np.pi)
 
 
-@numba.vectorize(cache=True)
+@pointwise
 def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the types itself
     """Integral of 1/r over a `dx x dy` cell at distance (x, y).
 
@@ -89,6 +88,8 @@ def _blurred_cell(b: Array, width: Array) -> Array:
     Shape (width, b). The sum over aliases converges fast for wide blurs; for narrow ones that over cells, with
     the share of the blurred cell in each (Poisson's summation).
     """
+    from scipy.special import erf  # slow to import, and of use to few
+
     result = np.zeros((width.size, b.size))
     wide = width > 0.25
     for n in range(-5, 6):

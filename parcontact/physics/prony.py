@@ -11,7 +11,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -42,6 +41,8 @@ class CreepSpectrum(NamedTuple):
 
     def time(self, compliance: float) -> float:
         """The time t at which J(t) = `compliance`, in s: 0 if it is so from the start, inf if it never is."""
+        from scipy.optimize import brentq  # slow to import, and of use to few
+
         growth = compliance - self.glass
         if growth <= 0:
             return 0.0
@@ -170,6 +171,8 @@ def creep(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times:
 
 def _zero_above(index: int, series: Prony) -> tuple[float, Array]:
     """The zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda) above tau[index], and every tau_k - lambda."""
+    from scipy.optimize import brentq
+
     pole, sign, room = _nearer_pole(index, series)
     times = series.relaxation_times
     own, rest = _split(pole, sign * room, series)

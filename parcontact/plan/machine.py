@@ -9,9 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 import numpy as np
-import pyfftw
 
 from ..parallel.fft import FFT
+from ..parallel.fftw import pyfftw
 from ..parallel.slab import Slab
 from ..physics.halfspace import HalfSpace
 from ..solve.contact import ContactSolver, MeanPressure

@@ -6,10 +6,10 @@ from typing import Any
 
 import h5py
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 from . import checkpoint, fields, hdf5
 from .provenance import Link, read_chain

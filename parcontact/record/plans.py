@@ -1,7 +1,7 @@
 """Transform plans, kept: FFTW chooses the fastest by trying, and another choice gives other last digits.
 
 So that a run repeated on the same machine gives the same digits, the first choice for a kind of run is kept in the
-user's cache directory; so that a run continued anywhere does, checkpoints carry it too.
+user's private cache directory; so that a run continued anywhere does, checkpoints carry it too.
 """
 
 import hashlib
@@ -13,11 +13,12 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-import pyfftw
 from numpy.typing import NDArray
 
+from .. import private
 from ..job import Job
 from ..parallel.fft import export_wisdom, import_wisdom
+from ..parallel.fftw import pyfftw
 from ..parallel.slab import Slab
 
 CPUINFO = Path("/proc/cpuinfo")
@@ -42,17 +43,16 @@ def keep(job: Job, slab: Slab) -> None:
     """Keep the plans of this run for later ones, unless there are some; collective."""
     data = gathered(slab).tobytes()
     if slab.root:
-        with suppress(OSError):  # a convenience: a run without a home does as well
-            place = _place(job, slab)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            part = place.with_name(f"{place.name}.{os.getpid()}")
-            part.write_bytes(data)
-            try:
-                os.link(part, place)  # the first one stays
-            except FileExistsError:
-                pass
-            finally:
-                part.unlink()
+        with suppress(OSError):  # a convenience: a run without a place for it does as well
+            if place := _place(job, slab):
+                part = place.with_name(f"{place.name}.{os.getpid()}")
+                part.write_bytes(data)
+                try:
+                    os.link(part, place)  # the first one stays
+                except FileExistsError:
+                    pass
+                finally:
+                    part.unlink()
 
 
 def _adopt(data: bytes | None, slab: Slab) -> bool:
@@ -66,15 +66,18 @@ def _adopt(data: bytes | None, slab: Slab) -> bool:
         return False
 
 
-def _read(place: Path) -> bytes | None:
+def _read(place: Path | None) -> bytes | None:
     try:
-        return place.read_bytes()
+        return place.read_bytes() if place and private.is_own(place) else None
     except OSError:
         return None
 
 
-def _place(job: Job, slab: Slab) -> Path:
-    """A file for all runs on this kind of machine whose transforms are the same."""
+def _place(job: Job, slab: Slab) -> Path | None:
+    """A file for all runs on this kind of machine whose transforms are the same; None if there is no safe place."""
+    directory = private.directory("plans")
+    if directory is None:
+        return None
     cpu = ""
     with suppress(OSError):
         cpu = next((line for line in CPUINFO.read_text().splitlines() if line.startswith("model name")), "")
@@ -82,5 +85,4 @@ def _place(job: Job, slab: Slab) -> Path:
     facts = [platform.machine(), cpu, pyfftw.fftw_version]
     facts += [slab.comm.size, job.grid.points, job.grid.boundary, job.numerics.kernel, job.numerics.precision, steady]
     name = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return home / "parcontact" / f"plans-{name}"
+    return directory / name

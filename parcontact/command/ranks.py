@@ -1,0 +1,68 @@
+"""The ranks of this program, which a launcher may have started: which is root, and MPI for verbs that need it.
+
+Who is root is known from the environment before MPI has started, so that what needs no MPI answers at once. Where MPI
+has not started, the other ranks say nothing and end well: the exit code of root is that of all.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+from ..errors import InputError, RunError
+
+if TYPE_CHECKING:
+    from ..parallel.mpi import MPI
+
+T = TypeVar("T")
+BLANK = " \0"  # what may follow the name of an MPI library
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # say which rank a process is
+LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # how many were started
+
+
+def is_root() -> bool:
+    """Whether this is the rank that speaks."""
+    return rank() == 0
+
+
+def rank() -> int:
+    """The rank of this process, by MPI if that has started, else by the launcher."""
+    if (world := started()) is not None:
+        return world.rank
+    return next((int(text) for name in RANKS if (text := os.environ.get(name, "")).isdecimal()), 0)
+
+
+def started() -> MPI.Intracomm | None:
+    """All ranks, if MPI has started."""
+    module = sys.modules.get("mpi4py.MPI")
+    return None if module is None else module.COMM_WORLD
+
+
+def start() -> MPI.Intracomm:
+    """All ranks; starts MPI. Raises InputError for a rank that should not be alone, but is."""
+    from ..parallel.mpi import MPI
+
+    world = MPI.COMM_WORLD
+    count = max((int(os.environ.get(name) or 1) for name in LAUNCHERS), default=1)
+    if world.size == 1 and count > 1:
+        raise InputError(
+            f"{count} ranks were started but each finds itself alone: the launcher belongs to another MPI than "
+            f"mpi4py ({MPI.Get_library_version().splitlines()[0].strip(BLANK)}). Use the mpirun beside this parcontact."
+        )
+    return world
+
+
+def on_root(world: MPI.Intracomm, act: Callable[[], T]) -> T:
+    """What root finds, on every rank, and so with what a user can put right; collective."""
+    found: tuple[T | None, Exception | None] = (None, None)
+    if world.rank == 0:
+        try:
+            found = act(), None
+        except (InputError, RunError) as error:
+            found = None, error
+    value, problem = world.bcast(found)
+    if problem is not None:
+        raise problem
+    return value

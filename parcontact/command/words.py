@@ -1,0 +1,213 @@
+"""What the words of a command line mean: verbs, options and their values."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .. import __version__
+from ..errors import InputError
+from . import ranks, verbs
+
+VERBS = ("run", "steady", "check", "plan", "theory", "info", "plot", "doctor")
+FIRST = """\
+parcontact needs a job: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
+
+  parcontact check job.yaml             list its mistakes, or all that it says with every default
+  parcontact plan job.yaml              say what it will do and cost
+  parcontact job.yaml                   run it, or go on with it (on two cores: mpirun -n 2 parcontact job.yaml)
+  parcontact plot out/job               draw what came out
+
+parcontact --help lists all verbs, parcontact VERB --help the options of one"""
+CODES = """\
+exit codes: 0 as asked; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
+checkpoint, run again"""
+
+
+def understand(words: Sequence[str]) -> argparse.Namespace:
+    """The options of a command line; `act` is its verb. Raises InputError or SystemExit for what cannot be meant."""
+    if not words:
+        raise InputError(FIRST.removeprefix("parcontact "))
+    first, *rest = words
+    if first == "help":
+        words = [*(word for word in rest if word in VERBS), "--help"]
+    elif first not in (*VERBS, "-h", "--help", "--version"):
+        _refuse_misspelt(first)
+        words = ["run", *words]
+    return _parser().parse_args(words)
+
+
+def _refuse_misspelt(word: str) -> None:
+    """A word that is no file, does not look like a job and is close to a verb."""
+    path = Path(word)
+    close = difflib.get_close_matches(word.lower(), (*VERBS, "help"), n=1)
+    if close and not path.suffix and path.name == word and not path.exists():
+        raise InputError(f"{word!r} is neither a verb nor a job file; did you mean {close[0]}?")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Speaks on root only, and ends the other ranks well unless MPI ends them together."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        if ranks.is_root():
+            super()._print_message(message, file)
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        super().exit(status if ranks.is_root() or ranks.started() else 0, message)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="parcontact",
+        description="Transient contact of a rough rigid surface on a viscoelastic half space.",
+        epilog=f"A first argument that is no verb is a job: mpirun -n 2 parcontact job.yaml\n\n{CODES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"parcontact {__version__}")
+    found = parser.add_subparsers(dest="verb", required=True, metavar="verb")
+
+    run = found.add_parser("run", help="run a job, or go on with it (the default verb)")
+    _job_arguments(run)
+    text = (
+        "go on from the newest good checkpoint if there is one (auto, the default), start afresh and replace what is "
+        "there (never), or go on from the checkpoint PATH"
+    )
+    run.add_argument("--restart", metavar="auto|never|PATH", default="auto", help=text)
+    text = (
+        "stop after the first step that reaches the time T [s] of the history; one that ends before goes on with its "
+        "last stage"
+    )
+    run.add_argument("--until", metavar="T", type=_seconds, help=text)
+    text = "stop early, with a checkpoint, to end within this wall time"
+    run.add_argument("--wall", metavar="HH:MM:SS", type=_wall, help=text)
+    run.add_argument("--quiet", action="store_true", help="print only warnings and errors")
+    run.set_defaults(act=verbs.run)
+
+    steady = found.add_parser("steady", help="solve steady sliding directly: a friction curve")
+    _job_arguments(steady)
+    for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
+        text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
+        steady.add_argument(f"--{name}", metavar="A:B:N", type=_values, default=(), help=text)
+    steady.add_argument("--quiet", action="store_true", help="print only warnings and errors")
+    steady.set_defaults(act=verbs.steady)
+
+    check = found.add_parser("check", help="list all mistakes of a job, or what it says with every default")
+    _job_arguments(check)
+    check.set_defaults(act=verbs.check)
+
+    plan = found.add_parser("plan", help="say what a job will do, and what it costs on so many ranks; writes nothing")
+    _job_arguments(plan)
+    text = "numbers of ranks, N,N,... (default: 1 and as many as there are cores here, or as many as plan)"
+    plan.add_argument("--ranks", metavar="N,...", type=_counts, default=(), help=text)
+    plan.add_argument("--seconds", metavar="T", type=_seconds, default=10.0, help="for how long the job is tried [s]")
+    plan.add_argument("--cores", metavar="N", type=_count, help="cores of a node of the machine that it is for")
+    text = "of that machine's network: seconds of a message, bytes per second of a node (default: 2e-6,12.5e9)"
+    plan.add_argument("--network", metavar="ALPHA,BETA", type=_network, help=text)
+    plan.add_argument("--sample", type=Path, help=argparse.SUPPRESS)  # by which a plan starts others
+    plan.set_defaults(act=verbs.plan)
+
+    theory = found.add_parser("theory", help="say what Persson's theory predicts for a job, into theory.csv")
+    _job_arguments(theory)
+    text = "factor that corrects friction in partial contact, 0 to 1 (1: not at all; default: 0.45)"
+    theory.add_argument("--gamma", metavar="G", type=_share, default=0.45, help=text)
+    text = "waves of the job's spectrum (continuum, the default), or those of the surface in its box (lattice)"
+    theory.add_argument("--waves", choices=("continuum", "lattice"), default="continuum", help=text)
+    theory.add_argument("--quiet", action="store_true", help="print only warnings and errors")
+    theory.set_defaults(act=verbs.theory)
+
+    info = found.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
+    info.add_argument("file", type=Path)
+    info.set_defaults(act=verbs.info)
+
+    plot = found.add_parser("plot", help="draw a picture of a run")
+    plot.add_argument("directory", type=Path, help="output directory of a run")
+    plot.set_defaults(act=verbs.plot)
+
+    doctor = found.add_parser("doctor", help="run small hard cases on this machine, and say what came out of each")
+    doctor.add_argument("--precision", choices=("double", "single", "mixed"), default="double")
+    doctor.set_defaults(act=verbs.doctor)
+    return parser
+
+
+def _job_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("job", help="job file (YAML)")
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
+    parser.add_argument("--out", metavar="DIR", help="output directory")
+
+
+# -- values -----------------------------------------------------------------------------------------------------------
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a time [s] of zero or more, got {text!r}")
+    return value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be positive whole numbers, got {text!r}")
+    return int(text)
+
+
+def _counts(text: str) -> tuple[int, ...]:
+    return tuple(_count(part) for part in text.split(","))
+
+
+def _network(text: str) -> tuple[float, float]:
+    values = _values(text)
+    if len(values) != 2 or min(values) <= 0.0:
+        raise argparse.ArgumentTypeError(f"must be seconds of a message and bytes per second, got {text!r}")
+    return values[0], values[1]
+
+
+def _share(text: str) -> float:
+    with suppress(ValueError):
+        if 0.0 <= float(text) <= 1.0:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
+
+
+def wall_seconds(text: str) -> float:
+    """Seconds of [[HH:]MM:]SS, or with days in front as in Slurm, D-HH:MM:SS; 0 for other text."""
+    days, dash, rest = text.rpartition("-")
+    fields = rest.split(":")
+    try:
+        if len(fields) > 3:
+            return 0.0
+        seconds = sum(float(field) * 60.0**power for power, field in enumerate(reversed(fields)))
+        return seconds + (86400.0 * int(days) if dash else 0.0)
+    except ValueError:
+        return 0.0
+
+
+def _wall(text: str) -> float:
+    seconds = wall_seconds(text)
+    if not 0.0 < seconds < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a wall time HH:MM:SS, got {text!r}")
+    return seconds
+
+
+def _values(text: str) -> tuple[float, ...]:
+    """Numbers equally spaced in their logarithm, `first:last:count`, or a list `a,b,c`."""
+    try:
+        return _spaced(text) if ":" in text else tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be first:last:count or a list of numbers, got {text!r}") from None
+
+
+def _spaced(text: str) -> tuple[float, ...]:
+    from ..job import log_range
+
+    first, last, count = text.split(":")
+    if min(float(first), float(last)) <= 0.0:
+        reason = "is spaced equally in the logarithm, so it must begin and end above 0"
+        raise argparse.ArgumentTypeError(f"a range first:last:count {reason}, got {text!r}")
+    if int(count) < 2 and first != last:
+        raise argparse.ArgumentTypeError(f"a range first:last:count must have a count of 2 or more, got {text!r}")
+    return log_range(text)
