@@ -1,6 +1,5 @@
 """What Persson's theory predicts for a job with one rough surface: friction and contact area at each instant."""
 
-import csv
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
 from .physics.prony import Prony
 from .physics.roughness import Roughness
-from .record import hdf5
+from .record import files, hdf5
 from .theory import full_contact, persson_rings
 from .theory.persson_history import Leg, Memory, follow
 from .theory.persson_rings import Rings
@@ -71,10 +70,10 @@ def write(job: Job, rows: Iterator[Instant]) -> Path:
     path = job.output.directory / FILE
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with hdf5.replaced(path) as part, part.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows([repr(float(value)) for value in row] for row in rows)
+        with files.replaced(path) as file:
+            file.write(f"{','.join(COLUMNS)}\n".encode())
+            for row in rows:
+                file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
     except OSError as error:
         raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
     return path

@@ -157,8 +157,9 @@ def test_killed(runs: Runs, whole: Path, tmp_path: Path) -> None:
 FAILING = """
 import sys
 from mpi4py import MPI
-from parcontact import __main__, march
+from parcontact import __main__
 from parcontact.errors import RunError
+from parcontact.march import step as march
 advance = march.March.advance
 def failing(self, step):
     if step.number == 5 and MPI.COMM_WORLD.rank == 1:

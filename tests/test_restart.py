@@ -3,7 +3,7 @@
 import csv
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from mpi4py import MPI
 from parcontact import job
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.record import checkpoint
+from parcontact.record import checkpoint, marker
 from parcontact.run import runner
 
 ROUGH = {
@@ -134,6 +134,9 @@ def cut(bench: Bench, whole: Path, step: int) -> Path:
         for path in (copy / "checkpoint").glob("step-*.h5"):
             if int(path.stem.removeprefix("step-")) > step:
                 path.unlink()
+        if step == 0:  # before its first checkpoint
+            claims = marker.read(copy)
+            marker.write(copy, {"run": replace(claims["run"], saved=False)})
     bench.comm.Barrier()
     return copy
 

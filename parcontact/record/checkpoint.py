@@ -13,7 +13,7 @@ import os
 import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -25,13 +25,22 @@ from numpy.typing import NDArray
 from ..errors import InputError, RunError
 from ..parallel.slab import Array, Slab
 from ..physics.entries import Entry
-from . import hdf5, layout
+from . import files, hdf5, layout
 from .provenance import Link, Provenance, read_chain
 
 FORMAT = 1
 TITLE = "parcontact checkpoint, format "
 SEAL = 4096  # bytes set aside for it
 SUMS = "checksums"
+
+
+@dataclass(frozen=True)
+class Table:
+    """What measures.csv held: how many rows, their checksum, and the last one."""
+
+    rows: int = 0
+    checksum: int = 0
+    last: str = ""
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,8 @@ class Contents:
     step: int
     time: float
     job: dict[str, Any]
+    run: str
+    table: Table
     chain: tuple[Link, ...]
     shape: tuple[int, int]
     units: dict[str, float]
@@ -56,23 +67,29 @@ class Contents:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a checkpoint says of itself: where the run is, its job as plain data, and where the file comes from."""
+    """What a checkpoint says of itself: where the run is, its job as plain data, and where the file comes from.
+
+    `run` is the id of the run that wrote it, the same in all that one directory holds; `table` is of its measures.
+    """
 
     step: int
     time: float
     job: Mapping[str, Any]
     provenance: Provenance
+    run: str = ""
+    table: Table = Table()
 
     def write(self, file: h5py.File) -> None:
         file.attrs["step"], file.attrs["time"] = self.step, self.time
         file.attrs["plain job"] = json.dumps(self.job)
+        file.attrs["run"], file.attrs["table"] = self.run, json.dumps(asdict(self.table))
         self.provenance.write(file)
 
 
 def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in_turn: bool = False) -> None:
     """Write a checkpoint; collective. On an error nothing of it is left, and what had the name before still has it."""
     maps = _maps(entries)
-    part = path.with_name(path.name + ".part")
+    part = slab.agree(files.unused(path))
 
     def build(file: h5py.File) -> None:
         facts.write(file)
@@ -181,6 +198,8 @@ def _contents(path: Path, file: h5py.File) -> Contents:
         int(file.attrs["step"]),
         float(file.attrs["time"]),
         json.loads(file.attrs["plain job"]),
+        str(file.attrs.get("run", "")),
+        Table(**json.loads(file.attrs.get("table", "{}"))),
         read_chain(file),
         shape,
         {name: float(file[name].attrs["unit"]) for name in [*maps, *numbers]},

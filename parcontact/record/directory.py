@@ -1,4 +1,7 @@
-"""The output directory of a run: one run at a time, its job files, its checkpoints."""
+"""The output directory of a run: one run at a time, its marker, its job files, its checkpoints.
+
+The lock is taken first, then it is seen whose the directory is, and only then something is written.
+"""
 
 import errno
 import fcntl
@@ -7,24 +10,39 @@ import re
 import shutil
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 from ..parallel.slab import Slab
-from . import hdf5
+from . import checkpoint, files, hdf5, marker
+from .marker import SCENE, VERBS, Claim
 
 PATIENCE = 3.0  # seconds: a run that was killed may need a moment to let go
-OUTPUTS = ("measures.csv", "fields.h5", "fields.xdmf", "run.log")
+RESULTS = {
+    "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
+    "steady": ("steady.csv", "steady_waves.csv", "steady.h5"),
+}
+COPIES = {  # of the job: as given, and with every default
+    "run": ("job.yaml", "job.resolved.yaml"),
+    "steady": ("steady.job.yaml", "steady.resolved.yaml"),
+}
+LOCK, STOP = ".lock", "stop"
+BESIDE = (STOP, "theory.csv")  # may be there before the first run
+SHOWN = 4  # names of files that a message lists
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
+ADVICE = "--restart never starts afresh, --out chooses another directory"
 
 
 class Directory:
-    """Where a run writes. Only root touches it; methods whose docstring says "collective" tell all ranks."""
+    """Where a verb writes. Only root touches it; methods whose docstring says "collective" tell all ranks."""
 
-    def __init__(self, path: Path, slab: Slab) -> None:
-        self.path, self.slab = path, slab
+    def __init__(self, path: Path, slab: Slab, verb: str = "run") -> None:
+        self.path, self.slab, self.verb = path, slab, verb
+        self.claims: dict[str, Claim] = {}
         self._lock: int | None = None
 
     @property
@@ -33,7 +51,12 @@ class Directory:
 
     @property
     def stop_file(self) -> Path:
-        return self.path / "stop"
+        return self.path / STOP
+
+    @property
+    def claim(self) -> Claim | None:
+        """What this verb has here; on root, None elsewhere."""
+        return self.claims.get(self.verb)
 
     def checkpoint(self, step: int) -> Path:
         """The file for the checkpoint after a step."""
@@ -43,52 +66,93 @@ class Directory:
     def claimed(self) -> Iterator[None]:
         """No other run writes here meanwhile; collective. A directory that does not exist is claimed when made."""
         try:
-            self._claim_if_there()
+            self._on_root(self._lock_if_there)
             yield
         finally:
             self._release()
 
-    def make(self, job: Path, resolved: str) -> None:
+    def refuse_foreign(self, job: Path, data: Mapping[str, Any], afresh: bool) -> None:
+        """Raise InputError where the files of others, or of another job, are; collective. `data`: the job, plain."""
+
+        def look() -> str:
+            foreign = self._foreign(job)
+            if foreign and not self.claims and not afresh and not self._proven():
+                names = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
+                return (
+                    f"the output directory {self.path} is not empty and not of this program: it holds {names}; --out "
+                    "chooses another directory, --restart never writes here and puts files of the same names aside"
+                )
+            for verb, claim in self.claims.items():
+                if verb != self.verb and (found := "; ".join(marker.differences(claim.job, data, SCENE))):
+                    return (
+                        f"the output directory {self.path} holds {VERBS[verb]} of another job: {found}; --out chooses "
+                        "another directory"
+                    )
+            return ""
+
+        self._on_root(look)
+
+    def make(self, job: Path, resolved: str, claim: Claim) -> None:
         """Make the directory with the job in it; collective. Raises InputError where it cannot be written."""
 
-        def act() -> None:
-            self.checkpoints.mkdir(parents=True, exist_ok=True)
-            copy = self.path / "job.yaml"
-            if not (copy.exists() and copy.samefile(job)):
-                with hdf5.replaced(copy) as part:
-                    shutil.copyfile(job, part)
-            with hdf5.replaced(self.path / "job.resolved.yaml") as part:
-                part.write_text(resolved)
+        def act() -> str:
+            seen = self.claims
+            if not self.path.is_dir() or self._lock is None:
+                self.path.mkdir(parents=True, exist_ok=True)
+                if problem := self._lock_if_there():
+                    return problem
+                if self.claims != seen or (self._foreign(job) and not self.claims):
+                    return f"the output directory {self.path} has been taken by another run meanwhile; {ADVICE}"
+            self._put_aside_what_is_not_ours(job)
+            self.claims = {**self.claims, self.verb: claim}
+            marker.write(self.path, self.claims)
+            if self.verb == "run":
+                self.checkpoints.mkdir(exist_ok=True)
+            copy, table = COPIES[self.verb]
+            if not _same(self.path / copy, job):
+                with files.replaced(self.path / copy) as new, job.open("rb") as given:
+                    shutil.copyfileobj(given, new)
+            files.write(self.path / table, resolved)
+            return ""
 
-        hdf5.on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
-        self._claim_if_there()
+        self._on_root(act)
 
     def clear(self) -> None:
-        """Remove what earlier runs wrote; collective."""
+        """Remove what earlier runs of this verb wrote; collective. Only after `make`, which has put aside the rest."""
 
-        def act() -> None:
-            for path in (*(self.path / name for name in OUTPUTS), *self.checkpoints.glob("step-*.h5*")):
+        def act() -> str:
+            checkpoints = [path for _, path in self.saved()] if self.verb == "run" else []
+            for path in [*(self.path / name for name in RESULTS[self.verb]), *self._unfinished(), *checkpoints]:
                 path.unlink(missing_ok=True)
+            return ""
 
-        hdf5.on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
+        self._on_root(act)
 
     def go_back(self, step: int) -> None:
         """Put aside the checkpoints after a step, and remove unfinished files; collective."""
 
-        def act() -> None:
-            for path in self.checkpoints.glob("*.part"):
+        def act() -> str:
+            for path in self._unfinished():
                 path.unlink()
             for later, path in self.saved():
                 if later > step:
-                    path.rename(path.with_name(path.name + ".aside"))
+                    files.put_aside(path)
+            return ""
 
-        hdf5.on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
+        self._on_root(act)
 
     def prune(self, keep: int) -> None:
         """Remove all but the newest checkpoints; root only."""
         with suppress(OSError):  # too many are no harm
             for _, path in self.saved()[keep:]:
                 path.unlink()
+
+    def note(self, **facts: Any) -> None:
+        """Change what the marker says of this verb; root only. That it cannot be written ends no run."""
+        if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
+            self.claims = {**self.claims, self.verb: changed}
+            with suppress(OSError):
+                marker.write(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
         """Checkpoints and their steps, the newest first; root only."""
@@ -99,24 +163,71 @@ class Directory:
         ]
         return sorted(found, reverse=True)
 
-    # -- the lock -----------------------------------------------------------------------------------------------------
+    def results(self) -> list[str]:
+        """Names of this verb's results that are here; root only."""
+        found = [name for name in RESULTS[self.verb][:2] if os.path.lexists(self.path / name)]
+        return [*found, *(path.name for _, path in self.saved() if self.verb == "run")]
 
-    def _claim_if_there(self) -> None:
+    def _unfinished(self) -> list[Path]:
+        """Files that a run which was killed had not finished."""
+        return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
+
+    # -- whose it is --------------------------------------------------------------------------------------------------
+
+    def _foreign(self, job: Path) -> list[str]:
+        """What is here beside hidden files and the job that is to run."""
+        if not self.path.is_dir():
+            return []
+        return sorted(
+            path.name
+            for path in self.path.iterdir()
+            if not path.name.startswith(".") and path.name not in BESIDE and not _same(path, job)
+        )
+
+    def _proven(self) -> bool:
+        """Whether a checkpoint says that the directory is ours, as in a copy that has lost its marker."""
+        return any(checkpoint.is_one(path) for _, path in self.saved())
+
+    def _put_aside_what_is_not_ours(self, job: Path) -> None:
+        """Files that bear the names of this verb's, where neither the marker nor a checkpoint says that they are."""
+        if self.claim is None and not (self.verb == "run" and self._proven()):
+            for name in (*RESULTS[self.verb], *COPIES[self.verb], *(["checkpoint"] if self.verb == "run" else [])):
+                if not _same(self.path / name, job):
+                    files.put_aside(self.path / name)
+
+    def _on_root(self, act: Callable[[], str]) -> None:
+        """Root acts, and returns what stands in the way or ''; collective. Raises InputError on all ranks."""
         problem = ""
-        if self.slab.root and self._lock is None and self.path.is_dir():
+        if self.slab.root:
             try:
-                problem = self._claim()
-            except OSError as error:
+                problem = act()
+            except hdf5.FAILURES as error:
                 problem = f"the output directory {self.path} cannot be written: {hdf5.reason(error)}"
         if problem := self.slab.agree(problem):
             raise InputError(problem)
 
-    def _claim(self) -> str:
+    # -- the lock -----------------------------------------------------------------------------------------------------
+
+    def _lock_if_there(self) -> str:
+        """Take the lock and read the marker; returns what stands in the way."""
+        if self._lock is None and self.path.is_dir():
+            if problem := self._take_lock():
+                return problem
+            try:
+                self.claims = marker.read(self.path)
+            except ValueError as error:
+                return f"{error}, so that it cannot be told whose {self.path} is; --out chooses another directory"
+        return ""
+
+    def _take_lock(self) -> str:
         """Take the lock, which the system gives back however this process ends. Returns what stands in the way."""
         deadline = time.monotonic() + PATIENCE
-        path = self.path / ".lock"
+        path = self.path / LOCK
         while True:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            try:
+                handle = files.opened(path, os.O_RDWR)
+            except ValueError as error:
+                return f"the output directory {self.path} cannot be locked by {path}: {error}"
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
@@ -127,7 +238,7 @@ class Directory:
                         return f"the output directory {self.path} is in use by another run ({holder or 'just started'})"
                     time.sleep(0.05)
                     continue
-            if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
+            if files.is_the_file(path, handle):
                 break
             os.close(handle)  # its last holder has removed it
         self._lock = handle
@@ -139,6 +250,13 @@ class Directory:
     def _release(self) -> None:
         if self._lock is not None:
             with suppress(OSError):
-                (self.path / ".lock").unlink()
+                (self.path / LOCK).unlink()
             os.close(self._lock)
             self._lock = None
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False

@@ -4,16 +4,19 @@ The file is laid out for all instants of the run before the first: saving one wr
 time last, so that a run that dies leaves a readable file. Instants not reached yet have the time NaN.
 """
 
+import os
 import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from stat import S_ISREG
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..parallel.slab import Array, Slab
-from . import hdf5, layout
+from . import files, hdf5, layout
 from .provenance import Provenance
 
 UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m"}
@@ -32,30 +35,40 @@ class FieldsFile:
     ) -> None:
         self.path, self.slab, self.size, self.names = path, slab, size, tuple(names)
         self.steps = {step: index for index, step in enumerate(steps)}
+        self.trouble = ""  # with fields.xdmf, which no run ends for; on root
         self._drawn = 0.0
+        self._identity = (0, 0)
+        self._kept: frozenset[int] = frozenset()
 
     def make(self, provenance: Provenance) -> None:
-        """Lay the file out anew."""
-        layout.lay_out(self.path, self.slab, lambda file: self._build(file, provenance))
-        self._draw()
+        """Lay the file out anew; what has its name is replaced."""
+        new = self.slab.agree(files.unused(self.path))
+        layout.lay_out(new, self.slab, lambda file: self._build(file, provenance))
+        self._publish(new)
 
     def resume(self, step: int, provenance: Provenance) -> str:
         """Go on after a step: what was saved up to it stays, whatever else was asked for then.
 
-        Returns what is lost, or ''.
+        Returns what is lost, or ''; a file that cannot be read is put aside. Raises InputError for one that is locked.
         """
-        found, problem = self.slab.agree(_layout(self.path) if self.slab.root else (None, ""))
+        found, problem = _found(self.path, self.slab)
         kept = [] if found is None else found.reached(step)
-        self.steps = {n: i for i, n in enumerate(sorted({*kept, *(n for n in self.steps if n > step)}))}
+        self.steps = {n: i for i, n in enumerate(sorted({*kept, *(n for n in self.steps if n >= step)}))}
+        self._kept = frozenset(kept)
         if found is None:
             self.make(provenance)
         elif found.steps == tuple(self.steps) and set(found.names) == set(self.names):
             layout.change(self.path, self.slab, provenance.renew)
             self._stamp(slice(len(kept), None), np.nan)
+            self._identity = self.slab.agree(_identity(self.path))
             self._draw()
         else:
-            self._move_over(found, kept, provenance)
+            problem = self._move_over(found, kept, provenance)
         return problem
+
+    def lacks(self, step: int) -> bool:
+        """Whether the maps of the step after which it goes on are due, and were not saved then."""
+        return step in self.steps and step not in self._kept
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
         """Put the maps of one instant into their place."""
@@ -67,7 +80,16 @@ class FieldsFile:
             self._draw()
 
     def sync(self) -> None:
-        """Wait until all that was saved is on the disk, and bring fields.xdmf up to date."""
+        """Wait until all that was saved is on the disk, and bring fields.xdmf up to date.
+
+        Raises RunError, also when the file was removed or replaced.
+        """
+
+        def look() -> None:
+            if _identity(self.path) != self._identity:
+                raise ValueError("it was removed, or replaced by another file, during the run: maps are lost")
+
+        hdf5.on_root(self.slab, look, f"cannot write {self.path}")
         hdf5.sync(self.path, self.slab)
         self._draw()
 
@@ -94,9 +116,18 @@ class FieldsFile:
             for dimension, axis in enumerate("tyx"):
                 dataset.dims[dimension].attach_scale(file[axis])
 
-    def _move_over(self, found: "Layout", kept: Sequence[int], provenance: Provenance) -> None:
-        """Lay a new file out and copy what stays; a map that was not saved then is NaN."""
-        old, new = self.path, self.path.with_name(self.path.name + ".part")
+    def _publish(self, new: Path) -> None:
+        """Give a file that is ready its name."""
+        hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
+        self._identity = self.slab.agree(_identity(self.path))
+        self._draw()
+
+    def _move_over(self, found: "Layout", kept: Sequence[int], provenance: Provenance) -> str:
+        """Lay a new file out and copy what stays; a map that was not saved then is NaN.
+
+        A file that also holds what is not ours is put aside; returns what to say of that.
+        """
+        old, new = self.path, self.slab.agree(files.unused(self.path))
         layout.lay_out(new, self.slab, lambda file: self._build(file, provenance))
         self.path = new
         rows = np.empty(self.slab.shape)
@@ -109,12 +140,15 @@ class FieldsFile:
         self._stamp([self.steps[step] for step in kept], [found.times[found.steps.index(step)] for step in kept])
         hdf5.sync(new, self.slab)
         self.path = old
-        hdf5.on_root(self.slab, lambda: new.replace(old), f"cannot write {old}")
-        self._draw()
+        aside = self.slab.agree(files.put_aside(old) if self.slab.root and found.others else None)
+        self._publish(new)
+        return f"{old} held {', '.join(found.others)}, which this program did not write: it is kept as {aside}" * (
+            aside is not None
+        )
 
     def _stamp(self, index: int | slice | list[int], time: float | list[float]) -> None:
         def stamp() -> None:
-            with h5py.File(self.path, "r") as file:
+            with h5py.File(self.path, "r", locking=False) as file:  # the output directory is ours
                 times = file["t"][...]
             times[index] = time
             layout.put(self.path, {"t": times})
@@ -122,27 +156,34 @@ class FieldsFile:
         hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
 
     def _draw(self) -> None:
-        def draw() -> None:
-            with h5py.File(self.path, "r") as file:
-                times, steps = file["t"][...], file["step"][...]
-            text = xdmf(self.path.name, times, steps, (self.slab.ny, self.slab.nx), self.size, self.names)
-            with hdf5.replaced(self.path.with_suffix(".xdmf")) as part:
-                part.write_text(text)
-
-        hdf5.on_root(self.slab, draw, f"cannot write {self.path.with_suffix('.xdmf')}")
+        target = self.path.with_suffix(".xdmf")
+        if self.slab.root:
+            try:
+                with h5py.File(self.path, "r", locking=False) as file:
+                    times, steps = file["t"][...], file["step"][...]
+                points = (self.slab.ny, self.slab.nx)
+                files.write(target, xdmf(self.path.name, times, steps, points, self.size, self.names))
+                self.trouble = ""
+            except hdf5.FAILURES as error:
+                self.trouble = f"cannot write {target}: {hdf5.reason(error)}"
         self._drawn = clock.monotonic()
 
 
-def cut_back(path: Path, slab: Slab, step: int) -> None:
-    """Take the instants after a step as not reached, in a file to which nothing more is added; collective."""
+def cut_back(path: Path, slab: Slab, step: int) -> str:
+    """Take the instants after a step as not reached, in a file to which nothing more is added; collective.
+
+    As for `FieldsFile.resume`, returns what is lost, and raises InputError.
+    """
+    if not slab.agree(slab.root and os.path.lexists(path)):
+        return ""
+    found, problem = _found(path, slab)
 
     def forget() -> None:
-        if path.exists():
-            with h5py.File(path, "r") as file:
-                times = np.where(file["step"][...] > step, np.nan, file["t"][...])
-            layout.put(path, {"t": times})
+        if found is not None:
+            layout.put(path, {"t": np.where(np.array(found.steps) > step, np.nan, found.times)})
 
     hdf5.on_root(slab, forget, f"cannot write {path}")
+    return problem
 
 
 class Layout:
@@ -150,6 +191,7 @@ class Layout:
 
     def __init__(self, file: h5py.File) -> None:
         self.names = tuple(name for name in UNITS if name in file)
+        self.others = tuple(name for name in file if name not in (*UNITS, *"txy", "step"))
         self.steps: tuple[int, ...] = tuple(file["step"][...].tolist())
         self.times: NDArray[np.float64] = file["t"][...]
         for name in self.names:
@@ -162,14 +204,41 @@ class Layout:
         return [number for number, time in pairs if number <= step and not np.isnan(time)]
 
 
+def _found(path: Path, slab: Slab) -> tuple[Layout | None, str]:
+    """What a file of fields holds, and what is lost; collective. Raises InputError for one that is locked or a link."""
+    found: tuple[Layout | None, str] = None, ""
+
+    def look() -> None:
+        nonlocal found
+        found = _layout(path)
+
+    hdf5.on_root(slab, look, f"cannot read {path}", InputError)
+    return slab.agree(found)
+
+
 def _layout(path: Path) -> tuple[Layout | None, str]:
+    """As `_found`; root only. A file that cannot be read is put aside, whatever it is."""
+    if not os.path.lexists(path):
+        return None, f"{path} is missing: the fields saved so far are lost"
+    if not S_ISREG(path.lstat().st_mode):
+        raise InputError(f"{path} is a link or no regular file; move it away to go on without the fields saved so far")
+    if holder := hdf5.lock_holder(path):
+        raise InputError(f"{path} is locked by {holder}; let it close the file, and run again")
     try:
         with h5py.File(path, "r") as file:
             return Layout(file), ""
-    except FileNotFoundError:
-        return None, f"{path} is missing: the fields saved so far are lost"
     except hdf5.FAILURES as error:
-        return None, f"{path} cannot be read ({hdf5.reason(error)}): the fields saved so far are lost"
+        kept = files.put_aside(path)
+        return None, f"{path} cannot be read ({hdf5.reason(error)}): it is kept as {kept}, and a new file is begun"
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """Which file a path leads to, by device and number; of none, zeros."""
+    try:
+        found = path.lstat()
+        return found.st_dev, found.st_ino
+    except OSError:
+        return 0, 0
 
 
 def xdmf(

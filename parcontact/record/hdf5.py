@@ -4,18 +4,20 @@ Every rank writes into the places that a file has been laid out with, which chan
 rank is raised on all, as a RunError in one sentence.
 """
 
+import errno
+import fcntl
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
 
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..parallel.slab import Array, Slab
 
 T = TypeVar("T")
@@ -83,6 +85,8 @@ def on_root(slab: Slab, action: Callable[[], Any], what: str, kind: type[Excepti
     if slab.root:
         try:
             action()
+        except (InputError, RunError) as error:
+            problem = str(error)
         except FAILURES as error:
             problem = f"{what}: {reason(error)}"
     if problem := slab.agree(problem):
@@ -213,9 +217,25 @@ class _Move:
         self._id.write(self._memory, self._space, self.rows, dxpl=how)
 
 
-@contextmanager
-def replaced(path: Path) -> Iterator[Path]:
-    """A temporary name to write to; on leaving without an error the file takes the place of `path`."""
-    part = path.with_name(path.name + ".part")
-    yield part
-    part.replace(path)
+def lock_holder(path: Path) -> str:
+    """Which process keeps others from reading an HDF5 file, by HDF5's own lock; '' if none does."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError as error:
+            return _holder(os.fstat(file.fileno())) if error.errno == errno.EWOULDBLOCK else ""
+    return ""
+
+
+def _holder(found: os.stat_result) -> str:
+    """The process with a lock on a file, as far as the system tells."""
+    place = f"{os.major(found.st_dev):02x}:{os.minor(found.st_dev):02x}:{found.st_ino}"
+    with suppress(OSError):
+        for line in Path("/proc/locks").read_text().splitlines():
+            words = line.split()
+            if place in words:
+                number = words[words.index(place) - 1]
+                with suppress(OSError):
+                    return f"process {number}, {Path(f'/proc/{number}/comm').read_text().strip()}"
+                return f"process {number}"
+    return "another process"

@@ -22,7 +22,7 @@ PIECE = 1 << 20  # bytes read at a time
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], block: int = 0) -> None:
-    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective."""
+    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective. The name must be unused."""
 
     def make() -> None:
         with _memory() as memory:
@@ -30,7 +30,7 @@ def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], block: i
                 build(file)
                 found = regions(file)
             size = os.fstat(memory.fileno()).st_size
-            with path.open("wb") as target:
+            with path.open("xb") as target:
                 target.truncate(size)
                 _copy(memory, target, outside(size, found))
 
@@ -72,7 +72,8 @@ def regions(file: h5py.File) -> list[tuple[int, int]]:
     names: list[str] = []
     file.visit(names.append)
     items = (file[name] for name in names)
-    places = [(item.id.get_offset(), item.nbytes) for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
+    maps = [item for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
+    places = [(item.id.get_offset(), item.nbytes) for item in maps if item.id.get_offset() is not None]
     merged: list[tuple[int, int]] = []
     for start, length in sorted(place for place in places if place[1]):
         merged.append((merged.pop()[0] if merged and merged[-1][1] == start else start, start + length))

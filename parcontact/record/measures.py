@@ -1,11 +1,15 @@
 """measures.csv: one row per step and one for the initial state, written by root."""
 
-import csv
 import os
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from . import hdf5
+from ..errors import InputError
+from . import files
+from .checkpoint import Table
 from .row import Row
 
 SOLVED = ("iterations", "residual", "penetration", "operator_calls")
@@ -14,6 +18,8 @@ COLUMNS = (
     *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds"),
 )
 LAST = ("friction_x", "contact_area_corrected")  # columns that came later stand at the end: nothing before them shifts
+MEND = "mend the line, or move the file away to go on without its rows"
+MAX_LINE = 1 << 20  # bytes: a longer one is none of ours
 
 
 def columns(branches: int) -> list[str]:
@@ -41,52 +47,148 @@ def _text(value: float) -> str:
 class MeasuresFile:
     """The growing file; a line that does not end in a newline is none."""
 
-    def __init__(self, path: Path, branches: int) -> None:
-        """Continue the file or begin it."""
-        new = not path.exists() or path.stat().st_size == 0
-        self._branches = branches
-        self._file = path.open("a", newline="")
-        self._writer = csv.writer(self._file, lineterminator="\n")
-        if new:
-            self._writer.writerow(columns(branches))
-            self._file.flush()
+    def __init__(self, path: Path, branches: int, table: Table = Table()) -> None:  # noqa: B008  # frozen
+        """Continue the file, which holds this `table`, or begin it."""
+        self.path, self.table, self._branches, self._names = path, table, branches, columns(branches)
+        self._handle = files.opened(path, os.O_RDWR | os.O_APPEND)
+        self._size = os.fstat(self._handle).st_size
+        if self._size == 0:
+            self._append(",".join(self._names))
 
     def write(self, row: Row) -> None:
-        self._writer.writerow(values(row, self._branches))
-        self._file.flush()
+        """Append a row; on an error the file is as it was before."""
+        cells = values(row, self._branches)
+        line = ",".join(cells)
+        self._append(line)
+        self.table = Table(self.table.rows + 1, _checksum(self.table.checksum, self._names, cells), line)
 
-    def sync(self) -> None:
-        """Wait until all rows are on the disk."""
-        os.fsync(self._file.fileno())
+    def sync(self) -> tuple[str, list[str]]:
+        """Wait until all rows are on the disk. What others did to the file: rows that are lost, and what was mended."""
+        os.fsync(self._handle)
+        if os.fstat(self._handle).st_size < self._size:
+            return f"{self.path} was cut short by another program during the run: rows are lost", []
+        if files.is_the_file(self.path, self._handle):
+            return "", []
+        aside = files.put_aside(self.path)
+        self._put_back()
+        what = f"replaced by another file, which is now {aside.name}," if aside else "removed"
+        return "", [f"{self.path} was {what} during the run: its rows were written again"]
 
     def close(self) -> None:
-        self._file.close()
+        with suppress(OSError):  # every row was written at once
+            os.close(self._handle)
+
+    def _append(self, line: str) -> None:
+        rest = memoryview(f"{line}\n".encode())
+        try:
+            while rest:
+                rest = rest[os.write(self._handle, rest) :]
+        except OSError:
+            with suppress(OSError):
+                os.ftruncate(self._handle, self._size)
+            raise
+        self._size += len(line) + 1
+
+    def _put_back(self) -> None:
+        """Write what the file held, which the system keeps as long as it is open, under its name again."""
+        with files.replaced(self.path) as new:
+            for start in range(0, self._size, MAX_LINE):
+                new.write(os.pread(self._handle, min(MAX_LINE, self._size - start), start))
+        handle = files.opened(self.path, os.O_RDWR | os.O_APPEND)
+        os.close(self._handle)
+        self._handle = handle
 
 
-def cut_back(path: Path, step: int, branches: int) -> str:
+def cut_back(path: Path, step: int, branches: int, then: Table) -> tuple[Table, list[str]]:
     """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
 
-    Returns what is missing, or ''.
+    `then` is what the file held when the checkpoint was written. Returns what it holds now, and what is lost. Raises
+    InputError, and changes nothing, for a file that others have made unreadable.
     """
     if not path.exists():
-        return f"{path} is missing: the rows up to step {step} are lost"
-    last = -1
-    with path.open(newline="") as file, hdf5.replaced(path) as part, part.open("w", newline="") as new:
-        table = csv.DictReader((line for line in file if line.endswith("\n")), restval="")
-        writer = csv.DictWriter(new, columns(branches), restval="", extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
-        for row in table:
-            if int(row["step"]) <= step:
-                last = int(row["step"])
-                writer.writerow(row)
+        return Table(), [f"{path} is missing: the rows up to step {step} are lost"]
+    found, wanted = _rows(path), columns(branches)
+    names = next(found, [])
+    if "step" not in names:
+        raise InputError(f"{path}, line 1, does not name the columns, step among them; move it away or mend it")
+    last, lines, checksum, renewed = -1, 0, 0, 0
+    with files.replaced(path) as new:
+        new.write(f"{','.join(wanted)}\n".encode())
+        line = ""
+        for number, cells in enumerate(found, 2):
+            if (at := _step(path, number, names, cells, last)) > step:
+                break
+            last, lines, checksum = at, lines + 1, _checksum(checksum, names, cells)
+            row = dict(zip(names, cells, strict=True))
+            kept_cells = [row.get(name, "") for name in wanted]
+            renewed, line = _checksum(renewed, wanted, kept_cells), ",".join(kept_cells)
+            new.write(f"{line}\n".encode())
+        kept = Table(lines, renewed, line)
+        problems = _compared(path, step, last, Table(lines, checksum), then)
+        if last < step and lines + 1 == then.rows and names == wanted:  # a full disk had no room for it
+            new.write(f"{then.last}\n".encode())
+            kept, problems = then, []
         new.flush()
         os.fsync(new.fileno())
-    return "" if last == step else f"{path} ends with step {last}: the rows up to step {step} are lost"
+    return kept, problems
+
+
+def _compared(path: Path, step: int, last: int, found: Table, then: Table) -> list[str]:
+    """What a table up to a step, ending with step `last`, lacks of what it held then."""
+    if last < step:
+        return [f"{path} ends with step {last}: the rows up to step {step} are lost"]
+    if then.rows > found.rows:
+        return [f"{path} lacks {then.rows - found.rows} of the {then.rows} rows up to step {step}"]
+    if then.rows and (found.rows, found.checksum) != (then.rows, then.checksum):
+        return [f"{path} was changed by hand: its {found.rows} rows up to step {step} are not those that were written"]
+    return []
+
+
+def _step(path: Path, number: int, names: Sequence[str], cells: Sequence[str], last: int) -> int:
+    """The step of a line, which must be later than the last one."""
+    text = cells[names.index("step")]
+    if not text.isascii() or not text.isdecimal() or len(text) > 18:
+        raise InputError(f"{path}, line {number}: the step {text[:20]!r} is not a whole number; {MEND}")
+    if int(text) <= last:
+        raise InputError(f"{path}, line {number}: step {text} comes after step {last}; {MEND}")
+    return int(text)
+
+
+def _checksum(before: int, names: Sequence[str], cells: Sequence[str]) -> int:
+    """CRC-32 of the rows up to this one, without their wall time, which is another at every run."""
+    text = ",".join(cell for name, cell in zip(names, cells, strict=True) if name != "seconds")
+    return zlib.crc32(text.encode(), before)
+
+
+def _rows(path: Path) -> Iterator[list[str]]:
+    """The cells of each whole line, the names of the columns first, all as many; raises InputError."""
+    count = 0
+    with path.open("rb") as file:
+        for number in range(1, 1 << 62):
+            line = file.readline(MAX_LINE)
+            if not line.endswith(b"\n"):
+                if len(line) == MAX_LINE:
+                    raise InputError(f"{path}, line {number}, has more than {MAX_LINE} bytes; {MEND}")
+                return
+            cells = line.decode(errors="replace").rstrip("\r\n").split(",")
+            if len(cells) != (count or len(cells)):
+                raise InputError(f"{path}, line {number}, has {len(cells)} values instead of {count}; {MEND}")
+            count = len(cells)
+            yield cells
 
 
 def read(path: Path) -> dict[str, list[float]]:
-    """Columns of a measures file by name, also of one that still grows; NaN for what was not asked for."""
-    with path.open(newline="") as file:
-        table = list(csv.reader(line for line in file if line.endswith("\n")))
-    series = zip(*table[1:], strict=True) if len(table) > 1 else [[] for _ in table[0]]
-    return {name: [float(text or "nan") for text in column] for name, column in zip(table[0], series, strict=True)}
+    """Columns of a table by name, also of one that still grows; NaN for what was not asked for.
+
+    Raises InputError, which names the line, for what is no table of numbers.
+    """
+    rows = _rows(path)
+    names = next(rows, [])
+    series: list[list[float]] = [[] for _ in names]
+    for number, cells in enumerate(rows, 2):
+        for name, text, values in zip(names, cells, series, strict=True):
+            try:
+                values.append(float(text or "nan"))
+            except ValueError:
+                raise InputError(f"{path}, line {number}: {name} is {text[:20]!r}, not a number") from None
+    return dict(zip(names, series, strict=True))

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Sequence
 
 from ..effects import decisions as calls_for
-from ..errors import InputError
+from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
 from . import fields, hdf5, measures
+from .checkpoint import Table
 from .console import Console, Silence
 from .directory import Directory
 from .fields import FieldsFile
@@ -19,8 +20,9 @@ class Recorder:
     """Writes what a job asks for after every step; making one, and its methods, are collective.
 
     Parameters: the `directory`; the `provenance` of its files; `total` steps of the run; `after`, the step after which
-    it goes on, or None to begin; `dissipated`, the number of branches whose dissipation has a column. Raises InputError
-    where the files cannot be written. `warnings` says what was lost of an earlier run.
+    it goes on, or None to begin, and what the `table` of measures held then; `dissipated`, the number of branches whose
+    dissipation has a column. Raises InputError where the files cannot be written. `warnings` says what was lost of an
+    earlier run, `problem` what of the results cannot be written.
     """
 
     def __init__(
@@ -31,6 +33,7 @@ class Recorder:
         provenance: Provenance,
         total: int,
         after: int | None,
+        then: Table,
         dissipated: int,
         quiet: bool,
     ) -> None:
@@ -42,9 +45,11 @@ class Recorder:
         table, log = self.path / "measures.csv", self.path / "run.log"
 
         def begin_table() -> None:
+            kept = Table()
             if after is not None:
-                self.warnings += filter(None, [measures.cut_back(table, after, dissipated)])
-            self._measures = MeasuresFile(table, dissipated)
+                kept, lost = measures.cut_back(table, after, dissipated, then)
+                self.warnings += lost
+            self._measures = MeasuresFile(table, dissipated, kept)
 
         def begin_log() -> None:
             self.console = Console(log, quiet, total)
@@ -57,7 +62,7 @@ class Recorder:
         path, output = self.path / "fields.h5", job.output
         if not calls_for.fields(job).on or not total:
             if after is not None:
-                fields.cut_back(path, self.slab, after)
+                self.warnings += filter(None, [fields.cut_back(path, self.slab, after)])
             return None
         steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), total})
         file = FieldsFile(path, self.slab, job.grid.size, output.fields, steps)
@@ -67,33 +72,59 @@ class Recorder:
             self.warnings += filter(None, [file.resume(after, provenance)])
         return file
 
+    @property
+    def table(self) -> Table:
+        """What measures.csv holds; on root."""
+        return self._measures.table if self._measures else Table()
+
     def write(self, row: Row, field: Callable[[str], Array]) -> None:
         """Record an instant; `field(name)` gives this rank's rows of a map.
 
-        What goes wrong with root's lines is left in `problem`, for the next decision to tell the other ranks.
+        What goes wrong is left in `problem`, for the next decision, which saves the state first.
         """
-        if self.slab.root and self._measures:
+        self.console.step(row)
+        if self._measures:
             try:
-                self.console.step(row)
                 self._measures.write(row)
             except OSError as error:
-                self.problem = f"cannot write {self.path / 'measures.csv'}: {hdf5.reason(error)}"
+                self.problem = f"cannot write {self._measures.path}: {hdf5.reason(error)}"
+        self._save_fields(row, field)
+
+    def catch_up(self, row: Row, field: Callable[[str], Array]) -> None:
+        """Save the maps of the step after which a run goes on, if they are due and could not be saved then."""
+        if self._fields and self._fields.lacks(row.step):
+            self._save_fields(row, field)
+
+    def _save_fields(self, row: Row, field: Callable[[str], Array]) -> None:
         if self._fields and row.step in self._fields.steps:
-            self._fields.save(row.step, row.time, {name: field(name) for name in self._fields.names})
+            try:
+                self._fields.save(row.step, row.time, {name: field(name) for name in self._fields.names})
+            except RunError as error:
+                self.problem = self.problem or str(error)
 
     def sync(self) -> None:
-        """Wait until all that was recorded is on the disk, so that no checkpoint is ahead of it; raises RunError."""
+        """Wait until all that was recorded is on the disk. What is wrong with it is left in `problem`, if results are
+        lost by it, or warned of."""
 
         def sync() -> None:
             if self._measures:
-                self._measures.sync()
+                lost, mended = self._measures.sync()
+                for text in mended:
+                    self.console.warn(text)
+                if lost:
+                    raise RunError(lost)
 
-        hdf5.on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
-        if self._fields:
-            self._fields.sync()
+        try:
+            hdf5.on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
+            if self._fields:
+                self._fields.sync()
+        except RunError as error:
+            self.problem = self.problem or str(error)
+        if self._fields and self._fields.trouble:
+            self.console.warn(self._fields.trouble)
 
     def close(self) -> None:
-        """Not collective."""
+        """Not collective; raises nothing."""
         self.console.close()
         if self._measures:
             self._measures.close()

@@ -1,8 +1,7 @@
 """Where a run begins: at the start, or after the newest sound checkpoint that belongs to its job."""
 
 import math
-import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,18 +11,16 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..errors import InputError
-from ..job import HeightFile, Job, Stage
-from ..job.table import plain
+from ..job import Job, Stage
 from ..job.timeline import Step
 from ..parallel.slab import Slab
-from ..record import checkpoint
+from ..record import checkpoint, marker
 from ..record.checkpoint import Contents
-from ..record.directory import Directory
+from ..record.directory import ADVICE, Directory
 
 SAME = ("grid", "surface", "material", "initial")  # sections that must not change
-SAME_NUMERICS = ("integrator", "kernel", "precision", "slope")
+SAME_NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
 ROUND_OFF = 1e-9  # relative: steps of two histories this close are the same
-ADVICE = "--restart never starts afresh, --out chooses another directory"
 
 
 @dataclass(frozen=True)
@@ -39,72 +36,83 @@ class Origin:
         return self.contents.numbers.get("plans/all")
 
 
-def plain_job(job: Job) -> dict[str, Any]:
-    """A job as plain data for a checkpoint; files of heights are known by what they hold, not by their path."""
-    data: dict[str, Any] = plain(job)
-    for part, shape in zip(data["surface"], job.surface, strict=True):
-        if isinstance(shape, HeightFile):
-            del part["path"]
-            part["content"] = f"{zlib.crc32(shape.path.read_bytes()):08x}"
-    return data
-
-
-def choose(job: Job, slab: Slab, directory: Directory, restart: str) -> tuple[Origin | None, list[str]]:
+def choose(
+    job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str
+) -> tuple[Origin | None, list[str]]:
     """Where to begin, and warnings about checkpoints that were passed over; collective.
 
-    `restart` is `auto`, `never` or the path of a checkpoint. Raises InputError when there are some and none will do.
+    `plain` is the job as plain data, on root; `restart` is `auto`, `never` or the path of a checkpoint. Raises
+    InputError when there are checkpoints and none will do, or when results would be lost.
     """
+    directory.refuse_foreign(job.path, plain, restart == "never")
     if restart == "never":
         return None, []
     given = None if restart == "auto" else Path(restart)
     candidates = [given] if given else [path for _, path in slab.agree(directory.saved() if slab.root else [])]
     problems: list[str] = []
     for path in candidates:
-        found = slab.agree(_attempt(path, job) if slab.root else None)
+        found = slab.agree(_attempt(path, plain) if slab.root else None)
         problem = found if isinstance(found, str) else checkpoint.verify(found, slab) if found else "?"
         if isinstance(found, Contents) and not problem:
             if difference := slab.agree(another_past(found, job) if slab.root else ""):
                 raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
-            own = slab.agree(path.absolute().parent == directory.checkpoints.absolute())
+            own = slab.agree(_is_own(found, directory) if slab.root else False)
+            _refuse(slab, _would_mix(directory, path) if slab.root and not own else "")
             return Origin(found, own), [f"passed over: {text}" for text in problems]
         problems.append(problem)
     if problems:
         raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
+    _refuse(slab, _would_lose(directory, plain) if slab.root else "")
     return None, []
 
 
-def _attempt(path: Path, job: Job) -> Contents | str:
+def _refuse(slab: Slab, problem: str) -> None:
+    """Raise what root says stands in the way; collective."""
+    if problem := slab.agree(problem):
+        raise InputError(problem)
+
+
+def _is_own(contents: Contents, directory: Directory) -> bool:
+    """Whether a checkpoint is of the run in the directory: by its run id, or as one of its files under any name."""
+    if directory.claim is not None and contents.run:
+        return contents.run == directory.claim.id
+    return any(contents.path.samefile(path) for _, path in directory.saved())
+
+
+def _would_mix(directory: Directory, path: Path) -> str:
+    """Why a run may not go on from the checkpoint of another run in a directory; root only."""
+    if found := directory.results():
+        there = ", ".join(found[:3])
+        return f"{path} is of another run than {directory.path}, which holds {there}; --out chooses another directory"
+    return ""
+
+
+def _would_lose(directory: Directory, plain: Mapping[str, Any]) -> str:
+    """Which results a run that begins anew would replace, though no checkpoint says that it can make them; root only.
+
+    A run of this job that ended before its first checkpoint has nothing that this one does not make again.
+    """
+    claim, found = directory.claim, directory.results()
+    if claim is None or not found:
+        return ""
+    there = f"{directory.path} holds {', '.join(found)}"
+    if different := "; ".join(marker.differences(claim.job, plain, (*SAME, *SAME_NUMERICS))):
+        return f"{there} of another job: {different}; {ADVICE}"
+    if claim.saved:
+        how = f"a run that has finished at t = {claim.finished[1]:g} s" if claim.finished else "a run"
+        return f"{there} of {how}, but its checkpoints are missing; {ADVICE}"
+    return ""
+
+
+def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
     """A checkpoint without its maps, or why it will not do; root only."""
     try:
         contents = checkpoint.inspect(path)
-        if found := "; ".join(differences(contents.job, plain_job(job))):
+        if found := "; ".join(marker.differences(contents.job, plain, (*SAME, *SAME_NUMERICS))):
             return f"{path} belongs to another job: {found}"
         return contents
     except (InputError, OSError) as error:
         return str(error)
-
-
-def differences(then: dict[str, Any], now: dict[str, Any]) -> Iterator[str]:
-    """What in the job of a checkpoint makes it another one than a job as plain data, with both values."""
-    for section in SAME:
-        yield from _differences(section, then.get(section), now.get(section))
-    for key in SAME_NUMERICS:
-        yield from _differences(f"numerics.{key}", then["numerics"].get(key), now["numerics"].get(key))
-
-
-def _differences(name: str, then: Any, now: Any) -> Iterator[str]:
-    if isinstance(then, dict) and isinstance(now, dict):
-        for key in [*then, *(key for key in now if key not in then)]:
-            yield from _differences(f"{name}.{key}", then.get(key), now.get(key))
-    elif _parts(then) and _parts(now) and len(then) == len(now):
-        for index, (old, new) in enumerate(zip(then, now, strict=True)):
-            yield from _differences(f"{name}.{index}", old, new)
-    elif then != now:
-        yield f"{name} was {then}, is {now}"
-
-
-def _parts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(part, dict) for part in value)
 
 
 def another_past(contents: Contents, job: Job) -> str:

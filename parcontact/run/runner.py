@@ -1,7 +1,8 @@
 """A run from a job to its output directory: it begins or goes on, saves what it remembers, and ends well."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from .. import scene
 from ..effects import decisions as calls_for
@@ -14,9 +15,10 @@ from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..physics.entries import Entry
-from ..record import checkpoint, plans
-from ..record.checkpoint import Facts
+from ..record import checkpoint, marker, plans
+from ..record.checkpoint import Facts, Table
 from ..record.directory import Directory
+from ..record.marker import Claim
 from ..record.provenance import Link, Provenance, extended
 from ..record.recorder import Recorder
 from ..scene import Scene
@@ -42,7 +44,8 @@ def run(job: Job, slab: Slab, options: Options) -> int:
     """Run a job; collective. Returns the exit code. Nothing is written before the whole job has proved sound."""
     directory = Directory(job.output.directory, slab)
     with Signals().noted() as signals, directory.claimed():
-        origin, warnings = restart.choose(job, slab, directory, options.restart)
+        plain = marker.plain_job(job) if slab.root else {}
+        origin, warnings = restart.choose(job, plain, slab, directory, options.restart)
         timeline = job.timeline(options.until or 0.0)
         _refuse_no_end(timeline, options.until)
         if origin and (reason := _nothing_to_do(origin, timeline, options.until)):
@@ -58,13 +61,15 @@ def run(job: Job, slab: Slab, options: Options) -> int:
             steadystart.begin(marching)
         plans.keep(job, slab)
         provenance = _provenance(job, slab, origin)
-        recorder = _begin(built, directory, provenance, origin, len(timeline), options.quiet)
+        claim = _claim(plain, directory, origin)
+        recorder = _begin(built, directory, claim, provenance, origin, len(timeline), options.quiet)
         try:
             for text in (*job.warnings, *warnings, *recorder.warnings):
                 recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None
             watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
-            return _Journey(marching, timeline, directory, recorder, watching, provenance, options.until).go(origin)
+            facts = Facts(0, 0.0, plain, provenance, claim.id)
+            return _Journey(marching, timeline, directory, recorder, watching, facts, options.until).go(origin)
         finally:
             recorder.close()
 
@@ -93,20 +98,34 @@ def _provenance(job: Job, slab: Slab, origin: Origin | None) -> Provenance:
     return Provenance(chain, seeds, str(job.included) if job.included else "")
 
 
+def _claim(plain: dict[str, Any], directory: Directory, origin: Origin | None) -> Claim:
+    """What this run says of itself in the marker: the id stays as long as it goes on in its own directory."""
+    data = marker.kept(plain)
+    if origin and origin.own:
+        return Claim(data, origin.contents.run, saved=True) if origin.contents.run else Claim(data, saved=True)
+    return Claim(data)
+
+
 def _begin(
-    built: Scene, directory: Directory, provenance: Provenance, origin: Origin | None, total: int, quiet: bool
+    built: Scene,
+    directory: Directory,
+    claim: Claim,
+    provenance: Provenance,
+    origin: Origin | None,
+    total: int,
+    quiet: bool,
 ) -> Recorder:
     """Make the output directory ready, and its files; collective."""
     job = built.job
-    directory.make(job.path, job.resolved())
+    directory.make(job.path, job.resolved(), claim)
     if origin and origin.own:
         directory.go_back(origin.contents.step)
-    else:
+    elif origin is None:
         directory.clear()
     split = calls_for.branch_dissipation(job).on
     dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
-    after = origin.contents.step if origin else None
-    return Recorder(job, built.slab, directory, provenance, total, after, dissipated, quiet)
+    after, then = (origin.contents.step, origin.contents.table) if origin else (None, Table())
+    return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet)
 
 
 class _Journey:
@@ -119,15 +138,14 @@ class _Journey:
         directory: Directory,
         recorder: Recorder,
         watching: Watch,
-        provenance: Provenance,
+        facts: Facts,
         until: float | None,
     ) -> None:
         self.march, self.timeline, self.directory, self.recorder = marching, timeline, directory, recorder
-        self.watch, self.provenance, self.until = watching, provenance, until
+        self.watch, self.facts, self.until = watching, facts, until
         self.slab, self.job = marching.scene.slab, marching.scene.job
         self.console = recorder.console
         self.first, self.saved, self.failed = marching.row.step, -1, False
-        self.plain = restart.plain_job(self.job) if self.slab.root else {}
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
         self.stop = ""
         self.began, self.saving = time.monotonic(), 0.0
@@ -142,6 +160,7 @@ class _Journey:
             self.console.say(fact)
         if origin:
             self.console.say(f"goes on after step {self.first} from {origin.contents.path}")
+            self.recorder.catch_up(self.march.row, self.march.field)
         ended = march.done(self.march, [self.decide] if origin else [self.record, self.decide])
         if not ended:
             self._march()
@@ -163,7 +182,7 @@ class _Journey:
         """Leave a checkpoint of the last good step; what to say of it."""
         try:
             if self.saved != self.march.row.step:
-                self.save(last=True)
+                self._write(last=True)
         except RunError as error:
             return f"; {error}"
         return self._newest()
@@ -178,7 +197,7 @@ class _Journey:
         row = marching.row
         verdict = self.watch.judge(row.step, row.step > self.first, self.recorder.problem)
         if verdict.problem:
-            raise RunError(verdict.problem + self._newest())
+            raise RunError(verdict.problem + self._left())
         self.stop = verdict.stop if row.step < len(self.timeline) else ""
         ends = bool(self.stop) or (self.until is not None and reached(row.time, self.until))
         if verdict.save and not ends and row.step < len(self.timeline):
@@ -186,13 +205,22 @@ class _Journey:
         return ends
 
     def save(self, last: bool = False) -> None:
-        """Write a checkpoint; one failure is only warned of, two in a row, or one at the end, are a RunError."""
+        """Write a checkpoint; results that were lost, or cannot be written, end the run when its state is saved."""
+        self._write(last)
+        if problem := self.slab.agree(self.recorder.problem):
+            raise RunError(problem + self._left())
+
+    def _write(self, last: bool) -> None:
+        """Write a checkpoint; one failure is only warned of, two in a row, or one at the end, are a RunError.
+
+        What was recorded is synchronised first, so that no checkpoint is ahead of it.
+        """
         began, row = time.monotonic(), self.march.row
         path = self.directory.checkpoint(row.step)
-        facts = Facts(row.step, row.time, self.plain, self.provenance)
+        self.recorder.sync()
+        facts = replace(self.facts, step=row.step, time=row.time, table=self.recorder.table)
         entries = {**self.march.entries(), "plans/all": Entry(plans.gathered(self.slab))}
         try:
-            self.recorder.sync()
             checkpoint.write(path, self.slab, facts, entries)
         except RunError as error:
             if last or self.failed:
@@ -202,6 +230,7 @@ class _Journey:
             return
         self.saved, self.failed = row.step, False
         if self.slab.root:
+            self.directory.note(saved=True)
             self.directory.prune(self.job.checkpoint.keep)
         seconds = time.monotonic() - began
         self.saving += seconds

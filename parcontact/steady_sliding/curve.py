@@ -11,7 +11,7 @@ from .. import scene
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Slab
-from ..record import steady_plot
+from ..record import marker, steady_plot
 from ..record.directory import Directory
 from .sliding import Point, SteadySliding
 
@@ -60,10 +60,12 @@ def _pressures(job: Job) -> tuple[float, ...]:
 
 def run(job: Job, slab: Slab, wanted: Request, quiet: bool) -> int:
     """Solve all points, writing each at once; collective. Returns the exit code: 1 if any of them has failed."""
-    directory = Directory(job.output.directory, slab)
+    directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
+        plain = marker.plain_job(job) if slab.root else {}
+        directory.refuse_foreign(job.path, plain, False)
         sliding = SteadySliding(scene.frame(job, slab))
-        directory.make(job.path, job.resolved())
+        directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         table = _Table(directory.path, sliding, wanted, quiet) if slab.root else None
         failures = 0
         for pressure in wanted.pressures:

@@ -97,7 +97,7 @@ def test_failed_write_leaves_the_old_one(comm: MPI.Intracomm, tmp_path: Path) ->
     write(path, comm)
     slab = Slab(comm, NX, NY)
     bad = entries(slab) | {"contact/pressure": Entry(np.zeros((NY + 1, NX)))}
-    with pytest.raises(RunError, match=r"cannot write .*file\.h5\.part"):
+    with pytest.raises(RunError, match=r"cannot write .*file\.h5\..*\.part"):
         checkpoint.write(path, slab, FACTS, bad)
     assert isinstance(look(path, comm), Contents)
     assert [file.name for file in tmp_path.iterdir()] == ["file.h5"]

@@ -7,6 +7,7 @@ import pytest
 
 from parcontact.physics.ledger import Measures
 from parcontact.record import measures
+from parcontact.record.checkpoint import Table
 from parcontact.record.measures import COLUMNS, LAST, MeasuresFile
 from parcontact.record.row import Row
 
@@ -56,7 +57,7 @@ def test_cut_back(tmp_path: Path) -> None:
     whole = path.read_text()
     with path.open("a") as file:
         file.write("6,0.6,0.")  # a row that was cut off
-    assert measures.cut_back(path, 3, 0) == ""
+    assert measures.cut_back(path, 3, 0, Table())[1] == []
     assert path.read_text() == "".join(whole.splitlines(keepends=True)[:5])
     file_again = MeasuresFile(path, 0)
     for step in (4, 5):
@@ -67,19 +68,19 @@ def test_cut_back(tmp_path: Path) -> None:
 
 def test_what_is_lost_is_said(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
-    assert "is missing" in measures.cut_back(path, 3, 0)
+    assert "is missing" in measures.cut_back(path, 3, 0, Table())[1][0]
     written(path, 3)
-    assert "ends with step 2: the rows up to step 5 are lost" in measures.cut_back(path, 5, 0)
+    assert "ends with step 2: the rows up to step 5 are lost" in measures.cut_back(path, 5, 0, Table())[1][0]
 
 
 def test_other_columns(tmp_path: Path) -> None:
     """The dissipation of branches may be asked for later, or no longer."""
     path = tmp_path / "measures.csv"
     written(path, 3)
-    assert measures.cut_back(path, 2, 2) == ""
+    assert measures.cut_back(path, 2, 2, Table())[1] == []
     assert list(measures.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1", *LAST]
     assert math.isnan(measures.read(path)["dissipated_1"][2])
-    assert measures.cut_back(path, 2, 0) == ""
+    assert measures.cut_back(path, 2, 0, Table())[1] == []
     assert list(measures.read(path)) == [*COLUMNS, *LAST]
     written(tmp_path / "split.csv", 2, branches=2)
     assert measures.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]
