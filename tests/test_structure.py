@@ -16,7 +16,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"compiled"},
     {"parallel", "job"},
     {"physics"},
-    {"theory", "solve"},
+    {"theory", "solve", "rubber"},
     {"effects"},
     {"record"},
     {"scene"},

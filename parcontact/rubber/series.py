@@ -1,0 +1,194 @@
+"""A Prony series from measured moduli: non-negative least squares on a logarithmic grid of relaxation times.
+
+    G'(w) = G_inf + sum_k G_k (w tau_k)^2/(1 + (w tau_k)^2),    G''(w) = sum_k G_k w tau_k/(1 + (w tau_k)^2),
+    G(t)  = G_inf + sum_k G_k exp(-t/tau_k),                    all G_k >= 0, G_inf >= 0.
+
+Errors are relative, so that the plateau of the glass does not hide that of the rubber. As few times as meet the error
+asked for are kept. (M. Baumgaertel, H. H. Winter, Rheol. Acta 28 (1989) 511; C. L. Lawson, R. J. Hanson, Solving Least
+Squares Problems (1974), chapter 23.)
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize, nnls
+
+from ..errors import InputError
+from .shift import WLF, Arrhenius, Factors, Shift
+from .tables import Measurement, Set
+
+Array = NDArray[np.float64]
+DENSE = 3  # times per decade of the best series that is looked for
+MOST = 48  # branches
+SPARE = 0.5  # decades of times beyond the data, to either side
+ENDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # decades beyond the data that are tried for a short series
+WIDEST = 8.0  # decades: the largest shift between neighbouring temperatures that is looked for
+MOST_DECADES = 30.0  # of shift between the coldest and the warmest set
+Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
+WLF_CONSTANTS: Ranges = ((2.0, 60.0, 24), (20.0, 600.0, 24))  # C1 [-], C2 [K]
+ENERGIES: Ranges = ((1e4, 1e6, 60),)  # J/mol
+SHORTEST = 0.3  # share of a sweep that must overlap with its neighbour's
+
+
+@dataclass(frozen=True)
+class Series:
+    """`modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference temperature.
+
+    `error` is the rms of the logarithms of fitted over measured moduli, storage and loss together; `scatter` that of a
+    dense series, the scatter of the data; `band` [rad/s] holds the reduced frequencies of the data (of relaxation: the
+    inverse times).
+    """
+
+    modulus_inf: float
+    moduli: Array
+    times: Array
+    error: float
+    scatter: float
+    band: tuple[float, float]
+
+
+def fit(sets: Sequence[Set], kind: str, error: float, shifts: Sequence[float] | None = None) -> Series:
+    """The shortest series that meets an rms error of the logarithms; `shifts` are log10 a_T of the sets.
+
+    The scatter of the data, which no series meets, is what a dense one leaves; it is allowed besides, as a square.
+    """
+    at, data = _reduced(sets, kind, shifts or [0.0] * len(sets))
+    rates = at if kind == "frequency" else 1.0 / at
+    band = float(rates.min()), float(rates.max())
+    dense = _solve(at, data, kind, _dense(*band))
+    goal = math.hypot(error, dense.error)
+    for count in range(1, MOST + 1):
+        tried = [_solve(at, data, kind, _grid(band, count, spare)) for spare in ENDS]
+        found = min(tried, key=lambda series: series.error)
+        if found.error <= goal:
+            return replace(found, scatter=dense.error, band=band)
+    return replace(dense, scatter=dense.error, band=band)
+
+
+def _grid(band: tuple[float, float], count: int, spare: float = SPARE) -> Array:
+    """Relaxation times [s] over a band of rates and some decades beyond, in the middles of equal parts of it."""
+    low, high = math.log10(1.0 / band[1]) - spare, math.log10(1.0 / band[0]) + spare
+    step = (high - low) / count
+    return np.asarray(10.0 ** (low + step * (0.5 + np.arange(count))))
+
+
+def _reduced(sets: Sequence[Set], kind: str, shifts: Sequence[float]) -> tuple[Array, Array]:
+    """Reduced rates or times of all sets, shape (n,), and their moduli, shape (n,) or (2 n,): storage before loss."""
+    sign = 1.0 if kind == "frequency" else -1.0
+    at = np.concatenate([each.at * 10.0 ** (sign * log) for each, log in zip(sets, shifts, strict=True)])
+    storage, loss = (np.concatenate([getattr(each, name) for each in sets]) for name in ("storage", "loss"))
+    return at, np.concatenate([storage, loss])
+
+
+def _columns(at: Array, kind: str, times: Array) -> Array:
+    """What a unit modulus of each time, and of none (the last column), adds to the data."""
+    if kind == "time":
+        return np.hstack([np.exp(-at[:, None] / times), np.ones((at.size, 1))])
+    z = at[:, None] * times
+    storage = np.hstack([z**2 / (1.0 + z**2), np.ones((at.size, 1))])
+    return np.vstack([storage, np.hstack([z / (1.0 + z**2), np.zeros((at.size, 1))])])
+
+
+def _solve(at: Array, data: Array, kind: str, times: Array) -> Series:
+    """The best moduli >= 0 for given times; those that are 0 are left out."""
+    columns = _columns(at, kind, times)
+    *moduli, spring = found = nnls(columns / data[:, None], np.ones(data.size), maxiter=100 * times.size + 100)[0]
+    fitted = np.maximum(columns @ found, np.finfo(float).tiny)
+    error = float(np.sqrt(np.mean(np.log(fitted / data) ** 2)))
+    kept = np.asarray(moduli) > 0.0
+    return Series(float(spring), np.asarray(moduli)[kept], times[kept], error, error, (0.0, 0.0))
+
+
+# -- the shift of measured sets ----------------------------------------------------------------------------------------
+
+
+def find_shift(measured: Measurement, reference: float, law: str) -> Shift:
+    """A law (`wlf`, `arrhenius` or `free`, for factors at the measured temperatures) that joins the sets of a
+    measurement to one curve at a reference temperature [deg C].
+
+    The constants of a law are those for which one Prony series meets all sets best; free factors move each set until it
+    overlaps best with its neighbour. Raises InputError where the sets are too few or do not overlap.
+    """
+    temperatures = [each.temperature for each in measured.sets]
+    known = [value for value in temperatures if value is not None]
+    if len(known) < 2:
+        raise InputError(f"{measured.path}: a shift needs sets at two temperatures at least")
+    if not known[0] <= reference <= known[-1]:
+        raise InputError(
+            f"{measured.path}: the reference temperature must lie within {known[0]:g} and {known[-1]:g} C, "
+            f"got {reference:g}"
+        )
+    if law == "free":
+        return _relative(known, _overlaps(measured), reference)
+    return _fitted(measured, known, WLF_CONSTANTS if law == "wlf" else ENERGIES, reference)
+
+
+def _overlaps(measured: Measurement) -> list[float]:
+    """log10 of the shift of each set against the first, one neighbour after the other."""
+    logs = [0.0]
+    for number, (colder, warmer) in enumerate(zip(measured.sets, measured.sets[1:], strict=False)):
+        steps = np.linspace(-WIDEST, WIDEST, 16 * int(WIDEST) + 1)
+        apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
+        if not np.isfinite(min(apart)):
+            raise InputError(f"{measured.path}: set {number + 1} and set {number + 2} do not overlap at any shift")
+        near = float(steps[int(np.argmin(apart))])
+        fine = np.linspace(near - 0.15, near + 0.15, 61)
+        logs.append(logs[-1] + float(fine[int(np.argmin([_apart(colder, warmer, s, measured.kind) for s in fine]))]))
+    return logs
+
+
+def _apart(colder: Set, warmer: Set, log: float, kind: str) -> float:
+    """Mean square of the differences of the logarithms where two sets overlap; infinite where they do so too little."""
+    sign = 1.0 if kind == "frequency" else -1.0
+    own, other = np.log10(colder.at), np.log10(warmer.at) + sign * log
+    low, high = max(own[0], other[0]), min(own[-1], other[-1])
+    if high - low < SHORTEST * min(np.ptp(own), np.ptp(other)):
+        return math.inf
+    points = np.linspace(low, high, 40)
+    pairs = [(colder.storage, warmer.storage), *([(colder.loss, warmer.loss)] if colder.loss.size else [])]
+    squares = [
+        np.mean((np.interp(points, own, np.log(a)) - np.interp(points, other, np.log(b))) ** 2) for a, b in pairs
+    ]
+    return float(np.mean(squares))
+
+
+def _relative(temperatures: Sequence[float], logs: Sequence[float], reference: float) -> Factors:
+    there = float(np.interp(reference, temperatures, logs))
+    return Factors(tuple(temperatures), tuple(float(log - there) for log in logs), reference)
+
+
+def _fitted(measured: Measurement, temperatures: Sequence[float], ranges: Ranges, reference: float) -> Shift:
+    """The constants for which one dense series meets all sets best: of a grid, then near to the best of these."""
+
+    def law(constants: Array) -> WLF | Arrhenius:
+        values = [float(value) for value in np.exp(constants)]
+        return WLF(values[0], values[1], reference) if len(values) == 2 else Arrhenius(values[0], reference)
+
+    def error(constants: Array) -> float:
+        try:
+            shifts = [law(constants).log_factor(t) for t in temperatures]
+        except InputError:
+            return math.inf
+        if max(shifts) - min(shifts) > MOST_DECADES:
+            return math.inf
+        at, data = _reduced(measured.sets, measured.kind, shifts)
+        rates = at if measured.kind == "frequency" else 1.0 / at
+        return _solve(at, data, measured.kind, _dense(float(rates.min()), float(rates.max()))).error
+
+    grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
+    start = min(grid, key=error)
+    if not math.isfinite(error(start)):
+        raise InputError(f"{measured.path}: no law of the shift joins the sets at {reference:g} C")
+    simplex = np.vstack([start, start + 0.05 * np.eye(start.size)])
+    options = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-8, "maxfev": 200}
+    return law(minimize(error, start, method="Nelder-Mead", options=options).x)
+
+
+def _dense(low: float, high: float) -> Array:
+    """Relaxation times for rates from `low` to `high` [1/s], as many as tell one measured point from the next."""
+    decades = math.log10(high / low) + 2 * SPARE
+    return _grid((low, high), min(MOST, math.ceil(DENSE * decades) + 1))

@@ -1,0 +1,207 @@
+"""Tables of measured moduli: what a text file says, in SI units, or one sentence with file and line why it will not do.
+
+Two forms are read. Both name what their columns are; nothing is guessed.
+
+* Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between them):
+  `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K), `tan_del`.
+* One header row in which units stand in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, any white space or comma between.
+
+Lines that begin with # are comments. Rows of one temperature are one set; without T all rows are one set.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+Kind = Literal["frequency", "time"]
+LARGEST_FILE = 50_000_000  # bytes
+LEAST_ROWS = 3  # of a set: fewer say nothing about a spectrum
+NEAR = 1.5  # degrees: rows whose temperatures differ by less belong to one set
+PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+RATES = {"Hz": 2 * math.pi, "rad/s": 1.0}
+TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "K": -273.15}
+NAMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
+
+
+@dataclass(frozen=True)
+class Set:
+    """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
+
+    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of a relaxation. `storage` and `loss`,
+    shape (n,) [Pa]: of shear; of a relaxation `storage` is the relaxation modulus and `loss` is empty.
+    """
+
+    temperature: float | None
+    at: Array
+    storage: Array
+    loss: Array
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """All sets of a file, by temperature; `tension` tells that moduli were Young's and have been divided."""
+
+    path: Path
+    kind: Kind
+    sets: tuple[Set, ...]
+    tension: bool
+
+
+class _Column(NamedTuple):
+    name: str
+    unit: str
+
+
+def read(path: Path, poisson: float = 0.5) -> Measurement:
+    """Read a table; Young's moduli become those of shear, `G = E/(2 (1 + nu))`. Raises InputError."""
+    lines = list(_lines(path))
+    if not lines:
+        raise InputError(f"{path} is empty; a table of moduli was expected")
+    columns, first = _columns(path, lines)
+    rows = np.array([_numbers(path, number, text, columns) for number, text in lines[first:]])
+    if len(rows) < LEAST_ROWS:
+        raise InputError(f"{path} has {len(rows)} rows of numbers; at least {LEAST_ROWS} were expected")
+    return _measurement(path, columns, rows, [number for number, _ in lines[first:]], poisson)
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """The lines that say something, with their numbers."""
+    try:
+        if not path.is_file():
+            raise InputError(f"{path} is not a file; a table of moduli was expected")
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path} has more than {LARGEST_FILE / 1e6:g} MB; a table of moduli was expected")
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as text: {error}") from error
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip(" \t,;") and not line.lstrip().startswith("#"):
+            yield number, line
+
+
+def _split(line: str) -> list[str]:
+    mark = next((mark for mark in (";", "\t", ",") if mark in line), None)
+    return [part.strip().strip('"').strip() for part in line.split(mark)] if mark else line.split()
+
+
+def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column], int]:
+    """The columns, and how many lines name them."""
+    number, head = lines[0]
+    if "[" in head:
+        spaced = re.sub(r"\s+\[", "[", head)
+        parts = [part for part in re.split(r"[,;\s]+", spaced) if part]
+        found = [re.fullmatch(r"([^\[]+)\[([^\]]*)\]", part) for part in parts]
+        if not all(found):
+            wrong = parts[found.index(None)]
+            raise InputError(f"{path}:{number}: {wrong!r} must be a name with its unit in brackets, such as f[Hz]")
+        return [_Column(_name(match[1]), match[2].strip()) for match in found if match], 1
+    names = [_name(name) for name in _split(head)]
+    units = _split(lines[1][1]) if len(lines) > 1 else []
+    units += [""] * (len(names) - len(units))
+    if _is_number(names[0]) or _is_number(units[0]):
+        raise InputError(
+            f"{path}:{number}: names and units of the columns were expected, such as f[Hz] E'[MPa] E''[MPa], or two "
+            "rows with names and units"
+        )
+    return [_Column(*pair) for pair in zip(names, units, strict=False)], 2
+
+
+def _name(text: str) -> str:
+    """The name of a column as pyvisco spells it: E' is E_stor, f_set is f."""
+    text = text.strip().replace("″", "''").replace("′", "'")
+    if match := re.fullmatch(r"([EG])('{1,2}|\")", text):
+        return f"{match[1]}_{NAMES[match[2]]}"
+    return {"f_set": "f", "w": "omega", "ω": "omega"}.get(text, text)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> list[float]:
+    parts = _split(text)
+    if len(parts) != len(columns):
+        raise InputError(f"{path}:{number}: {len(parts)} values where {len(columns)} columns are named")
+    for part, column in zip(parts, columns, strict=True):
+        if not _is_number(part) or not math.isfinite(float(part)):
+            raise InputError(f"{path}:{number}: {column.name} must be a finite number, got {part!r}")
+    return [float(part) for part in parts]
+
+
+def _measurement(
+    path: Path, columns: Sequence[_Column], rows: Array, numbers: Sequence[int], poisson: float
+) -> Measurement:
+    values = {column.name: rows[:, k] for k, column in enumerate(columns)}
+    units = {column.name: column.unit for column in columns}
+    modulus = _modulus(path, values)
+    kind: Kind = "time" if f"{modulus}_relax" in values else "frequency"
+    factor = 1.0 / (2.0 * (1.0 + poisson)) if modulus == "E" else 1.0
+    if kind == "time":
+        at = _positive(path, "t", values, numbers) * _unit(path, "t", units, {"s": 1.0})
+        names = [f"{modulus}_relax"]
+    else:
+        rate = "omega" if "omega" in values else "f"
+        at = _positive(path, rate, values, numbers) * _unit(path, rate, units, RATES)
+        names = [f"{modulus}_stor", f"{modulus}_loss"]
+    moduli = [_positive(path, n, values, numbers) * _unit(path, n, units, PRESSURES) * factor for n in names]
+    temperatures = values["T"] + _unit(path, "T", units, TEMPERATURES) if "T" in values else None
+    sets = tuple(_sets(path, at, moduli, temperatures))
+    return Measurement(path, kind, sets, modulus == "E")
+
+
+def _modulus(path: Path, values: dict[str, Array]) -> str:
+    """E or G, whichever the columns name, and completely."""
+    for modulus in ("E", "G"):
+        if f"{modulus}_relax" in values or {f"{modulus}_stor", f"{modulus}_loss"} <= values.keys():
+            return modulus
+    raise InputError(
+        f"{path} has the columns {', '.join(values)}; it needs f or omega with E_stor and E_loss (or G_stor and "
+        "G_loss), or t with E_relax (or G_relax)"
+    )
+
+
+def _positive(path: Path, name: str, values: dict[str, Array], numbers: Sequence[int]) -> Array:
+    if name not in values:
+        raise InputError(f"{path} has no column {name}; it has {', '.join(values)}")
+    wrong = np.flatnonzero(values[name] <= 0.0)
+    if wrong.size:
+        at = wrong[0]
+        raise InputError(f"{path}:{numbers[at]}: {name} must be positive, got {values[name][at]:g}")
+    return values[name]
+
+
+def _unit(path: Path, name: str, units: dict[str, str], known: dict[str, float]) -> float:
+    if units[name] not in known:
+        raise InputError(
+            f"{path}: the unit of {name} must be one of {', '.join(known)}, got {units[name] or 'none'!r}"
+        )
+    return known[units[name]]
+
+
+def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:
+    """Rows of one temperature each, in the order of their rates."""
+    if temperatures is None:
+        groups = [np.arange(at.size)]
+    else:
+        order = np.argsort(temperatures, kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(temperatures[order]) >= NEAR) + 1)
+    for rows in groups:
+        mean = None if temperatures is None else float(temperatures[rows].mean())
+        if rows.size < LEAST_ROWS:
+            raise InputError(f"{path}: {rows.size} rows at {mean:g} C; at least {LEAST_ROWS} were expected")
+        rows = rows[np.argsort(at[rows], kind="stable")]
+        empty = np.zeros(0)
+        yield Set(mean, at[rows], moduli[0][rows], moduli[1][rows] if len(moduli) > 1 else empty)
