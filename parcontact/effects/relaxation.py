@@ -12,9 +12,12 @@ def relaxation_of(job: Job) -> Prony:
     material = job.material
     if isinstance(material, jobs.Elastic):
         return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
+    if isinstance(material, jobs.Dma):
+        material = material.fitted
     zener = [b for b in material.branches if isinstance(b, jobs.ZenerBranch)]
     plain = [b for b in material.branches if isinstance(b, jobs.PronyBranch)]
     series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
     prony = zener_to_prony(series, kelvin, viscosity, material.modulus_inf)
     moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
-    return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], [*prony.relaxation_times, *times])
+    all_times = [material.time_factor * time for time in (*prony.relaxation_times, *times)]
+    return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], all_times)

@@ -2,7 +2,7 @@
 
 from ..errors import JobError
 from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_range
-from .material import Elastic, PronyBranch, Zener, ZenerBranch
+from .material import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe, load
 from .sections import Checkpoint, Grid, Numerics, Output
 from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
@@ -11,6 +11,7 @@ __all__ = [
     "Checkpoint",
     "Control",
     "Cylinder",
+    "Dma",
     "Elastic",
     "Flat",
     "GeometricStep",

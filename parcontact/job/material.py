@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo
 
+from ..errors import InputError
+from ..rubber import compound
 from .fault import Fault, quote, refuse
-from .part import Part, Rule, chosen
+from .part import Context, Part, Rule, chosen
+from .temperature import Celsius, Shift, shifted
 from .values import NonNegative, Positive
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
@@ -96,6 +100,19 @@ class Elastic(Part):
         return self.shear_modulus
 
 
+def _positive_band(band: tuple[float, float]) -> tuple[float, float]:
+    if band[0] >= band[1]:
+        refuse(Fault(f"must be a lower and a higher frequency [Hz], got {list(band)!r}"))
+    return band
+
+
+Band = Annotated[
+    tuple[Positive, Positive] | None,
+    AfterValidator(lambda band: band and _positive_band(band)),
+    Field(description="two frequencies [Hz], the measured band reduced to the reference temperature"),
+]
+
+
 def _stiff(modulus_inf: float, branches: tuple[ZenerBranch | PronyBranch | None, ...]) -> Iterator[Fault]:
     if None not in branches and modulus_inf + sum(branch.instant_modulus for branch in branches if branch) == 0:
         yield Fault("has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
@@ -104,7 +121,8 @@ def _stiff(modulus_inf: float, branches: tuple[ZenerBranch | PronyBranch | None,
 class Zener(Part):
     """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
 
-    The long-term modulus may be zero: the body is then a fluid in the long run.
+    The long-term modulus may be zero: the body is then a fluid in the long run. With a `shift` all relaxation times are
+    those of its reference temperature; at another `temperature` they are a_T times as long.
     """
 
     label: ClassVar[str] = "model zener"
@@ -112,8 +130,18 @@ class Zener(Part):
     poisson: Poisson = 0.5
     modulus_inf: Modulus = 0.0
     branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
+    shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
+    temperature: Celsius | None = None  # default: that of the reference
+    band: Band = None
 
-    rules = (Rule(("modulus_inf", "branches"), _stiff),)
+    rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
+
+    @property
+    def time_factor(self) -> float:
+        """a_T: the relaxation times at the temperature over those at the reference [-]."""
+        if self.shift is None or self.temperature is None:
+            return 1.0
+        return float(10.0 ** self.shift.made.log_factor(self.temperature))
 
     @property
     def instant_modulus(self) -> float:
@@ -126,5 +154,54 @@ class Zener(Part):
         return self.modulus_inf + sum(branch.long_modulus for branch in self.branches)
 
 
-KINDS = {"elastic": Elastic, "zener": Zener}
-Material = Annotated[Elastic | Zener, PlainValidator(chosen("model", KINDS))]
+def _table(path: Path, info: ValidationInfo) -> Path:
+    """The absolute path of a table of moduli; relative ones start at the job file."""
+    found = (info.context.path.parent if isinstance(info.context, Context) else Path.cwd()) / path.expanduser()
+    if not found.is_file():
+        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
+    return found
+
+
+class Dma(Part):
+    """A compound fitted to a table of measured moduli when the job is read, as `parcontact fit` does."""
+
+    label: ClassVar[str] = "model dma"
+    model: Literal["dma"] = "dma"
+    path: Annotated[Path, AfterValidator(_table), Field(description="the path of a table of measured moduli")]
+    poisson: Poisson = 0.5
+    reference: Celsius | None = None  # default: the middle one of the measured temperatures
+    shift: Literal["wlf", "arrhenius", "free"] = "wlf"
+    temperature: Celsius | None = None  # default: that of the reference
+    error: Positive = Field(default=0.02, description="a positive rms error of the logarithms of the moduli [-]")
+
+    _fitted: Zener = PrivateAttr()
+
+    def model_post_init(self, context: Any) -> None:
+        """Fits the compound."""
+        try:
+            found = compound.fitted(self.path, self.poisson, self.reference, self.shift, self.error)
+        except InputError as error:
+            refuse(Fault(f"cannot be fitted: {error}", ("path",)))
+        made = Zener.model_validate(found.material())
+        if faults := list(shifted(made.shift, self.temperature)):
+            refuse(*faults)
+        self._fitted = made.model_copy(update={"temperature": self.temperature})
+
+    @property
+    def fitted(self) -> Zener:
+        """The compound as springs and Maxwell branches."""
+        return self._fitted
+
+    @property
+    def instant_modulus(self) -> float:
+        """Modulus at a sudden strain [Pa]."""
+        return self._fitted.instant_modulus
+
+    @property
+    def long_modulus(self) -> float:
+        """Modulus after all relaxation [Pa]."""
+        return self._fitted.long_modulus
+
+
+KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}
+Material = Annotated[Elastic | Zener | Dma, PlainValidator(chosen("model", KINDS))]

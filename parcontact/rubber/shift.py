@@ -7,10 +7,9 @@
 """
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Protocol
-
-import numpy as np
 
 from ..errors import InputError
 
@@ -72,6 +71,9 @@ class Factors:
         low, high = self.temperatures[0], self.temperatures[-1]
         if not low <= temperature <= high:
             raise InputError(f"temperature {temperature:g} C is outside the shift factors, {low:g} to {high:g} C")
-        at = [temperature, self.reference]
-        here, there = np.interp(at, self.temperatures, self.logs)
-        return float(here - there)
+        return self._between(temperature) - self._between(self.reference)
+
+    def _between(self, temperature: float) -> float:
+        above = max(1, bisect_left(self.temperatures, temperature))
+        (low, high), (start, end) = self.temperatures[above - 1 : above + 1], self.logs[above - 1 : above + 1]
+        return start + (end - start) * (temperature - low) / (high - low)

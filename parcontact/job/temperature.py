@@ -1,0 +1,92 @@
+"""The `shift` of a material: how its relaxation times depend on temperature (`parcontact.rubber.shift`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, PlainValidator
+
+from ..errors import InputError
+from ..rubber.shift import WLF, Arrhenius, Factors
+from ..rubber.shift import Shift as Law
+from .fault import Fault
+from .part import Part, Rule, chosen
+from .values import Positive, Real
+
+LOWEST = -273.15  # deg C
+Celsius = Annotated[float, Field(gt=LOWEST, strict=True, allow_inf_nan=False, description="a temperature [deg C]")]
+
+
+class WlfShift(Part):
+    """`log10 a_T = -C1 (T - reference)/(C2 + T - reference)` (Williams, Landel and Ferry)."""
+
+    label: ClassVar[str] = "law wlf"
+    law: Literal["wlf"] = "wlf"
+    C1: Positive = Field(description="a positive number, the first constant of Williams, Landel and Ferry [-]")
+    C2: Positive = Field(description="a positive number, the second constant of Williams, Landel and Ferry [K]")
+    reference: Celsius
+
+    @property
+    def made(self) -> Law:
+        """The law itself."""
+        return WLF(self.C1, self.C2, self.reference)
+
+
+class ArrheniusShift(Part):
+    """`log10 a_T = energy/(R ln 10) (1/T - 1/reference)`, temperatures in K."""
+
+    label: ClassVar[str] = "law arrhenius"
+    law: Literal["arrhenius"] = "arrhenius"
+    energy: Positive = Field(description="a positive energy of activation [J/mol]")
+    reference: Celsius
+
+    @property
+    def made(self) -> Law:
+        """The law itself."""
+        return Arrhenius(self.energy, self.reference)
+
+
+def _rising(temperatures: tuple[float, ...], logs: tuple[float, ...], reference: float) -> Iterator[Fault]:
+    if len(temperatures) < 2 or any(b <= a for a, b in pairwise(temperatures)):
+        yield Fault("must be at least two rising temperatures [deg C]", ("temperatures",))
+    elif len(logs) != len(temperatures):
+        yield Fault(f"must be {len(temperatures)} numbers, one for each temperature, got {len(logs)}", ("logs",))
+    elif not temperatures[0] <= reference <= temperatures[-1]:
+        yield Fault(f"must be within {temperatures[0]:g} and {temperatures[-1]:g} C, got {reference:g}", ("reference",))
+
+
+class FactorsShift(Part):
+    """log10 of a_T at given temperatures, linear between them."""
+
+    label: ClassVar[str] = "law factors"
+    law: Literal["factors"] = "factors"
+    temperatures: tuple[Celsius, ...] = Field(description="a list of rising temperatures [deg C]")
+    logs: tuple[Real, ...] = Field(description="a list of numbers, log10 of a_T at each temperature")
+    reference: Celsius
+
+    rules = (Rule(("temperatures", "logs", "reference"), _rising),)
+
+    @property
+    def made(self) -> Law:
+        """The law itself."""
+        return Factors(self.temperatures, self.logs, self.reference)
+
+
+LAWS = {"wlf": WlfShift, "arrhenius": ArrheniusShift, "factors": FactorsShift}
+Shift = Annotated[WlfShift | ArrheniusShift | FactorsShift, PlainValidator(chosen("law", LAWS))]
+
+
+def shifted(shift: WlfShift | ArrheniusShift | FactorsShift | None, temperature: float | None) -> Iterator[Fault]:
+    """The rule of every material with a temperature: it needs a shift that reaches it."""
+    if temperature is None:
+        return
+    if shift is None:
+        sentence = "has no effect without a shift: the relaxation times are known at one temperature only; give one"
+        yield Fault(sentence, ("temperature",))
+        return
+    try:
+        shift.made.log_factor(temperature)
+    except InputError as error:
+        yield Fault(f"is beyond what the shift allows: {error}", ("temperature",))
