@@ -31,6 +31,7 @@ MOST_DECADES = 30.0  # of shift between the coldest and the warmest set
 Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
 WLF_CONSTANTS: Ranges = ((2.0, 60.0, 24), (20.0, 600.0, 24))  # C1 [-], C2 [K]
 ENERGIES: Ranges = ((1e4, 1e6, 60),)  # J/mol
+APART = 0.1  # rms of the differences of the logarithms of two sets that do not overlap
 SHORTEST = 0.3  # share of a sweep that must overlap with its neighbour's
 
 
@@ -133,8 +134,11 @@ def _overlaps(measured: Measurement) -> list[float]:
     for number, (colder, warmer) in enumerate(zip(measured.sets, measured.sets[1:], strict=False)):
         steps = np.linspace(-WIDEST, WIDEST, 16 * int(WIDEST) + 1)
         apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
-        if not np.isfinite(min(apart)):
-            raise InputError(f"{measured.path}: set {number + 1} and set {number + 2} do not overlap at any shift")
+        if not min(apart) < APART**2:
+            raise InputError(
+                f"{measured.path}: sets {number + 1} and {number + 2} do not overlap at any shift; measure at temperatures "
+                "nearer to each other, or fit a law"
+            )
         near = float(steps[int(np.argmin(apart))])
         fine = np.linspace(near - 0.15, near + 0.15, 61)
         logs.append(logs[-1] + float(fine[int(np.argmin([_apart(colder, warmer, s, measured.kind) for s in fine]))]))
