@@ -13,10 +13,10 @@ HOUSE = Path(parcontact.__file__).parent
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
     {"__init__", "errors", "private"},
-    {"compiled"},
+    {"compiled", "rubber"},
     {"parallel", "job"},
     {"physics"},
-    {"theory", "solve", "rubber"},
+    {"theory", "solve"},
     {"effects"},
     {"record"},
     {"scene"},

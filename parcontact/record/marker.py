@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..job import HeightFile, Job
+from ..job import Dma, HeightFile, Job
 from ..job.table import plain
 from . import files
 
@@ -35,12 +35,13 @@ class Claim:
 
 
 def plain_job(job: Job) -> dict[str, Any]:
-    """A job as plain data; files of heights are known by what they hold, not by their path."""
+    """A job as plain data; files that are read are known by what they hold, not by their path."""
     data: dict[str, Any] = plain(job)
-    for part, shape in zip(data["surface"], job.surface, strict=True):
-        if isinstance(shape, HeightFile):
+    pairs = zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True)
+    for part, given in pairs:
+        if isinstance(given, HeightFile | Dma):
             del part["path"]
-            part["content"] = f"{zlib.crc32(shape.path.read_bytes()):08x}"
+            part["content"] = f"{zlib.crc32(given.path.read_bytes()):08x}"
     return data
 
 

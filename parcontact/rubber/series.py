@@ -136,8 +136,8 @@ def _overlaps(measured: Measurement) -> list[float]:
         apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
         if not min(apart) < APART**2:
             raise InputError(
-                f"{measured.path}: sets {number + 1} and {number + 2} do not overlap at any shift; measure at temperatures "
-                "nearer to each other, or fit a law"
+                f"{measured.path}: sets {number + 1} and {number + 2} do not overlap at any shift; measure at "
+                "temperatures nearer to each other, or fit a law"
             )
         near = float(steps[int(np.argmin(apart))])
         fine = np.linspace(near - 0.15, near + 0.15, 61)

@@ -30,7 +30,7 @@ def test_noisy_sets_at_five_temperatures(tmp_path: Path) -> None:
     made = compound.fitted(path, 0.5, 20.0, "wlf", 0.02)
     assert isinstance(made.shift, WLF)
     assert_allclose([made.shift.C1, made.shift.C2], [measured.C1, measured.C2], rtol=0.05)
-    omega = np.geomspace(*made.series.band, 400)
+    omega = np.geomspace(made.series.band[0], made.series.band[1], 400)
     assert np.sqrt(np.mean(np.abs(sum_of(made, omega) / measured.complex_modulus(omega) - 1.0) ** 2)) < 0.02
     assert made.series.moduli.size <= 12
     assert 0.017 < made.series.scatter < 0.021  # the noise, but for what 250 numbers let a series follow
@@ -75,7 +75,7 @@ def test_a_fluid_has_no_spring(tmp_path: Path) -> None:
 
 
 def test_other_laws(tmp_path: Path) -> None:
-    """Free factors where the sets overlap: those of the truth to 0.02 decades of 5; Arrhenius where it holds: the energy
+    """Free factors where the sets overlap: those of the truth to 0.02 decades of 5; Arrhenius where it holds: energy
     to 1 %."""
     warm = measured.write_sweeps(tmp_path / "warm.csv", temperatures=(0.0, 10.0, 20.0, 35.0, 60.0))
     free = series.find_shift(tables.read(warm), 20.0, "free")
@@ -155,8 +155,9 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
         included = relaxation_of(load(tmp_path, f"{{include: rubber{temperature}}}"))
         dma = f"{{model: dma, path: rubber.csv, reference: 20, error: 0.05{temperature}}}"
         fitted = relaxation_of(load(tmp_path, dma))
-        for one, other in zip(included, fitted, strict=True):
-            assert_allclose(one, other, rtol=1e-6)
+        assert included.modulus_inf == pytest.approx(fitted.modulus_inf, rel=1e-6)
+        assert_allclose(included.moduli, fitted.moduli, rtol=1e-6)
+        assert_allclose(included.relaxation_times, fitted.relaxation_times, rtol=1e-6)
     assert made.shift is not None
     assert_allclose(included.relaxation_times, made.series.times * 10.0 ** made.shift.log_factor(50.0), rtol=1e-6)
 
