@@ -3,18 +3,16 @@
 Each effect is one object handed to the march; an effect that a job does not call for is never made.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from . import job as jobs
-from .effects import decisions as calls_for
-from .effects.decisions import Decision, Effect
+from .effects import decisions, relaxation
+from .effects.effect import Decision, Effect, effects_that_follow
 from .effects.folded_branches import describe_folded_branches, fold_branches_of
-from .effects.follower import Follower
 from .effects.relaxation import relaxation_of
-from .job import Job
+from .job import Job, extension
 from .parallel.fft import FFT, Spectrum
 from .parallel.slab import Array, Slab
 from .physics import heightfile
@@ -81,7 +79,7 @@ class Scene:
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
     lasts: bool
-    followers: dict[str, Follower] = field(default_factory=dict)
+    followers: dict[str, Effect] = field(default_factory=dict)
 
     @property
     def parts(self) -> dict[str, Remembers]:
@@ -106,15 +104,10 @@ class Scene:
         return self.frame.units
 
 
-FURTHER: tuple[tuple[Decision, Callable[[Scene], Follower]], ...] = (
-    # one line for each effect that follows the steps: what decides on it, what makes it for a scene; in
-    # checkpoints it has the name that the decision gives it
-)
-
-
-def effects(job: Job) -> list[Effect]:
+def effects(job: Job) -> list[Decision]:
     """Every effect that there is, on or off, and why; from the job alone."""
-    return [decide(job) for decide in (*calls_for.TABLE, *(decide for decide, _ in FURTHER))]
+    further = [effect.decide for effect in extension.find_effects().values()]
+    return [decide(job) for decide in (*decisions.TABLE, *further)]
 
 
 def frame(job: Job, slab: Slab) -> Frame:
@@ -137,15 +130,15 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     Collective. Raises InputError for surface files that do not fit.
     """
     base = frame(job, slab)
-    way = AnyFraction if calls_for.part_cells(job).on else WholeCells
+    way = AnyFraction if decisions.part_cells(job).on else WholeCells
     path: Path = way(base.surface, base.dtype)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
-    energy = _energy(base, solver, material) if calls_for.energies(job).on else None
+    energy = _energy(base, solver, material) if decisions.energies(job).on else None
     ledger = Ledger(slab, base.surface, base.units)
-    scene = Scene(base, path, branches, material, solver, ledger, energy, calls_for.lasting(job).on)
-    scene.followers = {decide(job).name: make(scene) for decide, make in FURTHER if decide(job).on}
+    scene = Scene(base, path, branches, material, solver, ledger, energy, decisions.lasting(job).on)
+    scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
     return scene
 
 
@@ -233,7 +226,7 @@ def _height(surface: Surface) -> float:
 
 
 def _material(base: Frame, branches: FoldedBranches) -> Elastic | Zener:
-    if not calls_for.viscoelasticity(base.job).on:
+    if not relaxation.decide(base.job).on:
         return Elastic(base.slab, base.prony.modulus_inf)
     integrator = base.job.numerics.integrator
     return Zener(base.slab, base.prony, integrator, base.dtype, branches.memoryless, branches.frozen)
@@ -247,7 +240,7 @@ def _solver(base: Frame, tolerance: float) -> ContactSolver:
 
 
 def _preconditioner(base: Frame) -> Convolution:
-    single = calls_for.mixed_precision(base.job).on
+    single = decisions.mixed_precision(base.job).on
     fft = FFT(base.slab, dtype=np.float32, measured=base.fft.measured) if single else base.fft
     return base.half_space.inverse(fft)
 
@@ -257,6 +250,6 @@ def _energy(base: Frame, solver: ContactSolver, material: Elastic | Zener) -> El
     unit = units.pressure * units.height * grid.dx * grid.dy
     if isinstance(material, Elastic):
         return ElasticEnergy(slab, unit)
-    if calls_for.energy_memory(base.job).on:
+    if decisions.energy_memory(base.job).on:
         return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)
     return ZenerEnergy(slab, material, AppliedInverse(solver.preconditioner, lambda: solver.w), unit)

@@ -15,16 +15,13 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.effects.decisions import Effect
-from parcontact.effects.follower import Instant
+from parcontact.effects.effect import Decision
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import Elastic, Material, Zener
-from parcontact.physics.entries import Entry, Saved
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
-from parcontact.physics.units import Units
 from parcontact.record import fields, measures
 from parcontact.run import runner
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
@@ -70,7 +67,7 @@ def extra(on: Job, off: Job) -> dict[str, int]:
     return {name: more[name] - less[name] for name in {*more, *less} if more[name] != less[name] if "most" not in name}
 
 
-def row(planned: Job, name: str) -> Effect:
+def row(planned: Job, name: str) -> Decision:
     return next(effect for effect in scene.effects(planned) if effect.name == name)
 
 
@@ -268,33 +265,6 @@ def test_displacement_control() -> None:
     of_measures = 2
     before = begun(planned).scene.slab.tally["allreduce"]
     assert spent == before + 1 + of_solve + of_measures
-
-
-def test_a_new_effect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line in the scene: it is in the table, and made where a job calls for it; it is told of every step made."""
-
-    def titled(planned: Job) -> Effect:
-        return Effect("a new one", bool(planned.title), "the job has a title" if planned.title else "no title")
-
-    class Follower:
-        def __init__(self, built: scene.Scene) -> None:
-            self.seen: list[int] = []
-
-        def follow(self, instant: Instant) -> None:
-            assert np.all(instant.pressure >= 0.0)
-            self.seen.append(instant.step.number)
-
-        def entries(self, units: Units) -> dict[str, Entry]:
-            return {}
-
-        def restore(self, saved: Saved) -> None: ...
-
-    assert begun(job(title="mine")).scene.followers == {}
-    monkeypatch.setattr(scene, "FURTHER", ((titled, Follower),))
-    off, on = job(history=[PRESS]), job(history=[PRESS], title="mine")
-    assert [row(planned, "a new one").on for planned in (off, on)] == [False, True]
-    assert marched(off)[0].scene.followers == {}
-    assert [each.seen for each in marched(on)[0].scene.followers.values()] == [[1, 2, 3, 4, 5]]  # type: ignore[attr-defined]
 
 
 # -- what is written --------------------------------------------------------------------------------------------------

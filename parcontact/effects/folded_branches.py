@@ -9,7 +9,19 @@ from .. import job as jobs
 from ..job import Grid, Job
 from ..physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from ..physics.prony import Prony
+from .effect import Decision
 from .relaxation import relaxation_of
+
+
+def decide(job: Job) -> Decision:
+    """Branches far faster or slower than all that happens have no map (`physics.folding`)."""
+    name, found = "folded branches", fold_branches_of(job)
+    if not found.folded:
+        return Decision(name, False, found.reason or "no branch is far faster or slower than all that happens")
+    kinds = ((found.memoryless, "memoryless"), (found.frozen, "frozen"))
+    folded = " and ".join(f"{len(numbers)} {kind}" for numbers, kind in kinds if numbers)
+    count = len(found.kept) + found.folded
+    return Decision(name, True, f"{folded} of {count}; error of friction {found.bound:.2g} at most")
 
 
 def fold_branches_of(job: Job, until: float = 0.0) -> FoldedBranches:

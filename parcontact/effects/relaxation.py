@@ -1,10 +1,11 @@
-"""The relaxation function of a job's material."""
+"""The relaxation function of a job's material, and whether there is any."""
 
 import numpy as np
 
 from .. import job as jobs
 from ..job import Job
 from ..physics.prony import Prony, normal_form, zener_to_prony
+from .effect import Decision
 
 
 def relaxation_of(job: Job) -> Prony:
@@ -21,3 +22,10 @@ def relaxation_of(job: Job) -> Prony:
     moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
     all_times = [material.time_factor * time for time in (*prony.relaxation_times, *times)]
     return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], all_times)
+
+
+def decide(job: Job) -> Decision:
+    """One map per branch that relaxes, and the last displacement."""
+    count = relaxation_of(job).moduli.size
+    what = "a branch relaxes" if count == 1 else f"{count} branches relax"
+    return Decision("viscoelasticity", count > 0, what if count else "the body has one modulus and no memory")

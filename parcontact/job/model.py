@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, create_model, model_validator
 
 from ..errors import JobError
-from . import advice, limits, table
+from . import advice, extension, limits, table
 from .fault import Fault, faults_of
 from .history import Initial, Stage, Steady
 from .loading import Included, read_job
@@ -123,6 +124,16 @@ class Job(Part):
         _default(data, "output", "directory", str(Path("out", context.path.stem if context else "job")))
         return data
 
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_sections_of_effects(cls, data: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
+        """A job that has the section of an effect is of a model that knows it."""
+        if cls is Job and isinstance(data, dict):
+            others = [key for key, value in data.items() if key not in cls.model_fields and value is not None]
+            if added := extension.effects_of(others):
+                return extended(tuple(sorted(added))).model_validate(data, context=info.context)
+        return handler(data)
+
     def model_post_init(self, context: Any) -> None:
         """Keeps the path of the job file, and that of its material."""
         if isinstance(context, Context):
@@ -154,6 +165,10 @@ class Job(Part):
         """What is allowed but will probably disappoint."""
         return tuple(advice.warnings(self))
 
+    def section(self, name: str) -> Any:
+        """The section that an effect has added, None if this job has not given it."""
+        return getattr(self, name, None)
+
     def timeline(self, until: float = 0.0) -> Timeline:
         """All steps of the history; its last stage goes on to `until` [s] if that is later than its end."""
         return Timeline(self.history, self.grid, until, self.initial.pressure)
@@ -161,6 +176,27 @@ class Job(Part):
     def resolved(self) -> str:
         """YAML text with every default filled in; it loads back to an equal job."""
         return dump(table.plain(self))
+
+
+SEPARATOR = ":"  # of sections in the name of an extended job, by which other ranks find its class
+
+
+@cache
+def extended(sections: tuple[str, ...]) -> type[Job]:
+    """The model of a job that may have these sections of effects too."""
+    fields: dict[str, Any] = {
+        name: (effect.section | None, Field(default=None, description="a mapping of keys"))
+        for name, effect in extension.effects_of(sections).items()
+    }
+    return create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
+
+
+def __getattr__(name: str) -> Any:
+    """The class of an extended job, where a job of another rank arrives."""
+    head, *sections = name.split(SEPARATOR)
+    if head == "Job" and sections:
+        return extended(tuple(sections))
+    raise AttributeError(name)
 
 
 def _named(stage: Any, index: int) -> Any:

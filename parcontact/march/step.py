@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..effects.follower import Instant
+from ..effects.effect import Instant
 from ..job.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
@@ -36,7 +36,7 @@ class March:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         work, stored, lost, split = self._energies()
-        self.row = Row(work=work, stored=stored, dissipated=lost, branch_dissipation=split)
+        self.row = Row(work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=self._added())
         self.position = (0.0, 0.0)
         self.alpha = self.alpha_old = self.d = 0.0
         slab, dtype = scene.slab, scene.solver.p.dtype
@@ -86,6 +86,7 @@ class March:
             instant = Instant(step, contact.p, alpha, self._displacement, slid, measures)
             for follower in self.scene.followers.values():
                 follower.follow(instant)
+            self.row = replace(self.row, added=self._added())
         return self.row
 
     def entries(self) -> dict[str, Entry]:
@@ -104,9 +105,14 @@ class March:
             stored=stored,
             dissipated=lost,
             branch_dissipation=split,
+            added=self._added(),
         )
         if isinstance(self.scene.material, Elastic):
             self._u = self.scene.solver.operator.apply(self.p, self.scene.solver.u)
+
+    def _added(self) -> tuple[float, ...]:
+        """What effects have for their columns."""
+        return tuple(float(value) for follower in self.scene.followers.values() for value in follower.values())
 
     @property
     def _parts(self) -> dict[str, Remembers]:

@@ -1,11 +1,13 @@
 """How many bytes a rank holds in maps, and how many a checkpoint has: from the job alone, to the byte."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import DTypeLike
 
-from ..effects import decisions as calls_for
+from ..effects import decisions, relaxation
+from ..effects.effect import effects_that_follow
 from ..effects.folded_branches import fold_branches_of
 from ..effects.relaxation import relaxation_of
 from ..job import Job
@@ -44,14 +46,14 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
     map_bytes = cells * precision.itemsize
     spectrum, sent, blocks = footprint(points, points, precision, ranks, rank)
     yield Holding("transforms", spectrum + sent + blocks, transform_name(points, precision), sent)
-    if calls_for.isolated(job).on:
+    if decisions.isolated(job).on:
         lengths = padded_lengths(*points)
         wide = footprint(points, lengths, precision, ranks, rank)
         name = transform_name(lengths, precision)
         yield Holding("padded transforms and operator", sum(wide) + wide[0] // 2, name, wide[1])
     else:
         yield Holding("operator", spectrum // 2)
-    if calls_for.mixed_precision(job).on:
+    if decisions.mixed_precision(job).on:
         narrow = footprint(points, points, np.float32, ranks, rank)
         name = transform_name(points, np.float32)
         yield Holding("single transforms and preconditioner", sum(narrow) + narrow[0] // 2, name, narrow[1])
@@ -59,28 +61,37 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
         yield Holding("preconditioner", spectrum // 2)
     yield Holding("solver", SOLVER * map_bytes + cells)
     yield Holding("heights", map_bytes)
-    if calls_for.spectrum(job).on:
+    if decisions.spectrum(job).on:
         yield Holding("surface spectrum", spectrum)
     if _moved(job):
         yield Holding("moved heights", map_bytes)
-    if calls_for.lasting(job).on:
+    if decisions.lasting(job).on:
         yield Holding("last pressure but one", map_bytes)
-    if calls_for.viscoelasticity(job).on:
+    if relaxation.decide(job).on:
         yield Holding("branches", (len(fold_branches_of(job).kept) + ZENER) * map_bytes)
-    if calls_for.energy_memory(job).on:
+    if decisions.energy_memory(job).on:
         yield Holding("energy memory", (relaxation_of(job).moduli.size + ZENER) * cells * 8)
+    for name, effect in effects_that_follow(job).items():
+        yield Holding(name, cells * _itemsize(effect.maps(job)))
 
 
 def saved(job: Job) -> int:
     """Bytes of the maps in a checkpoint, with the checksums of their rows."""
     points, maps, doubles = job.grid.nx * job.grid.ny, 1, 0
-    if calls_for.lasting(job).on:
+    if decisions.lasting(job).on:
         maps += 1
-    if calls_for.viscoelasticity(job).on:
+    if relaxation.decide(job).on:
         maps += 1 + len(fold_branches_of(job).kept)
-    if calls_for.energy_memory(job).on:
+    if decisions.energy_memory(job).on:
         doubles = 1 + relaxation_of(job).moduli.size
-    return points * (maps * _precision(job).itemsize + doubles * 8) + (maps + doubles) * job.grid.ny * 4
+    own = [kind for effect in effects_that_follow(job).values() for kind in effect.maps(job)]
+    itemsize = maps * _precision(job).itemsize + doubles * 8 + _itemsize(own)
+    return points * itemsize + (maps + doubles + len(own)) * job.grid.ny * 4
+
+
+def _itemsize(kinds: Sequence[DTypeLike]) -> int:
+    """Bytes of one point of maps of these types."""
+    return sum(np.dtype(kind).itemsize for kind in kinds)
 
 
 def _precision(job: Job) -> "np.dtype[np.floating]":
@@ -89,5 +100,5 @@ def _precision(job: Job) -> "np.dtype[np.floating]":
 
 def _moved(job: Job) -> bool:
     """Whether an elastic body needs the heights that a body with memory moves within its own pass."""
-    by_cells = calls_for.sliding(job).on and not calls_for.part_cells(job).on
-    return by_cells and not calls_for.viscoelasticity(job).on
+    by_cells = decisions.sliding(job).on and not decisions.part_cells(job).on
+    return by_cells and not relaxation.decide(job).on

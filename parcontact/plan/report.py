@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from .. import scene
-from ..effects import decisions as calls_for
+from ..effects import decisions
 from ..job import Job
 from . import memory
 from .scaling import SUMS_PER_STEP, Scaling
@@ -51,7 +51,7 @@ class Costs:
     @property
     def instants(self) -> int:
         """How often fields are saved."""
-        return -(-self.scaling.steps // self.job.output.every) if calls_for.fields(self.job).on else 0
+        return -(-self.scaling.steps // self.job.output.every) if decisions.fields(self.job).on else 0
 
     @property
     def instant_bytes(self) -> int:
@@ -83,7 +83,7 @@ def steps(costs: Costs) -> Iterator[str]:
     """How many steps, and what is in one."""
     samples = costs.scaling.samples
     names = (f"{stage.name} {seen.steps}" for stage, seen in zip(costs.job.history, samples[0].stages, strict=True))
-    most = "at most " if calls_for.short_rest(costs.job).on and samples[0].tried < samples[0].steps else ""
+    most = "at most " if decisions.short_rest(costs.job).on and samples[0].tried < samples[0].steps else ""
     yield f"{most}{costs.scaling.steps} steps: {', '.join(names)}"
     calls, transforms, sums = (
         samples[0].total(name) / costs.scaling.steps for name in ("operator", "fft", "allreduce")

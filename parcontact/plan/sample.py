@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 
 from .. import scene
-from ..effects import decisions as calls_for
+from ..effects import decisions
 from ..job import Job
 from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
@@ -93,7 +93,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
     began = time.perf_counter()
     numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
     march = March(scene.build(job.model_copy(update={"numerics": numerics}), slab))
-    if calls_for.steady_start(job).on:
+    if decisions.steady_start(job).on:
         steadystart.begin(march)
     building = time.perf_counter() - began
     stages = tuple(_try(march, job.timeline(), seconds))

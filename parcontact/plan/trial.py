@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..effects import decisions as calls_for
+from ..effects import decisions
 from ..job import Job
 from ..job.table import plain
 from . import memory
@@ -27,7 +27,7 @@ def grid_for(job: Job, ranks: int, seconds: float) -> Job | None:
 
 def _feasible(job: Job, ranks: int, seconds: float) -> bool:
     points = job.grid.nx * job.grid.ny
-    per_point = PER_POINT * (PADDED if calls_for.isolated(job).on else 1.0)
+    per_point = PER_POINT * (PADDED if decisions.isolated(job).on else 1.0)
     quick = CALLS * per_point * points / ranks <= seconds
     return quick and memory.total(job, ranks) * ranks <= SHARE * _free()
 

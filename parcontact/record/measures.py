@@ -22,13 +22,13 @@ MEND = "mend the line, or move the file away to go on without its rows"
 MAX_LINE = 1 << 20  # bytes: a longer one is none of ours
 
 
-def columns(branches: int) -> list[str]:
-    """Names of the columns when the dissipation of so many branches is asked for."""
-    return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST]
+def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
+    """Names of the columns when the dissipation of so many branches is asked for, and effects have added some."""
+    return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
 
 
 def values(row: Row, branches: int) -> list[Any]:
-    """One line of the file, in the order of `columns(branches)`."""
+    """One line of the file, in the order of `columns`."""
     m, c = row.measures, row.certificate
     forces = (m.pressure, m.force_x, m.force_y, m.friction)
     lengths = (m.contact_area, m.approach, m.mean_gap, m.max_pressure)
@@ -36,7 +36,7 @@ def values(row: Row, branches: int) -> list[Any]:
     energies = (row.work, row.stored, row.dissipated)
     shown = [row.step, row.time, row.distance, *forces, *lengths, *solve, *energies, round(row.seconds, 6)]
     last = (m.friction_x, m.contact_area_corrected)
-    return [_text(value) for value in (*shown, *row.branch_dissipation[:branches], *last)]
+    return [_text(value) for value in (*shown, *row.branch_dissipation[:branches], *last, *row.added)]
 
 
 def _text(value: float) -> str:
@@ -47,9 +47,15 @@ def _text(value: float) -> str:
 class MeasuresFile:
     """The growing file; a line that does not end in a newline is none."""
 
-    def __init__(self, path: Path, branches: int, table: Table = Table()) -> None:  # noqa: B008  # frozen
+    def __init__(
+        self,
+        path: Path,
+        branches: int,
+        table: Table = Table(),  # noqa: B008  # frozen
+        added: Sequence[str] = (),
+    ) -> None:
         """Continue the file, which holds this `table`, or begin it."""
-        self.path, self.table, self._branches, self._names = path, table, branches, columns(branches)
+        self.path, self.table, self._branches, self._names = path, table, branches, columns(branches, added)
         self._handle = files.opened(path, os.O_RDWR | os.O_APPEND)
         self._size = os.fstat(self._handle).st_size
         if self._size == 0:
@@ -99,7 +105,7 @@ class MeasuresFile:
         self._handle = handle
 
 
-def cut_back(path: Path, step: int, branches: int, then: Table) -> tuple[Table, list[str]]:
+def cut_back(path: Path, step: int, branches: int, then: Table, added: Sequence[str] = ()) -> tuple[Table, list[str]]:
     """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
 
     `then` is what the file held when the checkpoint was written. Returns what it holds now, and what is lost. Raises
@@ -107,7 +113,7 @@ def cut_back(path: Path, step: int, branches: int, then: Table) -> tuple[Table, 
     """
     if not path.exists():
         return Table(), [f"{path} is missing: the rows up to step {step} are lost"]
-    found, wanted = _rows(path), columns(branches)
+    found, wanted = _rows(path), columns(branches, added)
     names = next(found, [])
     if "step" not in names:
         raise InputError(f"{path}, line 1, does not name the columns, step among them; move it away or mend it")

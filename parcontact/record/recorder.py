@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from ..effects import decisions as calls_for
+from ..effects import decisions
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
@@ -21,8 +21,8 @@ class Recorder:
 
     Parameters: the `directory`; the `provenance` of its files; `total` steps of the run; `after`, the step after which
     it goes on, or None to begin, and what the `table` of measures held then; `dissipated`, the number of branches whose
-    dissipation has a column. Raises InputError where the files cannot be written. `warnings` says what was lost of an
-    earlier run, `problem` what of the results cannot be written.
+    dissipation has a column; `added`, the columns of effects. Raises InputError where the files cannot be written.
+    `warnings` says what was lost of an earlier run, `problem` what of the results cannot be written.
     """
 
     def __init__(
@@ -36,6 +36,7 @@ class Recorder:
         then: Table,
         dissipated: int,
         quiet: bool,
+        added: Sequence[str] = (),
     ) -> None:
         self.slab, self.path, self.problem = slab, directory.path, ""
         self.console: Console | Silence = Silence()
@@ -47,9 +48,9 @@ class Recorder:
         def begin_table() -> None:
             kept = Table()
             if after is not None:
-                kept, lost = measures.cut_back(table, after, dissipated, then)
+                kept, lost = measures.cut_back(table, after, dissipated, then, added)
                 self.warnings += lost
-            self._measures = MeasuresFile(table, dissipated, kept)
+            self._measures = MeasuresFile(table, dissipated, kept, added)
 
         def begin_log() -> None:
             self.console = Console(log, quiet, total)
@@ -60,7 +61,7 @@ class Recorder:
 
     def _begin_fields(self, job: Job, provenance: Provenance, total: int, after: int | None) -> FieldsFile | None:
         path, output = self.path / "fields.h5", job.output
-        if not calls_for.fields(job).on or not total:
+        if not decisions.fields(job).on or not total:
             if after is not None:
                 self.warnings += filter(None, [fields.cut_back(path, self.slab, after)])
             return None

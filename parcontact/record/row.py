@@ -11,7 +11,8 @@ from ..solve.contact import Certificate
 class Row:
     """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start.
 
-    `remark` is a sentence for run.log, or '': what was unusual about the step.
+    `added` is what effects have for columns of their own. `remark` is a sentence for run.log, or '': what was unusual
+    about the step.
     """
 
     step: int = 0
@@ -27,3 +28,4 @@ class Row:
     branch_dissipation: tuple[float, ...] = ()
     seconds: float = 0.0
     remark: str = ""
+    added: tuple[float, ...] = ()

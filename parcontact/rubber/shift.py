@@ -1,9 +1,9 @@
 """Time-temperature superposition: at a temperature T a compound relaxes as at the reference, `a_T` times as slowly.
 
-    WLF         log10 a_T = -C1 (T - T_ref)/(C2 + T - T_ref)      (M. L. Williams, R. F. Landel, J. D. Ferry,
-                                                                   J. Am. Chem. Soc. 77 (1955) 3701)
-    Arrhenius   log10 a_T = E/(R ln 10) (1/T - 1/T_ref)           temperatures in K
-    table       log10 a_T given at some temperatures, linear between them and nowhere beyond
+WLF         log10 a_T = -C1 (T - T_ref)/(C2 + T - T_ref)      (M. L. Williams, R. F. Landel, J. D. Ferry,
+                                                               J. Am. Chem. Soc. 77 (1955) 3701)
+Arrhenius   log10 a_T = E/(R ln 10) (1/T - 1/T_ref)           temperatures in K
+table       log10 a_T given at some temperatures, linear between them and nowhere beyond
 """
 
 import math

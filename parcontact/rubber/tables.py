@@ -185,9 +185,7 @@ def _positive(path: Path, name: str, values: dict[str, Array], numbers: Sequence
 
 def _unit(path: Path, name: str, units: dict[str, str], known: dict[str, float]) -> float:
     if units[name] not in known:
-        raise InputError(
-            f"{path}: the unit of {name} must be one of {', '.join(known)}, got {units[name] or 'none'!r}"
-        )
+        raise InputError(f"{path}: the unit of {name} must be one of {', '.join(known)}, got {units[name] or 'none'!r}")
     return known[units[name]]
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .. import scene
-from ..effects import decisions as calls_for
+from ..effects import decisions
 from ..errors import InputError, RunError
 from ..job import Job, Rough
 from ..job.timeline import Timeline, reached
@@ -57,7 +57,7 @@ def run(job: Job, slab: Slab, options: Options) -> int:
         marching = March(built)
         if origin:
             marching.restore(origin.contents)
-        elif calls_for.steady_start(job).on:
+        elif decisions.steady_start(job).on:
             steadystart.begin(marching)
         plans.keep(job, slab)
         provenance = _provenance(job, slab, origin)
@@ -122,10 +122,11 @@ def _begin(
         directory.go_back(origin.contents.step)
     elif origin is None:
         directory.clear()
-    split = calls_for.branch_dissipation(job).on
+    split = decisions.branch_dissipation(job).on
     dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
     after, then = (origin.contents.step, origin.contents.table) if origin else (None, Table())
-    return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet)
+    added = [name for follower in built.followers.values() for name in follower.columns]
+    return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet, added)
 
 
 class _Journey:

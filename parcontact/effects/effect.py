@@ -1,0 +1,84 @@
+"""What an effect is: a decision from the job alone, and what is made, held, remembered and written where it is on.
+
+An effect that follows the steps is one class, found by the section that it adds to a job (`job.extension`): no other
+file knows it. One that takes the place of a part (another body, operator or path) has its decision in `decisions`, and
+`scene.py` makes it where it makes that part.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from numpy.typing import DTypeLike
+
+from ..job import Job, extension
+from ..job.part import Part
+from ..job.timeline import Step
+from ..parallel.slab import Array
+from ..physics.entries import Remembers
+from ..physics.ledger import Measures
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Whether an effect is on, and why in a few words."""
+
+    name: str
+    on: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A step just made, in the run's units unless others are given; maps are valid until the next step begins.
+
+    The pressure on this rank's rows is `modulus pressure` (0 outside contact), `displacement` that of the body; both
+    have the shape (ny_loc, nx). `slid` [m] is by how much the surface moved in the step.
+    """
+
+    step: Step
+    pressure: Array
+    modulus: float
+    displacement: Array
+    slid: float
+    measures: Measures
+
+
+class Effect(Remembers, Protocol):
+    """The class of an effect that is told of every step made; made with a `Scene`, only where the job asks for it.
+
+    It also has the `entries` and `restore` of whatever remembers something. Methods are collective, unless they say
+    otherwise.
+    """
+
+    section: ClassVar[type[Part]]  # what it adds to a job
+    columns: ClassVar[tuple[str, ...]]  # what it adds to measures.csv
+
+    @staticmethod
+    def decide(job: Job) -> Decision:
+        """Whether the job asks for it, and its name in checkpoints; the same on every rank."""
+        ...
+
+    @staticmethod
+    def maps(job: Job) -> Sequence[DTypeLike]:
+        """The types of the maps that it holds and that a checkpoint has; what it holds besides is not planned."""
+        ...
+
+    def __init__(self, scene: Any) -> None: ...
+
+    def follow(self, instant: Instant) -> None:
+        """After a step."""
+        ...
+
+    def values(self) -> Sequence[float]:
+        """What its columns have in the row of the last step made, the same on every rank; NaN leaves one empty.
+
+        Local to this rank.
+        """
+        ...
+
+
+def effects_that_follow(job: Job) -> dict[str, type[Effect]]:
+    """The effects that the sections of a job ask for, by their names in checkpoints."""
+    found = extension.effects_of(type(job).model_fields).values()
+    return {effect.decide(job).name: effect for effect in found if effect.decide(job).on}

@@ -1,0 +1,195 @@
+"""An effect of a user's own, with a section of the job, a map, memory and a column: the one that the README shows.
+
+It is installed as a package would install it: a module on the path and an entry point, nothing of ours being touched.
+"""
+
+import csv
+import pickle
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+import yaml
+from marching import ROOT, begun, marched
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact import __main__, job, scene
+from parcontact.effects.effect import effects_that_follow
+from parcontact.job import Job, JobError, extension, model
+from parcontact.parallel.slab import Slab
+from parcontact.plan import memory
+from parcontact.run import runner
+
+pytestmark = pytest.mark.mpi
+
+NX, NY, COEFFICIENT = 24, 10, 1e-12
+PRESS = {"pressure": 1e5, "duration": 1e-3, "time_step": 5e-4}
+SLIDE = {"pressure": 1e5, "velocity": 0.2, "distance": 0.5e-3, "cells_per_step": 1}
+DATA: dict[str, Any] = {
+    "grid": {"points": [NX, NY], "size": [1e-3, 0.4e-3]},
+    "surface": [{"shape": "wave", "amplitude": 4e-6, "waves": waves} for waves in ([2, 0], [1, 1])],
+    "material": {"modulus_inf": 1e6, "model": "zener", "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [PRESS, SLIDE],
+    "numerics": {"tolerance": 1e-10},
+}
+WEAR = {**DATA, "wear": {"coefficient": COEFFICIENT}}
+
+
+def forget() -> None:
+    """What was found before is looked for anew."""
+    for found in (extension._registered, extension._load, model.extended):
+        found.cache_clear()
+    sys.modules.pop("tread_wear", None)
+
+
+@pytest.fixture
+def installed(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The directory in which the README's effect is installed."""
+    if comm.rank == 0:
+        readme = (ROOT / "README.md").read_text()
+        (shared_path / "tread_wear.py").write_text(re.findall(r"```python\n(# tread_wear.py\n.*?)```", readme, re.S)[0])
+        entry = re.findall(r'```toml\n\[project.entry-points."parcontact.effects"\]\n(.*?)\n```', readme, re.S)[0]
+        package = shared_path / "tread_wear-1.0.dist-info"
+        package.mkdir()
+        (package / "METADATA").write_text("Metadata-Version: 2.1\nName: tread-wear\nVersion: 1.0\n")
+        (package / "entry_points.txt").write_text(f"[parcontact.effects]\n{entry.replace(chr(34), '')}\n")
+    comm.Barrier()
+    monkeypatch.syspath_prepend(str(shared_path))
+    forget()
+    yield shared_path
+    forget()
+
+
+def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> list[dict[str, str]]:
+    """Run the job with wear into a directory that all ranks see; the rows of measures.csv."""
+    path = where / f"{name}.yaml"
+    if comm.rank == 0:
+        path.write_text(yaml.safe_dump(WEAR))
+    comm.Barrier()
+    loaded = job.load(path, [f"output.directory={where / name}"])
+    runner.run(loaded, Slab(comm, NX, NY), runner.Options(quiet=True, **options))
+    comm.Barrier()
+    with (where / name / "measures.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_column_is_archards_law(installed: Path, comm: MPI.Intracomm) -> None:
+    """Worn off in all: the constant times the mean pressure times the distance slid, to rounding."""
+    march, rows = marched(WEAR, comm=comm)
+    slab, wear = march.scene.slab, march.scene.followers["wear"]
+    worn = slab.sum(float(wear.depth.sum()))[0] / slab.points  # type: ignore[attr-defined]
+    assert_allclose(worn, COEFFICIENT * 1e5 * 0.5e-3, rtol=1e-12)
+    assert [row.added[0] for row in rows[:4]] == [0.0] * 4  # nothing slides before
+    assert rows[-1].added[0] == slab.reduce((), [float(wear.depth.max(initial=0.0))])[0] > worn  # type: ignore[attr-defined]
+
+
+def test_restart_on_another_number_of_ranks(installed: Path, comm: MPI.Intracomm) -> None:
+    """What all ranks began one of them ends, and the other way round: the map and the column are those of a whole run.
+
+    To the tolerance of a solve, 1e-10, times the few steps in which it matters.
+    """
+    alone = MPI.COMM_SELF
+    depths, columns = {}, {}
+    whole = run(comm, installed, "whole")
+    for name, first, second in (("fewer", comm, alone), ("more", alone, comm)):
+        for ranks, until in ((first, 2e-3), (second, None)):
+            if ranks is comm or comm.rank == 0:
+                run(ranks, installed, name, until=until)
+            comm.Barrier()
+    for name in ("whole", "fewer", "more"):
+        with h5py.File(installed / name / "checkpoint" / "step-15.h5") as file:
+            depths[name] = file["wear/depth"][()]
+        with (installed / name / "measures.csv").open(newline="") as file:
+            columns[name] = [float(row["wear_depth"]) for row in csv.DictReader(file)]
+    assert len(whole) == len(columns["whole"]) == 16
+    for name in ("fewer", "more"):
+        assert_allclose(depths[name], depths["whole"], rtol=0, atol=1e-7 * depths["whole"].max())
+        assert_allclose(columns[name], columns["whole"], rtol=1e-7)
+    assert columns["whole"][-1] == depths["whole"].max() > 0.0
+
+
+def test_plan_counts_its_bytes(installed: Path, comm: MPI.Intracomm) -> None:
+    planned = Job.model_validate(WEAR)
+    march, _ = marched(WEAR, comm=comm)
+    slab = march.scene.slab
+    held = {holding.what: holding.bytes for holding in memory.holdings(planned, comm.size, comm.rank)}
+    assert held["wear"] == 8 * slab.shape[0] * NX
+    assert sum(held.values()) == slab.tally["map bytes"]
+    assert memory.saved(planned) - memory.saved(Job.model_validate(DATA)) == 8 * NX * NY + 4 * NY
+    assert [decision.why for decision in scene.effects(planned) if decision.name == "wear"] == [
+        "the job has a section wear"
+    ]
+
+
+def test_absent_it_costs_nothing(installed: Path, comm: MPI.Intracomm) -> None:
+    """Its file is not even imported; where it is on, one map and a reduction in each step are all that is more."""
+    off, rows = marched(DATA, comm=comm)
+    assert "tread_wear" not in sys.modules
+    assert off.scene.followers == {}
+    assert rows[-1].added == ()
+    on, _ = marched(WEAR, comm=comm)
+    more, less = on.scene.slab.tally, off.scene.slab.tally
+    extra = {
+        name: more[name] - less[name] for name in {*more, *less} if more[name] != less[name] and "most" not in name
+    }
+    expected = {"map bytes": 8 * NX * on.scene.slab.shape[0], "allreduce": len(rows) - 1}
+    assert extra == {name: count for name, count in expected.items() if count}
+    assert not next(decision.on for decision in scene.effects(Job.model_validate(DATA)) if decision.name == "wear")
+
+
+def test_a_job_reaches_other_ranks(installed: Path, comm: MPI.Intracomm) -> None:
+    """A job with a section of an effect is one class, also for who unpickles it, and resolves to itself."""
+    own = Job.model_validate(WEAR)
+    assert pickle.loads(pickle.dumps(own)) == own == comm.bcast(own)
+    assert isinstance(own, Job)
+    assert own.section("wear").coefficient == COEFFICIENT
+    again = Job.model_validate(yaml.safe_load(own.resolved()))
+    assert again == own
+    assert list(effects_that_follow(again)) == ["wear"]
+    assert begun(DATA).scene.job.section("wear") is None
+
+
+def test_mistakes_have_their_place(installed: Path, comm: MPI.Intracomm) -> None:
+    """As in any section; a section of no effect is an unknown key."""
+    path = installed / f"bad-{comm.rank}.yaml"
+    for text, expected in {
+        "wear: {coeficient: 1.0}": ":8: wear.coeficient is not a known key; did you mean coefficient?",
+        "wear: {coefficient: -1.0}": ":21: wear.coefficient must be a positive coefficient of wear [1/Pa], got -1.0",
+        "wear: 3": ":7: wear must be a mapping of keys, got 3",
+        "ware: {}": ":1: ware is not a known key",
+    }.items():
+        path.write_text(f"{text}\n{yaml.safe_dump(DATA)}")
+        with pytest.raises(JobError) as error:
+            job.load(path)
+        assert any(f"{path}:1{expected}" in mistake for mistake in error.value.mistakes), error.value.mistakes
+
+
+@pytest.mark.parametrize("code", ["import nothing_like_this", "class Wear: section = int"])
+def test_an_effect_that_cannot_be_used(installed: Path, comm: MPI.Intracomm, code: str) -> None:
+    """The job names it, so the mistake is the job's."""
+    comm.Barrier()
+    if comm.rank == 0:
+        (installed / "tread_wear.py").write_text(code)
+        (installed / "bad.yaml").write_text(yaml.safe_dump(WEAR, sort_keys=False))
+    comm.Barrier()
+    with pytest.raises(JobError, match=r"wear belongs to the effect tread_wear:Wear, which cannot be used"):
+        job.load(installed / "bad.yaml")
+
+
+def test_plan_tells_of_it(
+    installed: Path, comm: MPI.Intracomm, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a user reads it."""
+    if comm.size > 1:
+        return
+    monkeypatch.setenv("XDG_CACHE_HOME", str(installed / "cache"))
+    (installed / "job.yaml").write_text(yaml.safe_dump(WEAR))
+    assert __main__.main(["plan", str(installed / "job.yaml"), "--ranks", "1", "--seconds", "0.1"]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"^  on   wear +the job has a section wear$", said, re.M)
+    assert re.search(r"^  wear +0.00192$", said, re.M)
