@@ -28,11 +28,10 @@ def pointwise(function: Function) -> Function:
 
 
 def cache_path(compiled: Any) -> Path | None:
-    """The directory in which machine code is kept, if any."""
-    dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a loop, or of a function of points
-    kept: Any = getattr(dispatcher, "_cache", None) or dispatcher.cache
-    path = kept.cache_path
-    return Path(path) if path else None
+    """The directory in which machine code of a compiled function is kept, if any."""
+    dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a function of points, or of a loop
+    kept = getattr(dispatcher, "_cache", None) or getattr(dispatcher, "cache", None)  # none if compiling is off
+    return Path(kept.cache_path) if kept and kept.cache_path else None
 
 
 def _compiled(compiler: Callable[[bool], Any]) -> Any:

@@ -90,6 +90,13 @@ BAD: list[tuple[Sequence[str], str]] = [
     (["job.yaml", "--wall", "soon"], "must be a wall time HH:MM:SS, got 'soon'"),
     (["job.yaml", "--sett", "grid.points=8"], "unrecognized arguments"),
     (["info", "absent.h5"], "absent.h5 does not exist"),
+    ([], "parcontact: a job is needed"),
+    (["plt", "out/job"], "'plt' is neither a verb nor a job file; did you mean plot?"),
+    (["hlep"], "did you mean help?"),
+    (["steady", "job.yaml", "--velocities", "0:10:5"], "so it must begin and end above 0, got '0:10:5'"),
+    (["steady", "job.yaml", "--velocities", "1:10:1"], "must have a count of 2 or more, got '1:10:1'"),
+    (["steady", "job.yaml", "--velocities", "1:10"], "must be first:last:count or a list of numbers, got '1:10'"),
+    (["--out", "", "job.yaml"], "must name a directory, got ''"),
     (["heights.yaml"], "heights.npy has shape (3, 4), but the grid has (ny, nx) = (12, 16)"),
     (["one_solve.yaml", "--until", "1"], "--until 1 is beyond the end of the history, t = 0 s"),
 ]
@@ -227,3 +234,25 @@ def test_help(main: Main) -> None:
     code, said, _ = main("run", "--help")
     for option in ("--restart", "--until", "--wall", "--out", "--quiet", "--set"):
         assert option in said
+
+
+def test_help_is_a_verb(main: Main) -> None:
+    assert main("help") == main("--help")
+    assert main("help", "plan") == main("plan", "--help")
+
+
+def test_options_may_come_first(main: Main, tmp_path: Path) -> None:
+    path = job(tmp_path / "job.yaml")
+    assert main("--quiet", "--until", "0", path)[0] == 0
+    assert (tmp_path / "out" / "job").is_dir()
+
+
+@pytest.mark.parametrize(
+    "name", ["5", "{a}", "~", "u #x", "1e3", "null", "- a", "\xfc: \U0001f6de", '"q"', "a\\b", "\x7f"]
+)
+def test_out_is_taken_literally(main: Main, tmp_path: Path, name: str) -> None:
+    """Whatever YAML would read in it."""
+    path = job(tmp_path / "job.yaml")
+    assert main("check", path, "--out", name)[0] == 0
+    assert main(path, "--quiet", "--until", "0", "--out", name)[0] == 0
+    assert sorted(found.name for found in tmp_path.iterdir()) == sorted(["job.yaml", name])

@@ -199,6 +199,7 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     text = "grid: {points: 32, size: 1.0e-3}\nsurface: {shape: sphere, radius: 1.0e-2}\n"
     text += "material: {model: elastic, shear_modulus: 1.0e6}\nhistory: [{pressure: 1.0e4}]\n"
     (tmp_path / "job.yaml").write_text(text)
+    (tmp_path / "parcontact.py").write_text("open('executed', 'w')")  # where Python would look first
     assert __main__.main(["plan", "job.yaml", "--ranks", "1,2,1000", "--cores", "4", "--seconds", "1"]) == 0
     said = capsys.readouterr().out
     assert "on   checkpoints" in said
@@ -207,7 +208,7 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     assert "scaling ends at" in said
     assert "tried: 1 steps on 1 rank in" in said
     assert ("tried: 1 steps on 2 ranks in" in said) == (machine.cores() > 1)  # by two processes started for it
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["job.yaml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["job.yaml", "parcontact.py"]
 
 
 @pytest.mark.parametrize("words", [["--ranks", "0"], ["--ranks", "two"], ["--network", "1"], ["--cores", "-1"]])

@@ -15,7 +15,7 @@ from . import ranks, verbs
 
 VERBS = ("run", "steady", "check", "plan", "theory", "info", "plot", "doctor")
 FIRST = """\
-parcontact needs a job: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
+a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
 
   parcontact check job.yaml             list its mistakes, or all that it says with every default
   parcontact plan job.yaml              say what it will do and cost
@@ -31,7 +31,7 @@ checkpoint, run again"""
 def understand(words: Sequence[str]) -> argparse.Namespace:
     """The options of a command line; `act` is its verb. Raises InputError or SystemExit for what cannot be meant."""
     if not words:
-        raise InputError(FIRST.removeprefix("parcontact "))
+        raise InputError(FIRST)
     first, *rest = words
     if first == "help":
         words = [*(word for word in rest if word in VERBS), "--help"]
@@ -136,10 +136,16 @@ def _parser() -> argparse.ArgumentParser:
 def _job_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("job", help="job file (YAML)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
-    parser.add_argument("--out", metavar="DIR", help="output directory")
+    parser.add_argument("--out", metavar="DIR", type=_directory, help="output directory")
 
 
 # -- values -----------------------------------------------------------------------------------------------------------
+
+
+def _directory(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("must name a directory, got ''")
+    return f"./{text}" if text.startswith("~") else text  # a shell has said all that it has to say of homes
 
 
 def _seconds(text: str) -> float:

@@ -28,7 +28,7 @@ def samples(job: Job, words: Sequence[str], ranks: Iterable[int], seconds: float
 
 
 def _attempt(job: Job, words: Sequence[str], ranks: int, path: Path, seconds: float) -> Sample | None:
-    program = [sys.executable, "-m", "parcontact", "plan", *words, "--sample", str(path)]
+    program = [sys.executable, "-P", "-m", "parcontact", "plan", *words, "--sample", str(path)]
     clean = {key: value for key, value in os.environ.items() if not key.startswith(MARKS)}
     began = time.perf_counter()
     try:

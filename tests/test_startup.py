@@ -1,0 +1,98 @@
+"""The program opens at once: what takes long to import is imported by verbs that need it, and by no other."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import RunParcontact
+
+JOBS = Path(__file__).parents[1] / "jobs"
+SLOW = ("mpi4py.MPI", "numba", "numpy", "scipy", "pyfftw", "matplotlib", "h5py", "pydantic", "yaml", "xarray")
+WATCHED = """
+import sys
+from parcontact.__main__ import main
+try:
+    code = main(sys.argv[2:])
+except SystemExit as ended:
+    code = ended.code
+print("imported:", *(name for name in sys.argv[1].split(",") if name in sys.modules))
+sys.exit(code)
+"""
+
+
+def imported(environment: dict[str, str], *words: str | Path, cwd: Path) -> tuple[int, set[str]]:
+    """The exit code of a command line, and which of the slow modules it has imported."""
+    command = [sys.executable, "-c", WATCHED, ",".join((*SLOW, *FURTHER)), *map(str, words)]
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True)
+    return done.returncode, set(done.stdout.splitlines()[-1].removeprefix("imported:").split())
+
+
+FURTHER = ("scipy.special", "scipy.fft", "scipy.optimize", "pyfftw.interfaces", "parcontact.scene", "tqdm")
+LIGHT: list[tuple[list[str | Path], int, set[str]]] = [
+    (["--help"], 0, set()),
+    (["--version"], 0, set()),
+    (["run", "--help"], 0, set()),
+    (["help", "steady"], 0, set()),
+    ([], 2, set()),
+    (["plt", "out/job"], 2, set()),
+    (["--wrong"], 2, set()),
+    (["check", JOBS / "westergaard.yaml"], 0, {"pydantic", "yaml"}),
+    (["check", JOBS / "velocity_step.yaml"], 0, {"pydantic", "yaml"}),
+    (["check", "absent.yaml"], 2, {"pydantic", "yaml"}),
+]
+
+
+@pytest.mark.parametrize(("words", "code", "needed"), LIGHT)
+def test_light_verbs(
+    words: list[str | Path], code: int, needed: set[str], outside_mpi: dict[str, str], tmp_path: Path
+) -> None:
+    assert imported(outside_mpi, *words, cwd=tmp_path) == (code, needed)
+
+
+def test_info_and_a_run(outside_mpi: dict[str, str], tmp_path: Path) -> None:
+    """A run needs loops, transforms, MPI and files; nothing to draw with, and nothing of scipy but its name."""
+    words = [JOBS / "westergaard.yaml", "--quiet", "--out", "out"]
+    code, found = imported(outside_mpi, *words, cwd=tmp_path)
+    assert code == 0
+    assert not found & {"scipy.special", "scipy.fft", "scipy.optimize", "pyfftw.interfaces", "matplotlib", "xarray"}
+    code, found = imported(outside_mpi, "info", "out/checkpoint/step-5.h5", cwd=tmp_path)
+    assert code == 0
+    assert not found & {"numba", "scipy", "pyfftw.interfaces", "matplotlib", "xarray", "parcontact.scene"}
+
+
+def test_the_package_alone(outside_mpi: dict[str, str]) -> None:
+    program = "import sys, parcontact; print([m for m in sys.argv[1:] if m in sys.modules])"
+    words = [sys.executable, "-c", program, *SLOW, *FURTHER]
+    assert subprocess.run(words, env=outside_mpi, capture_output=True, text=True).stdout == "[]\n"
+
+
+def test_pyfftw_is_whole_for_others(outside_mpi: dict[str, str]) -> None:
+    """Its interfaces, left out at first, are there for who asks."""
+    program = (
+        "import parcontact.parallel.fft, pyfftw\n"
+        "assert not hasattr(pyfftw, 'absent')\n"
+        "print(pyfftw.interfaces.scipy_fft.fft.__module__)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env=outside_mpi, capture_output=True, text=True)
+    assert done.stdout == "pyfftw.interfaces.scipy_fft\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "once"),
+    [
+        (["--version"], 0, "parcontact 0"),
+        (["--help"], 0, "exit codes"),
+        (["--wrong"], 2, "usage:"),
+        (["check", "absent.yaml"], 2, "absent.yaml: cannot be read"),
+        (["info", "absent.h5"], 2, "absent.h5 does not exist"),
+        (["absent.yaml"], 2, "absent.yaml: cannot be read"),
+    ],
+)
+def test_ranks_speak_once(run_parcontact: RunParcontact, words: list[str], code: int, once: str) -> None:
+    """On three ranks, whether MPI has started or not."""
+    done = run_parcontact(words, ranks=3)
+    assert done.returncode == code
+    assert (done.stdout + done.stderr).count(once) == 1
+    assert "alone" not in done.stderr
+    assert "Traceback" not in done.stderr
