@@ -21,7 +21,7 @@ sys.exit(code)
 """
 
 
-def imported(environment: dict[str, str], *words: str | Path, cwd: Path) -> tuple[int, set[str]]:
+def imported(environment: dict[str, str], *words: object, cwd: Path) -> tuple[int, set[str]]:
     """The exit code of a command line, and which of the slow modules it has imported."""
     command = [sys.executable, "-c", WATCHED, ",".join((*SLOW, *FURTHER)), *map(str, words)]
     done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True)
@@ -29,7 +29,7 @@ def imported(environment: dict[str, str], *words: str | Path, cwd: Path) -> tupl
 
 
 FURTHER = ("scipy.special", "scipy.fft", "scipy.optimize", "pyfftw.interfaces", "parcontact.scene", "tqdm")
-LIGHT: list[tuple[list[str | Path], int, set[str]]] = [
+LIGHT: list[tuple[list[object], int, set[str]]] = [
     (["--help"], 0, set()),
     (["--version"], 0, set()),
     (["run", "--help"], 0, set()),
@@ -45,7 +45,7 @@ LIGHT: list[tuple[list[str | Path], int, set[str]]] = [
 
 @pytest.mark.parametrize(("words", "code", "needed"), LIGHT)
 def test_light_verbs(
-    words: list[str | Path], code: int, needed: set[str], outside_mpi: dict[str, str], tmp_path: Path
+    words: list[object], code: int, needed: set[str], outside_mpi: dict[str, str], tmp_path: Path
 ) -> None:
     assert imported(outside_mpi, *words, cwd=tmp_path) == (code, needed)
 

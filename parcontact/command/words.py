@@ -145,7 +145,7 @@ def _job_arguments(parser: argparse.ArgumentParser) -> None:
 def _directory(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("must name a directory, got ''")
-    return f"./{text}" if text.startswith("~") else text  # a shell has said all that it has to say of homes
+    return str(Path.cwd() / text) if text.startswith("~") else text  # a shell has said all there is to say of homes
 
 
 def _seconds(text: str) -> float:
