@@ -90,6 +90,26 @@ def theory(options: argparse.Namespace) -> int:
     return DONE
 
 
+def fit(options: argparse.Namespace) -> int:
+    """Root alone, without MPI."""
+    if not ranks.is_root():
+        return DONE
+    from .. import job as jobs
+    from ..effects.folded_branches import excited_band
+    from ..record import compounds
+    from ..rubber import compound
+    from ..rubber.shift import given
+
+    target = options.out or options.table.with_suffix(".yaml")
+    compounds.refuse_foreign(target)
+    band = excited_band(jobs.load(options.job)) if options.job else None
+    law = given(options.shift, options.reference)
+    made = compound.fitted(options.table, options.poisson, options.reference, law, options.error)
+    for line in compounds.write(made, target, band):
+        print(line)
+    return DONE
+
+
 def info(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..record import info as about

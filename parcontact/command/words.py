@@ -13,7 +13,7 @@ from .. import __version__
 from ..errors import InputError
 from . import ranks, verbs
 
-VERBS = ("run", "steady", "check", "plan", "theory", "info", "plot", "doctor")
+VERBS = ("run", "steady", "check", "plan", "theory", "fit", "info", "plot", "doctor")
 FIRST = """\
 a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
 
@@ -119,6 +119,22 @@ def _parser() -> argparse.ArgumentParser:
     theory.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     theory.set_defaults(act=verbs.theory)
 
+    fit = found.add_parser("fit", help="fit a compound to measured moduli: a material file and a picture")
+    fit.add_argument("table", type=Path, help="measured moduli: a table with the names and units of its columns")
+    fit.add_argument("--out", metavar="FILE", type=Path, help="material file (default: the table's name with .yaml)")
+    text = "temperature [deg C] at which relaxation times are given (default: the middle one of those measured)"
+    fit.add_argument("--reference", metavar="T", type=float, help=text)
+    text = (
+        "how times depend on temperature: wlf (default) or arrhenius with fitted constants, free factors, or given "
+        "ones: wlf:C1,C2 or arrhenius:J/mol or a file with the columns T[C] and log_aT"
+    )
+    fit.add_argument("--shift", metavar="LAW", default="wlf", help=text)
+    text = "rms error of the logarithms of the moduli that is allowed beside the scatter of the data (default: 0.02)"
+    fit.add_argument("--error", metavar="E", type=_positive, default=0.02, help=text)
+    fit.add_argument("--poisson", metavar="NU", type=float, default=0.5, help="Poisson's ratio (default: 0.5)")
+    fit.add_argument("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
+    fit.set_defaults(act=verbs.fit)
+
     info = found.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
     info.add_argument("file", type=Path)
     info.set_defaults(act=verbs.info)
@@ -170,6 +186,13 @@ def _network(text: str) -> tuple[float, float]:
     if len(values) != 2 or min(values) <= 0.0:
         raise argparse.ArgumentTypeError(f"must be seconds of a message and bytes per second, got {text!r}")
     return values[0], values[1]
+
+
+def _positive(text: str) -> float:
+    with suppress(ValueError):
+        if 0.0 < float(text) < float("inf"):
+            return float(text)
+    raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}")
 
 
 def _share(text: str) -> float:

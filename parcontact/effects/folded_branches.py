@@ -1,5 +1,6 @@
 """Folded branches: which of them need no map, from the time scales of a job and the waves of its surface."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -78,6 +79,18 @@ def bands(job: Job) -> Iterator[Band]:
             yield Band(longest, finest, finest, (1.0, 0.0) if shape.axis == "y" else (0.0, 1.0))
         elif isinstance(shape, jobs.Sphere | jobs.HeightFile):
             yield Band(longest, finest, finest, only)
+
+
+def excited_band(job: Job) -> tuple[float, float] | None:
+    """Frequencies [Hz] with which the waves of a job's surface pass a point of the body, over all stages and steady
+    velocities; None for a surface that stands."""
+    speeds = [math.hypot(*phase.velocity) for phase in phases(job)] + [math.hypot(*job.initial.velocity)]
+    speeds = [speed for speed in (*speeds, *(job.steady.velocities if job.steady else ())) if speed > 0.0]
+    waves = [(band.low, band.high) for band in bands(job)]
+    if not speeds or not waves:
+        return None
+    low, high = min(low for low, _ in waves), max(high for _, high in waves)
+    return min(speeds) * low / (2 * math.pi), max(speeds) * high / (2 * math.pi)
 
 
 def _cells_and_points(grid: Grid) -> Iterator[tuple[float, int]]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from .shift import WLF, Arrhenius, Factors, Shift
 
+TITLE = "# Fitted by parcontact fit to"  # with which material files of fits begin
 DIGITS = 7  # of the numbers in a material file
 
 
@@ -40,7 +41,7 @@ class Compound:
         kind = "Young's moduli, divided by 2 (1 + poisson)" if self.measured.tension else "shear moduli"
         temperatures = [each.temperature for each in self.measured.sets if each.temperature is not None]
         lines = [
-            f"# Fitted to {self.measured.path.name} by parcontact fit: {kind}, {self.measured.kind} domain.",
+            f"{TITLE} {self.measured.path.name}: {kind}, {self.measured.kind} domain.",
             f"# {len(series.moduli)} branches; rms error of the moduli {series.error:.2%}, "
             f"of which {series.scatter:.2%} is scatter of the data.",
             f"# Measured band, reduced{at}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",

@@ -6,9 +6,11 @@ Arrhenius   log10 a_T = E/(R ln 10) (1/T - 1/T_ref)           temperatures in K
 table       log10 a_T given at some temperatures, linear between them and nowhere beyond
 """
 
+import csv
 import math
 from bisect import bisect_left
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from ..errors import InputError
@@ -77,3 +79,49 @@ class Factors:
         above = max(1, bisect_left(self.temperatures, temperature))
         (low, high), (start, end) = self.temperatures[above - 1 : above + 1], self.logs[above - 1 : above + 1]
         return start + (end - start) * (temperature - low) / (high - low)
+
+
+def given(text: str, reference: float | None) -> str | Shift:
+    """What the text of a command line means: the name of a law whose constants are to be fitted, or a law.
+
+    `wlf:8.86,101.6` and `arrhenius:1.2e5` hold constants at the reference temperature, another text is the path of a
+    file with the columns T[C] and log_aT. Raises InputError.
+    """
+    if text in ("wlf", "arrhenius", "free"):
+        return text
+    name, colon, rest = text.partition(":")
+    if colon and name in ("wlf", "arrhenius"):
+        if reference is None:
+            raise InputError(f"--shift {text} needs --reference, the temperature [deg C] that its constants belong to")
+        try:
+            if name == "arrhenius":
+                return Arrhenius(float(rest), reference)
+            first, second = (float(part) for part in rest.split(","))
+            return WLF(first, second, reference)
+        except ValueError:
+            form = "wlf:C1,C2" if name == "wlf" else "arrhenius:J/mol"
+            raise InputError(f"--shift must be of the form {form}, got {text!r}") from None
+    return _table(Path(text), reference)
+
+
+def _table(path: Path, reference: float | None) -> Factors:
+    try:
+        with path.open(newline="") as file:
+            rows = [row for row in csv.reader(file, skipinitialspace=True) if row and not row[0].startswith("#")]
+    except OSError as error:
+        raise InputError(
+            f"--shift must be wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file: {error}"
+        ) from error
+    try:
+        pairs = sorted((float(temperature), float(log)) for temperature, log in rows[1:])
+    except ValueError:
+        raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of a_T") from None
+    if not rows or [name.strip() for name in rows[0]] != ["T[C]", "log_aT"] or len(pairs) < 2:
+        raise InputError(f"{path}: a table of T[C],log_aT with at least two rows was expected")
+    temperatures, logs = zip(*pairs, strict=True)
+    if len(set(temperatures)) < len(temperatures):
+        raise InputError(f"{path}: a temperature has two factors")
+    at = min(pairs, key=lambda pair: abs(pair[1]))[0] if reference is None else reference
+    if not temperatures[0] <= at <= temperatures[-1]:
+        raise InputError(f"{path}: the reference temperature {at:g} C is outside its factors")
+    return Factors(temperatures, logs, at)

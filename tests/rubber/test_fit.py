@@ -1,0 +1,81 @@
+"""`parcontact fit` as a user calls it: files made and kept, laws given, bad input in one sentence."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib.image
+import pytest
+
+from parcontact import job as jobs
+from parcontact.errors import InputError
+from parcontact.rubber.shift import WLF, Arrhenius, Factors, given
+
+from . import measured
+
+if TYPE_CHECKING:
+    from conftest import RunParcontact
+
+JOB = """
+grid: {points: 32, size: 1.0e-3}
+surface: {shape: wave, amplitude: 1.0e-6, waves: [4, 0]}
+material: {include: rubber}
+history: [{pressure: 1.0e4, velocity: 1.0e6, distance: 1.0e-3, cells_per_step: 1}]
+"""
+
+
+def test_a_table_becomes_a_material(tmp_path: Path, run_parcontact: "RunParcontact") -> None:
+    """The file is included by a job, the picture has a picture's size, and frequencies beyond the data are told."""
+    measured.write_sweeps(tmp_path / "rubber.csv", noise=0.02)
+    job = tmp_path / "job.yaml"
+    job.write_text(JOB.replace("{include: rubber}", "{model: elastic, shear_modulus: 1.0e6}"))
+    words: list[str | Path] = ["fit", "rubber.csv", "--out", "materials/rubber.yaml", "--reference", "20", "--job", job]
+    done = run_parcontact(words, ranks=0)
+    assert done.returncode == 0, done.stderr
+    assert "12 branches" in done.stdout
+    assert "warning: the job's frequencies reach 1.8 decades above the measured band" in done.stdout
+    job.write_text(JOB)
+    found = jobs.load(job).material
+    assert isinstance(found, jobs.Zener)
+    assert len(found.branches) == 12
+    assert matplotlib.image.imread(tmp_path / "materials" / "rubber.png").shape[:2] == (900, 1200)
+    again = run_parcontact(words, ranks=0)
+    assert again.returncode == 0  # its own files are made anew
+    (tmp_path / "mine.yaml").write_text("title: mine\n")
+    refused = run_parcontact(["fit", "rubber.csv", "--out", "mine.yaml"], ranks=0)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("parcontact: mine.yaml is there and was not written by parcontact fit")
+    assert (tmp_path / "mine.yaml").read_text() == "title: mine\n"
+
+
+def test_laws_given(tmp_path: Path) -> None:
+    assert given("wlf", None) == "wlf"
+    assert given("wlf:8.86,101.6", 20.0) == WLF(8.86, 101.6, 20.0)
+    assert given("arrhenius:1.2e5", 20.0) == Arrhenius(1.2e5, 20.0)
+    path = tmp_path / "factors.csv"
+    path.write_text("T[C],log_aT\n# of a laboratory\n40,-1\n20, 0\n0,2\n")
+    assert given(str(path), None) == Factors((0.0, 20.0, 40.0), (2.0, 0.0, -1.0), 20.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "reference", "content", "sentence"),
+    [
+        ("wlf:8,100", None, "", "needs --reference"),
+        ("wlf:8", 20.0, "", "must be of the form wlf:C1,C2"),
+        ("arrhenius:much", 20.0, "", "must be of the form arrhenius:J/mol"),
+        ("none.csv", None, "", "or a readable file"),
+        ("factors.csv", None, "", "a table of T"),
+        ("factors.csv", None, "T[K],log_aT\n0,1\n1,2\n", "a table of T"),
+        ("factors.csv", None, "T[C],log_aT\n0,1\n", "a table of T"),
+        ("factors.csv", None, "T[C],log_aT\n0,1\n1\n", "each row must hold"),
+        ("factors.csv", None, "T[C],log_aT\n0,1\n0,2\n", "has two factors"),
+        ("factors.csv", 50.0, "T[C],log_aT\n0,1\n20,0\n", "50 C is outside"),
+    ],
+)
+def test_laws_that_will_not_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, reference: float | None, content: str, sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "factors.csv").write_text(content)
+    with pytest.raises(InputError) as failure:
+        given(text, reference)
+    assert sentence in str(failure.value)
