@@ -23,7 +23,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"march"},
     {"steady_sliding"},
     {"run", "plan", "prediction"},
-    {"doctor"},
+    {"doctor", "study"},
     {"command"},
     {"__main__"},
 ]

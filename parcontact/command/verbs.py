@@ -9,6 +9,7 @@ from . import ranks
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Sequence
 
     from ..job import Job
     from ..parallel.mpi import MPI
@@ -108,6 +109,20 @@ def fit(options: argparse.Namespace) -> int:
     for line in compounds.write(made, target, band):
         print(line)
     return DONE
+
+
+def study(options: argparse.Namespace) -> int:
+    world = ranks.start()
+    from .. import job as jobs
+    from ..parallel.slab import Slab
+    from ..study import runner
+
+    job, words = _load(options, world), _overrides(options)
+
+    def make(changes: Sequence[str]) -> Job:
+        return ranks.on_root(world, lambda: jobs.load(options.job, [*words, *changes]))
+
+    return runner.run(job, make, Slab(world, *job.grid.points), options.quiet)
 
 
 def info(options: argparse.Namespace) -> int:

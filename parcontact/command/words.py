@@ -13,7 +13,7 @@ from .. import __version__
 from ..errors import InputError
 from . import ranks, verbs
 
-VERBS = ("run", "steady", "check", "plan", "theory", "fit", "info", "plot", "doctor")
+VERBS = ("run", "steady", "check", "plan", "theory", "fit", "study", "info", "plot", "doctor")
 FIRST = """\
 a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
 
@@ -134,6 +134,11 @@ def _parser() -> argparse.ArgumentParser:
     fit.add_argument("--poisson", metavar="NU", type=float, default=0.5, help="Poisson's ratio (default: 0.5)")
     fit.add_argument("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
     fit.set_defaults(act=verbs.fit)
+
+    study = found.add_parser("study", help="compare settings of a job: what accuracy costs; goes on after a stop")
+    _job_arguments(study)
+    study.add_argument("--quiet", action="store_true", help="print only warnings and errors")
+    study.set_defaults(act=verbs.study)
 
     info = found.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
     info.add_argument("file", type=Path)

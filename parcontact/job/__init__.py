@@ -5,6 +5,7 @@ from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_r
 from .material import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe, load
 from .sections import Checkpoint, Grid, Numerics, Output
+from .study import Study
 from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "Sphere",
     "Stage",
     "Steady",
+    "Study",
     "Wave",
     "Zener",
     "ZenerBranch",

@@ -24,6 +24,7 @@ from .material import Elastic, Material, Zener
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
 from .source import Key, Mistake, Source, shorten
+from .study import Study
 from .surface import Rough, Shape
 from .timeline import Timeline
 from .yamltext import dump
@@ -93,6 +94,7 @@ class Job(Part):
     output: Output = Output()
     checkpoint: Checkpoint = Checkpoint()
     steady: Steady | None = None
+    study: Study | None = None
 
     _path: Path = PrivateAttr(default=Path("job.yaml"))
     _included: Included | None = PrivateAttr(default=None)

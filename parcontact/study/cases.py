@@ -1,0 +1,121 @@
+"""The cases of a study: which settings are combined, and what they change in the job.
+
+All meshes, cells per step and integrators are combined with each other. For each integrator the mesh is also refined
+alone, with the time steps of the finest mesh. Tolerance, precision and kernel are changed one at a time, on the mesh
+next to the job's own. A rough surface of one seed has the same waves on every mesh.
+"""
+
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass, fields, replace
+
+from ..errors import InputError
+from ..job import GeometricStep, HeightFile, Job, Study
+
+
+@dataclass(frozen=True)
+class Case:
+    """One combination: points along x, cells per step (of its own mesh), and the numerics."""
+
+    mesh: int
+    cells_per_step: float
+    integrator: str
+    tolerance: float
+    precision: str
+    kernel: str
+
+    @property
+    def time_step(self) -> float:
+        """In lengths of the box."""
+        return self.cells_per_step / self.mesh
+
+    @property
+    def effort(self) -> float:
+        """Roughly in proportion to the work: points times steps."""
+        return self.mesh**2 / self.time_step
+
+    def __str__(self) -> str:
+        cells = f"{self.cells_per_step:.4g} cell{'s' if self.cells_per_step > 1.0 else ''} per step"
+        rest = [f"tolerance {self.tolerance:g}", self.precision, self.kernel]
+        return ", ".join([f"mesh {self.mesh}", cells, self.integrator, *rest])
+
+
+NAMES = tuple(field.name for field in fields(Case))
+
+
+@dataclass(frozen=True)
+class Ladders:
+    """What is refined, from the coarsest to the finest; one value where the job asks for none."""
+
+    meshes: tuple[int, ...]
+    cells: tuple[float, ...]
+    integrators: tuple[str, ...]
+    study: Study
+    own: Case
+
+    def cases(self) -> list[Case]:
+        """All of them, each once, the cheapest first."""
+        finest = self.meshes[-1]
+        found = dict.fromkeys(self._together())
+        for case in [case for case in found if case.mesh == finest and case.cells_per_step == self.cells[0]]:
+            found |= dict.fromkeys(at_time_step(case, mesh) for mesh in self.meshes)
+        found |= dict.fromkeys(self._one_at_a_time())
+        return sorted(found, key=lambda case: (case.effort, astuple(case)))
+
+    def _together(self) -> Iterator[Case]:
+        for integrator in self.integrators:
+            for mesh in self.meshes:
+                for cells in self.cells:
+                    yield replace(self.own, mesh=mesh, cells_per_step=cells, integrator=integrator)
+
+    def _one_at_a_time(self) -> Iterator[Case]:
+        mesh = min(self.meshes, key=lambda points: abs(points - self.own.mesh))
+        base = replace(self.own, mesh=mesh, cells_per_step=self.cells[0], integrator=self.integrators[0])
+        for tolerance in self.study.tolerance:
+            yield replace(base, tolerance=tolerance)
+        for precision in self.study.precision:
+            yield replace(base, precision=precision)
+        for kernel in self.study.kernel:
+            yield replace(base, kernel=kernel)
+
+
+def at_time_step(case: Case, mesh: int) -> Case:
+    """The same time step on another mesh."""
+    return replace(case, mesh=mesh, cells_per_step=case.cells_per_step * mesh / case.mesh)
+
+
+def ladders(job: Job) -> Ladders:
+    """What a job's study refines; raises InputError where there is nothing, or its surface has one mesh only."""
+    study, numerics = job.study, job.numerics
+    if study is None:
+        raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
+    if not job.history:
+        raise InputError("a study compares histories: the job needs a history")
+    if len(study.mesh) > 0 and any(isinstance(shape, HeightFile) for shape in job.surface):
+        raise InputError("study.mesh: the heights of a file are given on one mesh; leave this ladder out")
+    for mesh in study.mesh:
+        if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:
+            raise InputError(f"study.mesh: {mesh} points along x are no whole number along y in this box")
+    own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), 1.0)
+    case = Case(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
+    meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
+    cells = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
+    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case)
+
+
+def overrides(job: Job, own: Case, case: Case) -> list[str]:
+    """What makes a case of the job, as for `--set`; time steps of all kinds change in the same proportion."""
+    ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
+    words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
+    words += ["output.branch_dissipation=false"]
+    words += [f"numerics.{name}={getattr(case, name)}" for name in ("integrator", "tolerance", "precision", "kernel")]
+    factor = case.time_step / own.time_step
+    for index, stage in enumerate(job.history):
+        place = f"history.{index}"
+        if stage.cells_per_step is not None:
+            words.append(f"{place}.cells_per_step={stage.cells_per_step * case.cells_per_step / own.cells_per_step!r}")
+        elif isinstance(stage.time_step, GeometricStep):
+            first, growth = stage.time_step.first * factor, stage.time_step.growth**factor
+            words.append(f"{place}.time_step={{first: {first!r}, growth: {growth!r}}}")
+        elif stage.time_step is not None:
+            words.append(f"{place}.time_step={stage.time_step * factor!r}")
+    return words

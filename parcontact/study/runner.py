@@ -1,0 +1,133 @@
+"""`parcontact study`: all cases one after the other, each at once into study.csv; then limits and pictures."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+
+from ..errors import RunError
+from ..job import Job
+from ..parallel.slab import Slab
+from ..record import study_plots
+from ..record.directory import Directory
+from ..run.watch import Signals
+from . import outcome, table, verdict
+from .cases import Case, Ladders, ladders, overrides
+from .outcome import Outcome
+
+DONE, AGAIN = 0, 3  # exit codes
+HEAD = f"  {'case':80} {'friction max':>13} {'area':>9} {'CPU [s]':>8}"
+MakeJob = Callable[[Sequence[str]], Job]
+
+
+def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
+    """Run a study; collective. `make` gives the job changed by some overrides; returns the exit code.
+
+    All cases are read before the first is run. After a stop the same command goes on with the cases that lack.
+    """
+    refined = ladders(job)
+    jobs = {case: make(overrides(job, refined.own, case)) for case in refined.cases()}
+    directory = Directory(job.output.directory, slab)
+    with Signals().noted() as signals, directory.claimed():
+        directory.make(job.path, job.resolved())
+        study = _Study(refined, jobs, directory, slab, quiet)
+        stop = directory.stop_file
+        ended = study.run(lambda: signals.come or (slab.root and stop.exists()))
+        if not ended:
+            if slab.root:
+                stop.unlink(missing_ok=True)
+            study.say(f"stopped after {len(study.outcomes)} of {len(jobs)} cases; run again to go on")
+            return AGAIN
+        study.conclude()
+    return DONE
+
+
+class _Study:
+    """The cases, and what has come out of them so far."""
+
+    def __init__(self, refined: Ladders, jobs: dict[Case, Job], directory: Directory, slab: Slab, quiet: bool) -> None:
+        self.refined, self.jobs, self.slab, self.quiet = refined, jobs, slab, quiet
+        self.path = directory.path / "study.csv"
+        self.prints = {case: _fingerprint(one) for case, one in jobs.items()}
+        known = table.read(self.path, self.prints) if slab.root else {}
+        self.outcomes: dict[Case, Outcome] = slab.agree(known)
+        self.warm: set[str] = set()
+
+    def say(self, text: str) -> None:
+        if self.slab.root and not self.quiet:
+            print(text, flush=True)
+
+    def run(self, stopped: Callable[[], bool]) -> bool:
+        """Run the cases that lack; whether all are there in the end."""
+        self.say(f"{len(self.jobs)} cases, {len(self.outcomes)} of them are there already")
+        self.say(HEAD)
+        for case, job in self.jobs.items():
+            if case not in self.outcomes:
+                found = self._one(case, job, stopped)
+                if found is None:
+                    return False
+                self.outcomes[case] = found
+                if self.slab.root:
+                    table.write(self.path, self.prints, self.outcomes)
+            one = self.outcomes[case]
+            self.say(f"  {case!s:80} {one.mu_max:13.6g} {one.area_corrected:9.5f} {one.cpu_seconds:8.2f}")
+        return True
+
+    def _one(self, case: Case, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
+        slab = self.slab.resized(*job.grid.points)
+        try:
+            if case.precision not in self.warm:
+                outcome.warm_up(job, slab)
+                self.warm.add(case.precision)
+            return outcome.run(job, slab, stopped)
+        except RunError as error:
+            raise RunError(f"{case}: {error}") from error
+
+    def conclude(self) -> None:
+        """Limits, errors, pictures and sentences."""
+        if not self.slab.root:
+            return
+        ordered = {case: self.outcomes[case] for case in self.jobs}
+        reference = verdict.references(self.refined, ordered)
+        errors = {case: verdict.errors(found, reference) for case, found in ordered.items()}
+        table.write(self.path, self.prints, ordered, errors)
+        lines = [str(found) for found in verdict.limits(self.refined, ordered)]
+        lines += verdict.sentences(ordered, reference, self.slab.comm.size)
+        self.path.with_suffix(".txt").write_text("\n".join(lines) + "\n")
+        pictures = study_plots.plot(self.path.parent, self._curves(ordered, errors), self._points(ordered, errors))
+        for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
+            self.say(line)
+
+    def _curves(self, outcomes: dict[Case, Outcome], errors: dict[Case, dict[str, float]]) -> list[study_plots.Curve]:
+        """How errors fall along each ladder."""
+        return [
+            study_plots.Curve(quantity, integrator, name, sizes, [errors[case][quantity] for case in cases])
+            for integrator in self.refined.integrators
+            for name, (sizes, cases) in verdict.sequences(self.refined, outcomes, integrator).items()
+            for quantity in verdict.NEEDED
+        ]
+
+    def _points(
+        self, outcomes: dict[Case, Outcome], errors: dict[Case, dict[str, float]]
+    ) -> dict[str, list[study_plots.Point]]:
+        """Error and cost of every case by quantity; those on the front with their settings."""
+        points = {}
+        for quantity in verdict.NEEDED:
+            error = {case: errors[case][quantity] for case in outcomes}
+            best = verdict.front(outcomes, error)
+            points[quantity] = [
+                study_plots.Point(
+                    found.transform_work, found.cpu_seconds, error[case], case.integrator, _short(case), case in best
+                )
+                for case, found in outcomes.items()
+            ]
+        return points
+
+
+def _short(case: Case) -> str:
+    """Its settings as they fit into a picture."""
+    return f"{case.mesh}, {case.cells_per_step:.3g} cells\n{case.tolerance:g} {case.precision}"
+
+
+def _fingerprint(job: Job) -> str:
+    """Of all that the outcome of a case depends on."""
+    lasting = job.model_copy(update={"study": None, "output": None, "checkpoint": None, "title": ""})
+    return hashlib.sha256(lasting.resolved().encode()).hexdigest()[:12]

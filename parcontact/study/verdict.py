@@ -1,0 +1,134 @@
+"""What a study finds: limits, errors of every case, which settings are worth their price, and sentences about it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .cases import Case, Ladders
+from .extrapolation import Limit, extrapolate
+from .outcome import QUANTITIES, Outcome
+
+TARGETS = (0.05, 0.03, 0.01, 0.003)
+NEEDED = ("mu_max", "mu_dyn", "area_corrected")  # what the sentences hold the settings to
+Outcomes = Mapping[Case, Outcome]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The limit of one quantity along one ladder of one integrator."""
+
+    quantity: str
+    integrator: str
+    ladder: str
+    limit: Limit
+
+    @property
+    def relative(self) -> float:
+        """The uncertainty over the limit."""
+        return self.limit.uncertainty / abs(self.limit.value) if self.limit.value else math.inf
+
+    def __str__(self) -> str:
+        order = "no order found" if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
+        name = f"{self.quantity} with {self.integrator}, {self.ladder}"
+        return f"{name}: {self.limit.value:.6g} +- {100 * self.relative:.2g} %, {order}"
+
+
+def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Case]]]:
+    """Cases that differ in one thing, from coarse to fine: mesh and time together, mesh alone, time alone; with the
+    sizes that belong to them."""
+    usual = [
+        case
+        for case in outcomes
+        if case.integrator == integrator and (case.tolerance, case.precision, case.kernel) == _rest(ladders.own)
+    ]
+    coarse, finest = ladders.cells[0], ladders.meshes[-1]
+    together = sorted((c for c in usual if math.isclose(c.cells_per_step, coarse)), key=lambda case: case.mesh)
+    step = coarse / finest
+    mesh = sorted((c for c in usual if math.isclose(c.time_step, step)), key=lambda case: case.mesh)
+    time = sorted((c for c in usual if c.mesh == finest), key=lambda case: -case.cells_per_step)
+    time = [case for case in time if any(math.isclose(case.cells_per_step, cells) for cells in ladders.cells)]
+    found = {
+        "mesh and time together": ([1.0 / c.mesh for c in together], together),
+        "mesh alone": ([1.0 / c.mesh for c in mesh], mesh),
+        "time alone": ([c.time_step for c in time], time),
+    }
+    return {name: pair for name, pair in found.items() if len(pair[1]) > 1}
+
+
+def _rest(case: Case) -> tuple[float, str, str]:
+    return case.tolerance, case.precision, case.kernel
+
+
+def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
+    """The limit of every quantity along every ladder."""
+    found = []
+    for integrator in ladders.integrators:
+        for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
+            for quantity in QUANTITIES:
+                values = [float(getattr(outcomes[case], quantity)) for case in cases]
+                found.append(Found(quantity, integrator, name, extrapolate(sizes, values)))
+    return found
+
+
+def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
+    """The best limit of each quantity: along mesh and time together where both are refined, the least uncertain one.
+
+    Without a ladder of mesh or of time it is the most expensive case, and nothing is known of its error.
+    """
+    whole = "mesh and time together" if len(ladders.meshes) > 1 else "time alone"
+    found = [one for one in limits(ladders, outcomes) if one.ladder == whole]
+    dearest = max(outcomes, key=lambda case: (case.effort, -case.tolerance, case.precision == "double"))
+    best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in QUANTITIES}
+    for quantity in QUANTITIES:
+        choices = [one for one in found if one.quantity == quantity and one.limit.value]
+        if choices:
+            best[quantity] = min(choices, key=lambda one: one.relative).limit
+    return best
+
+
+def errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]:
+    """Relative error of each quantity; NaN where the reference is 0, as the friction of a body that does not slide."""
+    return {
+        name: abs(getattr(outcome, name) / limit.value - 1.0) if limit.value else math.nan
+        for name, limit in reference.items()
+    }
+
+
+def worst(error: Mapping[str, float]) -> float:
+    """The largest of the errors that settings are held to; NaN if there is none."""
+    values = [error[name] for name in NEEDED if not math.isnan(error[name])]
+    return max(values, default=math.nan)
+
+
+def front(outcomes: Outcomes, error: Mapping[Case, float]) -> list[Case]:
+    """The cases than which none is both cheaper, in transforms, and more accurate; the cheapest first."""
+    best, chosen = math.inf, []
+    for case in sorted(outcomes, key=lambda case: (outcomes[case].transform_work, error[case])):
+        if error[case] < best:
+            best = error[case]
+            chosen.append(case)
+    return chosen
+
+
+def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
+    """For each target: the cheapest settings that reach it in all quantities, and how long they take."""
+    error = {case: worst(errors(outcome, reference)) for case, outcome in outcomes.items()}
+    best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
+    doubt = max((abs(one.uncertainty / one.value) for name, one in reference.items() if name in NEEDED and one.value))
+    lines = []
+    for target in TARGETS:
+        enough = [case for case in outcomes if error[case] <= target]
+        text = f"for {100 * target:g} %: "
+        if enough:
+            case = min(enough, key=lambda case: outcomes[case].transform_work)
+            text += f"{case}; {outcomes[case].cpu_seconds:.3g} s of CPU time on {_ranks(ranks)}"
+        else:
+            text += f"none of these settings; the best, {best}, are at {100 * error[best]:.2g} %"
+        if not doubt <= target:
+            text += f" (the reference itself is only known to {100 * doubt:.2g} %)"
+        lines.append(text)
+    return lines
+
+
+def _ranks(ranks: int) -> str:
+    return "1 rank" if ranks == 1 else f"{ranks} ranks"

@@ -1,0 +1,107 @@
+"""Which cases a study has, and what they change in a job."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from parcontact.errors import InputError
+from parcontact.job import Job, load
+from parcontact.study.cases import Case, Ladders, ladders, overrides
+
+TEXT = """
+grid: {points: [64, 32], size: [1.0e-3, 5.0e-4]}
+surface: {shape: rough, hurst: 0.9, long_wavelength: 5.0e-4, short_wavelength: 1.25e-4, rms_slope: 0.02, seed: 1}
+material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-5}]}
+history:
+  - {pressure: 1.0e5, duration: 1.0e-3, time_step: {first: 1.0e-6, growth: 1.2}}
+  - {pressure: 1.0e5, velocity: 1.0, duration: 1.0e-4, time_step: 1.0e-6}
+  - {pressure: 1.0e5, velocity: 1.0, distance: 1.25e-4, cells_per_step: 2}
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "job.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+def refined(path: Path, study: str) -> tuple[Job, Ladders]:
+    job = load(path, [f"study={study}"])
+    return job, ladders(job)
+
+
+def test_cases(path: Path) -> None:
+    """Meshes, steps and integrators combined; the mesh alone; the rest one at a time; each once, the cheapest first."""
+    _, found = refined(
+        path,
+        "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler], "
+        "tolerance: [1e-3, 1e-4], precision: [single, double], kernel: [love]}",
+    )
+    cases = found.cases()
+    assert len(cases) == len(set(cases)) == 3 * 2 * 2 + 2 * 1 + 3  # of the mesh alone, half a cell on 32 points is new
+    assert {case.mesh for case in cases} == {32, 64, 128}
+    alone = [case for case in cases if case.time_step == 2 / 128]
+    assert {(case.mesh, case.cells_per_step) for case in alone} == {(128, 2.0), (64, 1.0), (32, 0.5)}
+    assert [case.effort for case in cases] == sorted(case.effort for case in cases)
+    others = [case for case in cases if (case.tolerance, case.precision, case.kernel) != (1e-4, "double", "spectral")]
+    assert {(case.tolerance, case.precision, case.kernel) for case in others} == {
+        (1e-3, "double", "spectral"),
+        (1e-4, "single", "spectral"),
+        (1e-4, "double", "love"),
+    }
+    assert {(case.mesh, case.cells_per_step, case.integrator) for case in others} == {(64, 2.0, "exponential")}
+
+
+@pytest.mark.parametrize(
+    ("mesh", "cells", "factor"), [(64, 2.0, 1.0), (64, 1.0, 0.5), (128, 2.0, 0.5), (128, 4.0, 1.0)]
+)
+def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, factor: float) -> None:
+    """Twice as fine in time: each stage has twice the steps; growing ones are rounded up."""
+    job, found = refined(path, "{mesh: [64, 128]}")
+    case = Case(mesh, cells, "backward-euler", 1e-3, "single", "love")
+    changed = load(path, overrides(job, found.own, case))
+    assert changed.grid.points == (mesh, mesh // 2)
+    assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 1e-3)
+    assert (changed.numerics.precision, changed.numerics.kernel) == ("single", "love")
+    before, after = ([span.count for span in one.timeline().spans] for one in (job, changed))
+    assert after[1:] == [round(count / factor) for count in before[1:]]
+    assert abs(after[0] - before[0] / factor) <= 2
+    assert changed.timeline().end == pytest.approx(job.timeline().end, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ([], "no ladders"),
+        (["study={mesh: [48, 33]}"], "33 points along x are no whole number along y"),
+        (["study={mesh: [32, 64]}", "surface={shape: file, path: h.npy}"], "given on one mesh"),
+    ],
+)
+def test_refused(path: Path, changes: list[str], sentence: str) -> None:
+    np.save(path.with_name("h.npy"), np.zeros((32, 64)))
+    with pytest.raises(InputError, match=sentence):
+        ladders(load(path, changes))
+
+
+@pytest.mark.parametrize(
+    ("study", "sentence"),
+    [
+        ("{}", "study needs at least one ladder: mesh, cells_per_step"),
+        ("{mesh: [32, 32]}", "study.mesh.1 names 32 a second time"),
+        ("{mesh: [0]}", "study.mesh.0 must be a list of positive whole numbers"),
+        ("{tolerance: [2.0]}", "study.tolerance.0 must be a list of tolerances"),
+        ("{mesh: [32], cells: [1]}", "study.cells is not a known key"),
+    ],
+)
+def test_mistakes(path: Path, study: str, sentence: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load(path, [f"study={study}"])
+    assert sentence in str(caught.value)
+
+
+def test_defaults_of_a_study(path: Path) -> None:
+    """One ladder is enough; the rest is the job's own, with the cells per step of its first stage that has them."""
+    _, found = refined(path, "{mesh: 32}")
+    assert found.cases() == [Case(32, 2.0, "exponential", 1e-4, "double", "spectral")]

@@ -1,0 +1,134 @@
+"""Whole studies: of a wave in full contact, whose friction has a closed form, and as a user runs them."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import RunParcontact
+from mpi4py import MPI
+
+from parcontact.job import load
+from parcontact.parallel.slab import Slab
+from parcontact.study import outcome, verdict
+from parcontact.study.cases import Case, ladders, overrides
+from parcontact.study.extrapolation import Limit
+from parcontact.study.outcome import Outcome
+
+WAVE = """
+grid: {points: [32, 1], size: [2.5e-4, 2.5e-4]}
+surface: {shape: wave, amplitude: 5.0e-7, waves: [1, 0]}
+material: {model: zener, modulus_inf: 0.275e6, branches: [{modulus: 2.475e6, relaxation_time: 1.0e-3}]}
+initial: {state: steady, velocity: 0.004, pressure: 2.0e5}
+history: [{pressure: 2.0e5, velocity: 0.0397887, distance: 5.0e-4, cells_per_step: 1}]
+numerics: {tolerance: 1.0e-7}
+study: {mesh: [32, 64, 128], cells_per_step: [1, 0.5], integrator: [exponential, backward-euler]}
+output: {directory: out}
+"""
+EXACT = 9.770908e-4  # k^2 h0^2 G''(k v)/P0, full contact, steady at k v tau = 1
+FULL = 11.78e-4 / EXACT  # its maximum after the jump of velocity over that, from the closed form of the transient
+
+
+def outcomes(path: Path) -> dict[Case, Outcome]:
+    job = load(path)
+    found = {}
+    for case in ladders(job).cases():
+        changed = load(path, overrides(job, ladders(job).own, case))
+        found[case] = outcome.run(changed, Slab(MPI.COMM_SELF, *changed.grid.points), lambda: False)
+    assert None not in found.values()
+    return {case: one for case, one in found.items() if one is not None}
+
+
+def test_orders_and_limits_of_full_contact(tmp_path: Path) -> None:
+    """Exponential steps are of the second order, backward Euler of the first, to the same closed form.
+
+    Measured: the exponential steps' limit is right to 3e-6, that of backward Euler to 1.2e-3, which has 128 cells at
+    most to tell its orders apart.
+    """
+    path = tmp_path / "wave.yaml"
+    path.write_text(WAVE)
+    found = outcomes(path)
+    limits = {(one.quantity, one.integrator, one.ladder): one for one in verdict.limits(ladders(load(path)), found)}
+    for integrator, order in (("exponential", 2.0), ("backward-euler", 1.0)):
+        limit = limits["mu_max", integrator, "mesh and time together"].limit
+        print(f"{integrator}: mu_max {limit}")
+        assert limit.value == pytest.approx(FULL * EXACT, rel=1e-3)
+        limit = limits["mu_dyn", integrator, "mesh and time together"].limit
+        print(f"{integrator}: mu_dyn {limit}")
+        assert limit.order == pytest.approx(order, abs=0.1)
+        assert abs(limit.value - EXACT) < limit.uncertainty + 1e-6 * EXACT
+        assert limit.value == pytest.approx(EXACT, rel=2e-3)
+    reference = verdict.references(ladders(load(path)), found)
+    assert reference["mu_dyn"].value == pytest.approx(EXACT, rel=1e-5)
+    alone = [one for one in found if one.integrator == "exponential" and math.isclose(one.time_step, 1 / 128)]
+    errors = [verdict.errors(found[case], reference)["mu_dyn"] for case in sorted(alone, key=lambda case: case.mesh)]
+    assert np.ptp(errors) < 0.1 * max(errors)  # full contact is exact on every mesh: refining it alone is wasted
+
+
+def make(work: float, error: float) -> Outcome:
+    return Outcome(1.0 + error, 2.0 * (1.0 + error / 2), 0.5, 0.5, 10, 100, work, work / 10)
+
+
+def test_front_and_sentences() -> None:
+    """The cheapest settings that are accurate enough, and no others."""
+    results = [make(1.0, 0.1), make(2.0, 0.02), make(3.0, 0.04), make(4.0, 0.002)]
+    cases = {Case(2**k, 1.0, "exponential", 1e-4, "double", "spectral"): one for k, one in enumerate(results)}
+    first, second, _, last = cases
+    reference = {
+        "mu_max": Limit(1.0, 1.0, 0.004),
+        "mu_dyn": Limit(2.0, 1.0, 0.0),
+        "area": Limit(0.5, 1.0, 0.0),
+        "area_corrected": Limit(0.5, 1.0, 0.0),
+    }
+    error = {case: verdict.worst(verdict.errors(one, reference)) for case, one in cases.items()}
+    assert [round(value, 12) for value in error.values()] == [0.1, 0.02, 0.04, 0.002]
+    assert verdict.front(cases, error) == [first, second, last]
+    lines = verdict.sentences(cases, reference, 2)
+    assert lines[0] == f"for 5 %: {second}; 0.2 s of CPU time on 2 ranks"
+    assert lines[2] == f"for 1 %: {last}; 0.4 s of CPU time on 2 ranks"
+    assert lines[3].endswith("(the reference itself is only known to 0.4 %)")
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_goes_on_case_by_case(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """Stopped by the file `stop`, the same command goes on with what lacks, on another number of ranks too."""
+    job = tmp_path / "wave.yaml"
+    job.write_text(WAVE.replace("[32, 64, 128]", "[32, 64]").replace(", backward-euler", ""))
+    whole = run_parcontact(["study", job, "--out", "whole"])
+    assert whole.returncode == 0, whole.stderr
+    assert "for 5 %: mesh" in whole.stdout
+    table = rows(tmp_path / "whole" / "study.csv")
+    assert len(table) == 4
+    assert all(float(row["error_mu_dyn"]) < 0.1 for row in table)
+    for name in ("convergence.png", "work_precision.png", "study.txt"):
+        assert (tmp_path / "whole" / name).stat().st_size > 100
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "stop").touch()
+    stopped = run_parcontact(["study", job])
+    assert (stopped.returncode, "stopped after 0 of 4 cases" in stopped.stdout) == (3, True), stopped.stderr
+    kept = (tmp_path / "whole" / "study.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "out" / "study.csv").write_text("".join(kept[:3]))
+    again = run_parcontact(["study", job], ranks=2)
+    assert again.returncode == 0, again.stderr
+    assert "4 cases, 2 of them are there already" in again.stdout
+    for ours, theirs in zip(rows(tmp_path / "out" / "study.csv"), table, strict=True):
+        for name in ("mu_max", "mu_dyn", "area_corrected"):  # of one solve to 1e-7 each
+            assert float(ours[name]) == pytest.approx(float(theirs[name]), rel=1e-5)
+    changed = run_parcontact(["study", job, "--set", "material.modulus_inf=3e5"])
+    assert "4 cases, 0 of them are there already" in changed.stdout
+
+
+def test_a_case_that_cannot_be(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """All cases are read before the first is run; nothing is written."""
+    job = tmp_path / "wave.yaml"
+    job.write_text(WAVE.replace("waves: [1, 0]", "waves: [9, 0]").replace("[32, 64, 128]", "[16, 32]"))
+    found = run_parcontact(["study", job])
+    assert found.returncode == 2
+    assert "9" in found.stderr
+    assert "Traceback" not in found.stderr
+    assert not (tmp_path / "out").exists()
