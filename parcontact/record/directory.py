@@ -25,10 +25,12 @@ PATIENCE = 3.0  # seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
     "steady": ("steady.csv", "steady_waves.csv", "steady.h5"),
+    "study": ("study.csv", "study.txt", "convergence.png", "work_precision.png"),
 }
 COPIES = {  # of the job: as given, and with every default
     "run": ("job.yaml", "job.resolved.yaml"),
     "steady": ("steady.job.yaml", "steady.resolved.yaml"),
+    "study": ("study.job.yaml", "study.resolved.yaml"),
 }
 LOCK, STOP = ".lock", "stop"
 BESIDE = (STOP, "theory.csv")  # may be there before the first run

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from ..errors import RunError
 from ..job import Job
 from ..parallel.slab import Slab
-from ..record import study_plots
+from ..record import files, marker, study_plots
 from ..record.directory import Directory
 from ..run.watch import Signals
 from . import outcome, table, verdict
@@ -25,9 +25,11 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     """
     refined = ladders(job)
     jobs = {case: make(overrides(job, refined.own, case)) for case in refined.cases()}
-    directory = Directory(job.output.directory, slab)
+    directory = Directory(job.output.directory, slab, "study")
     with Signals().noted() as signals, directory.claimed():
-        directory.make(job.path, job.resolved())
+        plain = marker.plain_job(job) if slab.root else {}
+        directory.refuse_foreign(job.path, plain, False)
+        directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         study = _Study(refined, jobs, directory, slab, quiet)
         stop = directory.stop_file
         ended = study.run(lambda: signals.come or (slab.root and stop.exists()))
@@ -91,7 +93,7 @@ class _Study:
         table.write(self.path, self.prints, ordered, errors)
         lines = [str(found) for found in verdict.limits(self.refined, ordered)]
         lines += verdict.sentences(ordered, reference, self.slab.comm.size)
-        self.path.with_suffix(".txt").write_text("\n".join(lines) + "\n")
+        files.write(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
         pictures = study_plots.plot(self.path.parent, self._curves(ordered, errors), self._points(ordered, errors))
         for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
             self.say(line)

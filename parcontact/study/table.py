@@ -1,11 +1,12 @@
 """study.csv: one line per case, written when the case is done, with its errors once all are."""
 
 import csv
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..record import hdf5
+from ..record import files
 from . import cases, outcome
 from .cases import Case
 from .outcome import QUANTITIES, Outcome
@@ -37,14 +38,15 @@ def write(
     errors: Mapping[Case, Mapping[str, float]] | None = None,
 ) -> None:
     """Put all outcomes into the table, in the place of the old one."""
-    with hdf5.replaced(path) as part, part.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for case, result in outcomes.items():
-            settings = [getattr(case, name) for name in cases.NAMES]
-            results = [getattr(result, name) for name in outcome.NAMES]
-            missed = [errors[case][name] if errors else "" for name in QUANTITIES]
-            writer.writerow([wanted[case], *settings, *results, *missed])
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for case, result in outcomes.items():
+        settings = [getattr(case, name) for name in cases.NAMES]
+        results = [getattr(result, name) for name in outcome.NAMES]
+        missed = [errors[case][name] if errors else "" for name in QUANTITIES]
+        writer.writerow([wanted[case], *settings, *results, *missed])
+    files.write(path, text.getvalue())
 
 
 def _value(name: str, text: str) -> Any:
