@@ -252,4 +252,4 @@ def _energy(base: Frame, solver: ContactSolver, material: Elastic | Zener) -> El
         return ElasticEnergy(slab, unit)
     if decisions.energy_memory(base.job).on:
         return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)
-    return ZenerEnergy(slab, material, AppliedInverse(solver.preconditioner, lambda: solver.w), unit)
+    return ZenerEnergy(slab, material, AppliedInverse(solver.preconditioner, lambda: solver.lend()[0]), unit)

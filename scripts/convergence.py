@@ -14,7 +14,8 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import job, scene
-from parcontact.march import step as march
+from parcontact.march.loop import run as run_march
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.theory import hertz
 
@@ -25,8 +26,8 @@ NAMES = ("approach", "peak pressure", "pressure")
 def errors(points: int, path: Path = JOB) -> tuple[float, float, float]:
     """Relative errors of the approach, the peak pressure and the pressures on `points x points`."""
     sphere = job.load(path, [f"grid.points={points}", "numerics.tolerance=1e-8"])
-    run = march.March(scene.build(sphere, Slab(MPI.COMM_SELF, *sphere.grid.points)))
-    march.run(run, [])
+    run = March(scene.build(sphere, Slab(MPI.COMM_SELF, *sphere.grid.points)))
+    run_march(run, [])
     facts = (0.15, 1e-2, 2.75e6)  # force, radius, shear modulus
     x = sphere.grid.dx * np.arange(points) - sphere.grid.lx / 2
     exact = hertz.pressure(np.hypot(x[None, :], x[:, None]), *facts)

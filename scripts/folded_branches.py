@@ -47,13 +47,13 @@ def together(runs: list[March]) -> list[list[Row]]:
 
 def memory_pass(run: March) -> float:
     """The shortest time [s] of a pass through the memory of a run that is over."""
-    body, u = run.scene.material, run.scene.solver.u
+    body = run.scene.material
     assert isinstance(body, Zener)
+    u = body.u.copy()
     spent = []
     for _ in range(PASSES):
         began = time.perf_counter()
-        body.begin(1e-6, Heights(u))
-        body.commit(u, Heights(u))
+        body.commit(body.begin(1e-6, Heights(u)), u)
         spent.append(time.perf_counter() - began)
     return min(spent)
 

@@ -37,8 +37,7 @@ def solver(heights: Map, tolerance: float, max_iterations: int = 500) -> Contact
 
 def cold(solving: ContactSolver, heights: Map, mean: float) -> Contact:
     """A solve from nothing."""
-    solving.p.fill(0.0)
-    return solving.solve(heights, MeanPressure(mean))
+    return solving.solve(heights, MeanPressure(mean), np.zeros_like(heights))
 
 
 def rough(points: int, cells: int) -> Map:

@@ -20,7 +20,8 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
-from parcontact.march import step as march
+from parcontact.march.loop import run as run_march
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.convolution import Convolution
 from parcontact.solve import kernels
@@ -71,10 +72,10 @@ def main(points: int) -> None:
         path.write_text(JOB.format(points=points, short=1.6e-2 / points))
         job = jobs.load(path)
     for _ in range(2):
-        run = march.March(scene.build(job, Slab(MPI.COMM_SELF, points, points)))
+        run = March(scene.build(job, Slab(MPI.COMM_SELF, points, points)))
         seconds.clear()
         calls.clear()
-        march.run(run, [])
+        run_march(run, [])
     row = run.row
     seconds["rest of the operators"] = seconds.pop("operators") - seconds["FFTs"]
     calls["rest of the operators"] = calls.pop("operators")

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from parcontact import scene
 from parcontact.job import Job, load
-from parcontact.march.step import March, run
+from parcontact.march.loop import run
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
 from parcontact.steady_sliding import start as steadystart

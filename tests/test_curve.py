@@ -10,7 +10,8 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact import scene
 from parcontact.errors import InputError
-from parcontact.march import step as march
+from parcontact.march.loop import run as run_march
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.measures import read
 from parcontact.steady_sliding import start as steadystart
@@ -61,11 +62,11 @@ def frictions(shared_path: Path, comm: MPI.Intracomm) -> Callable[..., list[floa
         path = shared_path / f"job-{comm.rank}.yaml"
         path.write_text(text)
         job = jobs.load(path, overrides)
-        marching = march.March(scene.build(job, Slab(comm, *job.grid.points)))
+        marching = March(scene.build(job, Slab(comm, *job.grid.points)))
         if job.initial.state == "steady":
             steadystart.begin(marching)
         found: list[float] = []
-        march.run(marching, [lambda m: found.append(m.row.measures.friction)])
+        run_march(marching, [lambda m: found.append(m.row.measures.friction)])
         return found
 
     return run

@@ -19,7 +19,7 @@ from parcontact.effects.effect import Decision
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
-from parcontact.physics.body import Elastic, Material, Zener
+from parcontact.physics.body import Elastic, Zener
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
 from parcontact.record import fields, measures
@@ -80,9 +80,13 @@ def bare(planned: Job) -> Counter[str]:
     base = scene.frame(planned, slab)
     heights = base.surface.heights((0.0, 0.0), slab.empty())
     solver = bare_solver(base)
+    last, p = slab.zeros(), slab.zeros()
     ledger = Ledger(slab, base.surface, base.units)
     for stage in planned.history:
-        contact = solver.solve(heights, MeanPressure(stage.load.end / (base.prony.modulus_inf * base.units.pressure)))
+        load = MeanPressure(stage.load.end / (base.prony.modulus_inf * base.units.pressure))
+        p[...] = last
+        contact = solver.solve(heights, load, p)
+        last, p = p, last
         ledger.measures(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, (0.0, 0.0))
     return slab.tally.copy()
 
@@ -93,19 +97,22 @@ def lasting(planned: Job) -> Counter[str]:
     base = scene.frame(planned, slab)
     path = WholeCells(base.surface)
     memory = base.prony.moduli.size > 0
-    body: Material = Zener(slab, base.prony, "exponential") if memory else Elastic(slab, base.prony.modulus_inf)
+    body = Zener(slab, base.prony, "exponential") if memory else Elastic(slab, base.prony.modulus_inf)
     solver = bare_solver(base)
     ledger = Ledger(slab, base.surface, base.units)
-    earlier, moduli, cells = slab.zeros(), [0.0, 0.0], 0
+    earlier, last, p = (slab.zeros() for _ in range(3))
+    moduli, cells = [0.0, 0.0], 0
     for step in planned.timeline():
         heights = path.at(step.position)
-        alpha, effective = body.begin(step.dt, heights)
+        trial = body.begin(step.dt, heights)
+        alpha = trial.alpha
         now, before = (1.0 + step.growth) * moduli[1] / alpha, step.growth * moduli[0] / alpha
-        loops.travel(solver.p, earlier, now, before, heights.offset - cells)
+        loops.travel(last, earlier, now, before, heights.offset - cells, p)
         moduli, cells = [moduli[1], alpha], heights.offset
-        contact = solver.solve(effective, MeanPressure(step.load / (alpha * base.units.pressure)))
-        ledger.measures(contact.p, alpha, contact.u, effective, contact.d, step.position)
-        body.commit(contact.u, heights)
+        contact = solver.solve(trial.effective, MeanPressure(step.load / (alpha * base.units.pressure)), p)
+        ledger.measures(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
+        body.commit(trial, contact.u)
+        earlier, last, p = last, p, earlier
     return slab.tally.copy()
 
 
@@ -226,7 +233,7 @@ def test_isolated_contact() -> None:
 def test_extrapolated_starts() -> None:
     """Off: no earlier pressure is kept; the same solves otherwise."""
     single, lasts = job(history=[STAND, {"pressure": 4e3}]), job(history=[STAND, {**PRESS, "time_step": 1e-3}])
-    assert begun(single).p_old is None
+    assert begun(single).state.earlier is None
     assert extra(lasts, single) == {"map bytes": MAP}
     assert [row(planned, "extrapolated starts").on for planned in (single, lasts)] == [False, True]
 
@@ -258,9 +265,8 @@ def test_displacement_control() -> None:
     march.advance(next(iter(planned.timeline())))
     solver, slab = march.scene.solver, march.scene.slab
     spent = slab.tally["allreduce"]
-    solver.p.fill(0.0)
     heights = march.scene.path.at((0.0, 0.0)).base
-    solver.solve(heights, Approach(-5e-7 / march.scene.units.height))
+    solver.solve(heights, Approach(-5e-7 / march.scene.units.height), slab.zeros())
     of_solve = slab.tally["allreduce"] - spent
     of_measures = 2
     before = begun(planned).scene.slab.tally["allreduce"]

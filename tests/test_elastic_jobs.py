@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from parcontact import job, scene
 from parcontact.errors import RunError
-from parcontact.march import step as march
+from parcontact.march.loop import run as run_march
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
 from parcontact.theory import hertz, jgh, westergaard
@@ -41,15 +42,15 @@ Fields = dict[str, NDArray[Any]]
 def run(path: Path, *overrides: str) -> list[tuple[Row, Fields]]:
     """What each step of a job gave: its row and fields. The steps of these jobs are static solves."""
     loaded = job.load(path, overrides)
-    ready = march.March(scene.build(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points)))
+    ready = March(scene.build(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points)))
     steps = []
 
-    def note(state: march.March) -> None:
+    def note(state: March) -> None:
         if state.row.step > 0:
             fields = {name: state.field(name).copy() for name in ("pressure", "displacement", "gap")}
             steps.append((state.row, fields))
 
-    march.run(ready, [note])
+    run_march(ready, [note])
     return steps
 
 

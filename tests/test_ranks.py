@@ -14,7 +14,8 @@ import pytest
 from mpi4py import MPI
 
 from parcontact import job, scene
-from parcontact.march import step as march
+from parcontact.march.loop import run as run_march
+from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 
 if TYPE_CHECKING:
@@ -44,11 +45,11 @@ GRIDS = {
 FIELDS = ("pressure", "displacement", "gap", "height")
 
 
-def solved(path: Path, comm: MPI.Intracomm, *overrides: str) -> march.March:
+def solved(path: Path, comm: MPI.Intracomm, *overrides: str) -> March:
     """A march at the end of a job, on the ranks of `comm`."""
     loaded = job.load(path, overrides)
-    done = march.March(scene.build(loaded, Slab(comm, *loaded.grid.points)))
-    march.run(done, [])
+    done = March(scene.build(loaded, Slab(comm, *loaded.grid.points)))
+    run_march(done, [])
     return done
 
 

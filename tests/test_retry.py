@@ -15,7 +15,8 @@ from test_restart import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut
 
 from parcontact.errors import RunError
 from parcontact.march.failure import StepError
-from parcontact.march.step import March, run
+from parcontact.march.loop import run
+from parcontact.march.step import March
 from parcontact.physics.convolution import Convolution
 from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
@@ -36,8 +37,8 @@ def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     """Solves that fail up to twice: how often is a matter of the contact, and so is the same when repeated."""
     solve, refused = ContactSolver.solve, [0]
 
-    def refuse(solver: ContactSolver, h: Any, control: Any, length: float = 1.0) -> Contact:
-        contact = solve(solver, h, control, length)
+    def refuse(solver: ContactSolver, h: Any, control: Any, start: Any, length: float = 1.0) -> Contact:
+        contact = solve(solver, h, control, start, length)
         if solver.slab.nx < GRID["points"][0]:
             return contact
         if refused[0] < solver.slab.sum(float(np.count_nonzero(contact.p)))[0] % 3:
@@ -107,7 +108,7 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
     data = {"grid": {**GRID, "boundary": boundary}, "surface": ROUGH, "material": ELASTIC, "history": [PRESS]}
     built = begun(data | {"numerics": {"precision": precision}}).scene
     coarse = solver_on(built.frame, built.slab.resized(32, 32), 1e-3)
-    assert coarse.p.shape == (32, 32)
+    assert coarse.slab.shape == (32, 32)
     assert built.frame.fft.measured
     for operator in (coarse.operator, coarse.preconditioner):
         assert isinstance(operator, Convolution)
@@ -125,10 +126,8 @@ def remembered(march: March) -> dict[str, NDArray[Any]]:
 @pytest.mark.parametrize("material", [ELASTIC, ZENER])
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) -> None:
-    """But the pressure before the last; the step can be made again, and ends where it would have ended.
-
-    Both solve to a certificate of 1e-9.
-    """
+    """Not even in the pressure before the last: the step can be made again, and ends where it would have ended, to the
+    last bit."""
     slide = {"name": "slide", "pressure": 1e5, "velocity": [0.2, 0.1], "duration": 4e-4, "time_step": 1e-4}
     data = {
         "grid": {**GRID, "boundary": boundary},
@@ -152,9 +151,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
     with pytest.raises(StepError, match=r"step 8 at t = \S+ s \(stage 'slide'\): the contact solve did not converge"):
         run(march, [spoil])
     after = remembered(march)
-    earlier = before.pop(EARLIER), after.pop(EARLIER)
-    assert earlier[0].any()
-    assert not earlier[1].any()
+    assert before["contact/earlier pressure"].any()
     assert before.keys() == after.keys()
     assert all(np.array_equal(before[name], after[name]) for name in before)
     assert march.row.step == 7
@@ -163,15 +160,14 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
     march.scene.solver.max_iterations = 500
     job = march.scene.job
     run(march, [], islice(job.timeline(), 7, None))
-    limit = 1e-6 * smooth.row.measures.max_pressure
-    np.testing.assert_allclose(march.field("pressure"), smooth.field("pressure"), atol=limit)
-    assert march.row.dissipated == pytest.approx(smooth.row.dissipated, rel=1e-6)
+    for name in ("pressure", "displacement", "gap"):
+        assert np.array_equal(march.field(name), smooth.field(name))
+    assert march.row.dissipated == smooth.row.dissipated
 
 
 LIGHT = {**PRESS, "pressure": 2e4}
 HEAVY = {"name": "heavy", "pressure": 1e7}
 SINGLE = {"precision": "single", "tolerance": 1e-6}  # which rounding allows under the small load, not under the large
-EARLIER = "contact/earlier pressure"
 
 
 def failed(bench: Bench, history: list[dict[str, Any]], numerics: dict[str, Any]) -> tuple[dict[str, Any], Path, str]:
@@ -195,7 +191,7 @@ def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
     assert said.endswith(f"numerics.precision: mixed; the newest checkpoint is {last}")
     if bench.comm.rank == 0:
         found, clean = maps(last), maps(bench.where / "clean" / "checkpoint" / last.name)
-        assert {name for name in clean if found[name] != clean[name]} <= {EARLIER, f"checksums/{EARLIER}"}
+        assert found == clean
         assert rows(out) == rows(bench.where / "clean")
         counts, message = (out / "run.log").read_text().splitlines()[-2:]
         assert f", retry {1 + said.count(', with ')}," in f"{counts},"

@@ -32,7 +32,7 @@ SMALL = {
     "check_plan": Small(
         ["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED
     ),
-    "condensation": Small(["64"], r"(?m)^ +0\.001 +5 "),
+    "folded_branches": Small(["64"], r"(?m)^ +0\.001 +5 "),
     "convergence": Small(["32", "64"], r"order +-?[\d.]+ +2\.\d\d +1\.[5-9]"),
     "faults": Small(["--trials", "1", "--flips", "4", "--backs", "1", "--fills", "0"], r""),
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),

@@ -12,8 +12,9 @@ from marching import begun, column, marched
 from mpi4py import MPI
 from test_restart import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
 
+from parcontact.march.loop import run
 from parcontact.march.rest import remaining, steps_to_make
-from parcontact.march.step import March, run
+from parcontact.march.step import March
 from parcontact.physics.body import Zener
 from parcontact.record.row import Row
 
@@ -123,7 +124,7 @@ def test_what_remains_is_bounded(boundary: str, surface: Any, material: Any, con
         body = now.scene.material
         assert isinstance(body, Zener)
         if now.row.time > 1e-3:
-            scale = min(float(np.abs(body.u).max()), height) if now.p.any() else height
+            scale = min(float(np.abs(body.u).max()), height) if now.state.pressure.any() else height
             predicted.append(scale * remaining(now, body, 0.051 - now.row.time))
             seen.append(body.u.copy())
 
@@ -263,5 +264,5 @@ def begun_again(march: March) -> float:
     assert isinstance(other.scene.material, Zener)
     units = march.scene.units
     other.scene.material.restore({name: np.asarray(e.value) for name, e in march.scene.material.entries(units).items()})
-    other.p[...] = march.p
+    other.state.pressure[...] = march.state.pressure
     return remaining(other, other.scene.material, 1e-3)

@@ -14,17 +14,14 @@ Only stages whose time steps grow are ended so: who gives one time step asks for
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from ..job.timeline import Span, Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import Zener
-
-if TYPE_CHECKING:
-    from .step import March
+from .step import March
 
 
-def steps_to_make(march: "March", timeline: Timeline, until: float | None = None) -> Iterator[Step]:
+def steps_to_make(march: March, timeline: Timeline, until: float | None = None) -> Iterator[Step]:
     """The steps after the last one made, each decided on when it is asked for; collective.
 
     A step that stands for several does not pass one after which fields are due, nor the first that reaches `until` [s].
@@ -37,13 +34,13 @@ def steps_to_make(march: "March", timeline: Timeline, until: float | None = None
         yield span.leap(number, target) if _at_rest(march, span, number, target) else span.step(number)
 
 
-def _due(march: "March", number: int) -> list[int]:
+def _due(march: March, number: int) -> list[int]:
     """The next step after which fields are saved, if they are."""
     output = march.scene.job.output
     return [-(-number // output.every) * output.every] if output.fields else []
 
 
-def _at_rest(march: "March", span: Span, number: int, target: int) -> bool:
+def _at_rest(march: March, span: Span, number: int, target: int) -> bool:
     """Whether from a step on nothing changes until the end of its stage, and there is a step to spare; collective."""
     index = span.place(number)
     if target <= number or index < 1:
@@ -57,13 +54,13 @@ def _at_rest(march: "March", span: Span, number: int, target: int) -> bool:
     return march.scene.slab.agree(change <= march.scene.job.numerics.tolerance)
 
 
-def remaining(march: "March", material: Zener, seconds: float) -> float:
+def remaining(march: March, material: Zener, seconds: float) -> float:
     """By how much displacements at most change within some time, over the smaller of the largest displacement and the
     surface's height; over the latter where nothing is pressed; collective."""
     scene = march.scene
     material.settle()
     share, modulus = material.relaxing(seconds)
-    sizes = [_largest(field) for field in (*material.branches, material.u, march.p)]
+    sizes = [_largest(field) for field in (*material.branches, material.u, march.state.pressure)]
     *branches, u, p = scene.slab.reduce((), sizes)
     lacking, height = float(share @ branches), scene.solver.height
     if lacking == 0.0:

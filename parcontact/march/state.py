@@ -1,38 +1,86 @@
-"""A checkpoint of a run: the entries of its parts, each under the name of the part, and how a run goes on from them."""
+"""All that one step of a run hands to the next, and checkpoints of it: what goes into them, and how a run goes on."""
 
-from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..parallel.slab import Slab
-from ..physics.entries import Entry, Remembers
+from ..parallel.slab import Array
+from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from ..record.checkpoint import Contents, read
+from ..record.row import Row
 from ..scene import Scene
 
 
-def entries(parts: Mapping[str, Remembers], units: Units) -> dict[str, Entry]:
-    """What parts of a run remember, by names `part/name`; maps are the run's own, not copies."""
-    return {f"{part}/{name}": entry for part, owner in parts.items() for name, entry in owner.entries(units).items()}
+@dataclass(frozen=True)
+class State:
+    """A run after a step, but for what the parts of its scene remember themselves (`Scene.parts`).
+
+    `pressure` is a map of p with the pressure `alpha p`, `earlier` the one before it (no history of single solves keeps
+    one), `alpha` and `alpha_old` the moduli of the two steps; `approach` d of the body, all in the run's units.
+    `position` [m] is by how much the surface has moved.
+    """
+
+    row: Row
+    pressure: Array
+    earlier: Array | None
+    alpha: float = 0.0
+    alpha_old: float = 0.0
+    approach: float = 0.0
+    position: tuple[float, float] = (0.0, 0.0)
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """What a checkpoint has of it; step and time it says itself."""
+        strain = units.height / units.length
+        earlier = (
+            {} if self.earlier is None else {"contact/earlier pressure": Entry(self.earlier, strain, optional=True)}
+        )
+        return {
+            "clock/distance": Entry(self.row.distance, 1.0, "m"),
+            "clock/position": Entry(np.array(self.position), 1.0, "m"),
+            "contact/pressure": Entry(self.pressure, strain),
+            "contact/modulus": Entry(self.alpha, units.modulus, "Pa"),
+            "contact/earlier modulus": Entry(self.alpha_old, units.modulus, "Pa"),
+            "contact/approach": Entry(self.approach, units.height, "m"),
+            **earlier,
+        }
+
+    def restored(self, saved: Saved, row: Row) -> "State":
+        """The state that a checkpoint has, whose maps have been read into those of this one."""
+        if self.earlier is not None and "contact/earlier pressure" not in saved:
+            self.earlier.fill(0.0)
+        names = ("contact/modulus", "contact/earlier modulus", "contact/approach", "clock/distance")
+        alpha, alpha_old, approach, distance = (float(saved[name]) for name in names)
+        x, y = saved["clock/position"].tolist()
+        row = replace(row, distance=distance)
+        return State(row, self.pressure, self.earlier, alpha, alpha_old, approach, (x, y))
 
 
-def restore(parts: Mapping[str, Remembers], scene: Scene, contents: Contents, slab: Slab) -> None:
-    """Put the parts of a run into the state of a checkpoint; collective.
+def entries(scene: Scene, state: State) -> dict[str, Entry]:
+    """Everything that a run remembers, by names `part/name`; maps are the run's own, not copies."""
+    units = scene.units
+    parts = ((f"{part}/{name}", e) for part, owner in scene.parts.items() for name, e in owner.entries(units).items())
+    return {**state.entries(units), **dict(parts)}
 
-    Raises InputError if one remembers something that the checkpoint does not have.
+
+def restore(scene: Scene, state: State, contents: Contents) -> State:
+    """Put the parts of a scene into the state of a checkpoint; the run's own, in the maps of `state`, is returned.
+
+    Collective. Raises InputError for a checkpoint that lacks something, or is of another body.
     """
     _refuse_lost_branches(scene, contents)
-    declared = entries(parts, scene.units)
+    declared = entries(scene, state)
     wanted = {name: entry for name, entry in declared.items() if not entry.optional or name in contents.units}
     _compare(contents, wanted)
-    read(contents, slab, wanted)
+    read(contents, scene.slab, wanted)
     saved = {name: _value(name, entry, contents) for name, entry in wanted.items()}
-    for part, owner in parts.items():
+    for part, owner in scene.parts.items():
         head = f"{part}/"
         owner.restore({name.removeprefix(head): value for name, value in saved.items() if name.startswith(head)})
+    return state.restored(saved, Row(contents.step, contents.time))
 
 
 def _value(name: str, entry: Entry, contents: Contents) -> NDArray[Any]:

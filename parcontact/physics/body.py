@@ -17,9 +17,8 @@ Two kinds of branches have no map (`physics.folding` says which and what it cost
 `gain (u_new - u)` is all there is, its decay being 0 to the error allowed; a frozen one is the spring `h_k = G_k u`.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -57,12 +56,21 @@ def coefficients(prony: Prony, integrator: str, dt: float) -> tuple[Array, Array
     return np.exp(-z), prony.moduli * phi
 
 
-class Material(Protocol):
-    """The body between two instants; every call is local to this rank."""
+Advance = tuple[Array, Array]  # decay and gain of the branches that have a map
 
-    def begin(self, dt: float, heights: Heights) -> tuple[float, Array]: ...
 
-    def commit(self, displacement: Array, heights: Heights) -> None: ...
+@dataclass(frozen=True)
+class Trial:
+    """A step of a body that has begun: it ends when `commit` consumes it, and is nothing if it is dropped.
+
+    The contact problem of the step is that of an elastic body of modulus `alpha` under the `effective` heights, a map
+    that is valid until the next step begins; `advance` is what the branches will have done by the end of the step.
+    """
+
+    alpha: float
+    effective: Array
+    heights: Heights
+    advance: Advance | None = None
 
 
 class Elastic:
@@ -72,16 +80,16 @@ class Elastic:
         self.slab, self.modulus = slab, modulus
         self._moved: Array | None = None
 
-    def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
-        """Modulus and effective heights of a step: the heights themselves."""
+    def begin(self, dt: float, heights: Heights) -> Trial:
+        """A step under the heights themselves; local to this rank."""
         if heights.offset == 0:
-            return self.modulus, heights.base
+            return Trial(self.modulus, heights.base, heights)
         if self._moved is None:
             self._moved = self.slab.empty(heights.base.dtype)
         loops.roll(heights.base, heights.offset, self._moved)
-        return self.modulus, self._moved
+        return Trial(self.modulus, self._moved, heights)
 
-    def commit(self, displacement: Array, heights: Heights) -> None:
+    def commit(self, trial: Trial, displacement: Array) -> None:
         """Nothing to remember."""
 
     def entries(self, units: Units) -> dict[str, Entry]:
@@ -93,12 +101,12 @@ class Elastic:
 
 
 @dataclass(frozen=True)
-class _Plan:
-    """What a step dt is made of: its modulus, decay and gain of the kept branches, what they and u weigh in heights."""
+class _Coefficients:
+    """Of a step dt: its modulus, how the kept branches advance, what they and u weigh in the effective heights."""
 
     dt: float
     alpha: float
-    advance: tuple[Array, Array]
+    advance: Advance
     weights: tuple[Array, float]
 
 
@@ -108,8 +116,8 @@ class Zener:
     Branches are known by their number in `prony`. Those of `kept` have a map each, in that order in `branches`; the
     `memoryless` and `frozen` ones have none.
 
-    The maps are advanced when the next step begins, in the same pass that forms its effective heights: until then the
-    increment of the displacement waits in the buffer of the effective heights.
+    The advance of a committed step is pending until the next step begins: then one pass over the maps makes it and
+    forms the effective heights. Meanwhile the increment of the displacement waits in the map of those heights.
     """
 
     def __init__(
@@ -130,10 +138,9 @@ class Zener:
         self.branches.fill(0.0)
         self.u = slab.zeros(dtype)
         self._work = slab.zeros(dtype)
-        self._still: tuple[Array, Array] = np.ones(len(self.kept)), np.zeros(len(self.kept))
-        self._step: tuple[Array, Array] = self._still
-        self._pending: tuple[Array, Array] = self._still
-        self._plan: _Plan | None = None
+        self._still: Advance = np.ones(len(self.kept)), np.zeros(len(self.kept))
+        self._pending: Advance = self._still
+        self._coefficients: _Coefficients | None = None
 
     def elapsed(self, dt: float) -> Array:
         """`z = dt/tau` of each branch."""
@@ -143,27 +150,37 @@ class Zener:
         """`decay` and `gain` of each branch over a step dt."""
         return coefficients(self.prony, self.integrator, dt)
 
-    def begin(self, dt: float, heights: Heights) -> tuple[float, Array]:
-        """Modulus alpha and effective heights `h + r/alpha` of a step; may be called again for another dt."""
-        if self._plan is None or self._plan.dt != dt:
-            self._plan = self._planned(dt)
-        alpha, weights = self._plan.alpha, self._plan.weights
-        self._step = self._plan.advance
-        loops.begin(self.branches, *self._pending, self._work, *weights, self.u, *heights.parts)
+    def begin(self, dt: float, heights: Heights) -> Trial:
+        """A step of modulus alpha under the effective heights `h + r/alpha`, in place of one that has begun and is not
+        committed; local to this rank."""
+        if self._coefficients is None or self._coefficients.dt != dt:
+            self._coefficients = self._coefficients_of(dt)
+        step = self._coefficients
+        loops.begin(self.branches, *self._pending, self._work, *step.weights, self.u, *heights.parts)
         self._pending = self._still
-        return alpha, self._work
+        return Trial(step.alpha, self._work, heights, step.advance)
 
-    def _planned(self, dt: float) -> "_Plan":
+    def _coefficients_of(self, dt: float) -> _Coefficients:
         decay, gain = self.coefficients(dt)
         total = float(gain[self._moving].sum())
         alpha = self._spring + total
         decay, gain = decay[self.kept], gain[self.kept]
-        return _Plan(dt, alpha, (decay, gain), (decay / alpha, total / alpha))
+        return _Coefficients(dt, alpha, (decay, gain), (decay / alpha, total / alpha))
 
-    def commit(self, displacement: Array, heights: Heights) -> None:
-        """End the step: `displacement` is `A p/alpha`, which under the effective heights stands for u."""
-        loops.commit(displacement, self._work, self.u, *heights.parts)
-        self._pending = self._step
+    def commit(self, trial: Trial, displacement: Array) -> None:
+        """End the step: `displacement` is `A p/alpha`, which under the effective heights stands for u; local to this
+        rank."""
+        assert trial.advance is not None
+        loops.commit(displacement, trial.effective, self.u, *trial.heights.parts)
+        self._pending = trial.advance
+
+    def begin_with(self, u: Array, branches: Iterable[Array]) -> None:
+        """Begin with a displacement and the map of each branch of `prony`, in order."""
+        self.u[...] = u
+        for k, branch in enumerate(branches):
+            if k in self.kept:
+                self.branches[self.kept.index(k)] = branch
+        self._pending = self._still
 
     @property
     def increment(self) -> Array:

@@ -82,7 +82,7 @@ class ElasticEnergy:
         self.slab, self.unit = slab, unit
         self.balance = Balance()
 
-    def advance(self, dt: float, now: Pressed, before: Pressed | None, u: Array) -> None:
+    def advance(self, dt: float, now: Pressed, before: Pressed, u: Array) -> None:
         """After a solve for a pressure and the displacement u; one reduction; collective."""
         self.balance.work = self.balance.stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
 
@@ -121,8 +121,7 @@ class ElasticPressure:
 
     def advance(self, dt: float, p: Array, du: Array) -> Array:
         """What v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`; local to this rank."""
-        self.body.begin(dt, Heights(self.body.u))
-        self.body.commit(p, Heights(self.body.u))
+        self.body.commit(self.body.begin(dt, Heights(self.body.u)), p)
         return self.body.increment
 
     def entries(self, units: Units) -> dict[str, Entry]:
@@ -145,13 +144,13 @@ class ZenerEnergy:
         self.balance = Balance(dissipated=np.zeros(count))
         self._spring, self._branches = 0.0, np.zeros(count)  # <u, A^-1 u> and <h_k, A^-1 h_k>
 
-    def advance(self, dt: float, now: Pressed, before: Pressed | None, u: Array) -> None:
-        """After a step to the pressure `now` from `before` (None: as in a jump); one reduction; collective."""
+    def advance(self, dt: float, now: Pressed, before: Pressed, u: Array) -> None:
+        """After a step to the pressure `now` from `before`; one reduction; collective."""
         material, balance = self.material, self.balance
         moduli, du = material.prony.moduli, material.increment
         w = self.inverse.advance(dt, now.p, du)
         sums = [loops.dot(branch, w) for branch in material.branches]
-        work = loops.work(*now, *(before or now), du)
+        work = loops.work(*now, *before, du)
         *products, own, total, work = self.slab.sum(*sums, loops.dot(du, w), loops.dot(material.u, w), work)
         crossed, past = np.array(products), self._branches
         decay, gain = material.coefficients(dt)

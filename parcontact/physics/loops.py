@@ -113,11 +113,11 @@ def work(p, alpha, p_old, alpha_old, du):
 
 
 @loop
-def travel(p, p_old, factor, factor_old, shift):
-    """Extrapolate a pressure that moves with the surface: `p <- max(S (factor p - factor_old S p_old), 0)`.
+def travel(p, p_old, factor, factor_old, shift, out):
+    """Extrapolate a pressure that moves with the surface: `out = max(S (factor p - factor_old S p_old), 0)`.
 
-    The former p goes into `p_old`. S moves by `shift` cells along x (cyclic). Whole cells keep the contact sharp:
-    interpolated between cells it would spread, which costs a solver more than being off by half a cell.
+    S moves by `shift` cells along x (cyclic); `out` may be `p_old`. Whole cells keep the contact sharp: interpolated
+    between cells it would spread, which costs a solver more than being off by half a cell.
     """
     ny, nx = p.shape
     start = shift % nx
@@ -126,10 +126,9 @@ def travel(p, p_old, factor, factor_old, shift):
         moved[start:] = p_old[j, : nx - start]
         moved[:start] = p_old[j, nx - start :]
         for i in range(nx):
-            p_old[j, i] = p[j, i]
             moved[i] = max(factor * p[j, i] - factor_old * moved[i], 0.0)
-        p[j, start:] = moved[: nx - start]
-        p[j, :start] = moved[nx - start :]
+        out[j, start:] = moved[: nx - start]
+        out[j, :start] = moved[nx - start :]
 
 
 @loop

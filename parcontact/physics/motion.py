@@ -8,6 +8,13 @@ from numpy.typing import DTypeLike
 from .body import Heights
 from .surface import Surface
 
+Vector = tuple[float, float]
+
+
+def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
+    """By how many cells, along x and y, the surface moves from one displacement [m] to another."""
+    return (new[0] - old[0]) / cell[0], (new[1] - old[1]) / cell[1]
+
 
 class Path(Protocol):
     """Heights of the surface at a displacement; collective."""

@@ -35,10 +35,10 @@ def per_call(alone: Slab) -> float:
     solver = ContactSolver(slab, half_space.operator(fft), half_space.inverse(fft), 1.0, 1e-15, 30)
     heights = slab.empty()
     heights[...] = np.random.default_rng(0).random(slab.shape)
-    best = np.inf
+    best, pressure = np.inf, slab.zeros()
     for _ in range(3):
         calls, began = slab.tally["operator"], time.perf_counter()
-        solver.solve(heights, MeanPressure(0.1))
+        solver.solve(heights, MeanPressure(0.1), pressure)
         best = min(best, (time.perf_counter() - began) / (slab.tally["operator"] - calls))
     return float(best)
 

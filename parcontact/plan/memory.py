@@ -15,7 +15,7 @@ from ..parallel.fft import footprint, transform_name
 from ..parallel.slab import deal
 from ..physics.convolution import padded_lengths
 
-SOLVER = 6  # maps of a contact solver, besides one of a byte per point
+SOLVER = 6  # maps: four of a contact solver, besides one of a byte per point, the last pressure and the next one
 ZENER = 2  # maps of a body with memory, besides one per branch
 
 

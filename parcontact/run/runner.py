@@ -9,7 +9,7 @@ from ..effects import decisions
 from ..errors import InputError, RunError
 from ..job import Job, Rough
 from ..job.timeline import Timeline, reached
-from ..march import step as march
+from ..march import loop
 from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
@@ -162,7 +162,7 @@ class _Journey:
         if origin:
             self.console.say(f"goes on after step {self.first} from {origin.contents.path}")
             self.recorder.catch_up(self.march.row, self.march.field)
-        ended = march.done(self.march, [self.decide] if origin else [self.record, self.decide])
+        ended = loop.run_tasks(self.march, [self.decide] if origin else [self.record, self.decide])
         if not ended:
             self._march()
         if self.saved != self.march.row.step:
@@ -172,7 +172,7 @@ class _Journey:
     def _march(self) -> None:
         steps = steps_to_make(self.march, self.timeline, self.until)
         try:
-            march.run(self.march, [self.record, self.decide], steps)
+            loop.run(self.march, [self.record, self.decide], steps)
         except StepError as error:
             text = f"{error}{self._left()}"
             self._log_counts()

@@ -76,19 +76,17 @@ class Certificate:
 
 @dataclass(frozen=True)
 class Contact:
-    """A solved (or given up) contact: maps `p` and `u = A p` are the solver's own, valid until its next solve.
+    """A solved (or given up) contact, maps of shape (rows of this rank, nx).
 
-    `failure` is empty, or says what the solve did instead of reaching the tolerance; `shortened` counts the iterations
-    in which the step was halved.
+    `p` is the map that was given as the start, the caller's own; `u = A p` is the solver's, valid until its next solve.
+    `failure` is empty, or says what the solve did instead of reaching the tolerance.
     """
 
     p: Array
     u: Array
     d: float
-    load: float
     certificate: Certificate
     iterations: int
-    shortened: int
     failure: str
 
     @property
@@ -116,8 +114,28 @@ class Balance:
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load)
 
 
+def certify(
+    slab: Slab, p: Array, u: Array, h: Array, balance: Balance, mean: float | None, height: float, working: Array
+) -> tuple[float, float, Certificate]:
+    """Mark the working set of a pressure and its image u; its size, its sum of gaps, and the certificate; collective.
+
+    `mean` is the mean pressure asked for, None with a given approach; `height` what gaps are compared with.
+    """
+    *sums, deepest = kernels.certify(p, u, h, balance.d, working)
+    wrong, members, excess, deepest = slab.reduce(sums, [deepest])
+    complementarity = wrong / (balance.load or 1.0) / height
+    load = 0.0 if mean is None else abs(balance.load / slab.points / mean - 1.0)
+    return members, excess, Certificate(complementarity, max(deepest / height, 0.0), load)
+
+
+def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Balance:
+    """A pressure and its image u in numbers, for an approach d; collective."""
+    load, work, gaps = slab.sum(*kernels.weigh(p, u, h, d))
+    return Balance(d, load, gaps, 0.5 * work)
+
+
 class ContactSolver:
-    """Buffers and loop for contacts on one grid.
+    """Loop for contacts on one grid, and the maps that it works in: four, and a byte per point.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
     lowest to its highest point, in the unit of h: what gaps are compared with; `tolerance` on the certificate;
@@ -136,79 +154,80 @@ class ContactSolver:
     ) -> None:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
-        self.round_off = ROUND_OFF * float(np.finfo(dtype).eps)
-        self.least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
-        self.p, self.u, self.w, self.t, self.r, self.spare = (slab.zeros(dtype) for _ in range(6))
-        self.working = slab.zeros(np.bool_)
+        self.dtype = dtype
+        self._rounding = ROUND_OFF * float(np.finfo(dtype).eps)
+        self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
+        self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
+        self._working = slab.zeros(np.bool_)
 
-    def solve(self, h: Array, control: MeanPressure | Approach, length: float = 1.0) -> Contact:
-        """Solve for heights `h`, starting from the pressure in `self.p` (no value of it negative); collective.
+    def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
+        """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution
+        will be; collective.
 
         Under load control the start is scaled to the load, or uniform where it is zero everywhere. `length` is that of
         a step over the exact one. A solve that does not reach the tolerance says why in `failure`; its maps are then
         the last iterate, not a solution.
         """
         mean = control.value if isinstance(control, MeanPressure) else None
-        if mean is not None and 0.0 <= mean < self.least:
-            return self._separated(h)
+        if mean is not None and 0.0 <= mean < self._least:
+            return self._separate(h, start)
         centred = mean is not None
-        self._begin(mean)
-        balance = self._weigh(h, 0.0).settled() if centred else self._weigh(h, control.value)
-        best, old_product, shortened, iteration = (np.inf, 0), 0.0, 0, 0
+        p, other = start, self._other
+        balance = self._begin(p, h, control)
+        best, old_product, iteration = (np.inf, 0), 0.0, 0
         while True:
-            members, excess, certificate = self._certify(h, balance, mean)
+            members, excess, certificate = self._certify(p, h, balance, mean)
             best = min(best, (certificate.worst, iteration))
             failure = self._verdict(certificate.worst, iteration, *best)
             if failure is not None:
-                load = balance.load / self.slab.points
-                return Contact(self.p, self.u, balance.d, load, certificate, iteration, shortened, failure)
-            self.r, self.spare = self.spare, self.r
-            kernels.residual(self.working, self.u, h, balance.d + (excess / members if centred else 0.0), self.r)
-            slope, old_product = self._turn(old_product, members, centred)
-            balance, halvings = self._descend(h, balance, length * slope, mean)
+                if p is not start:
+                    start[...] = p
+                return Contact(start, self._u, balance.d, certificate, iteration, failure)
+            level = balance.d + (excess / members if centred else 0.0)
+            slope, old_product = self._turn(h, level, old_product, members, centred, other)
+            balance, halvings = self._descend(p, h, balance, length * slope, mean, other)
+            p, other = other, p
+            kernels.residual(self._working, self._w, h, level, self._w)
             iteration += 1
             if halvings:
-                shortened += 1
                 old_product = 0.0
 
-    def judge(self, h: Array, control: MeanPressure | Approach, otherwise: str) -> Contact:
-        """The pressure in `self.p`, scaled to the load, as it is; `otherwise` is its failure unless it is a solution.
-
-        Also marks its working set: the contact and what penetrates. Collective.
-        """
+    def judge(self, h: Array, control: MeanPressure | Approach, p: Array, otherwise: str) -> Contact:
+        """The pressure p, scaled to the load, as it is; `otherwise` is its failure unless it solves; collective."""
         mean = control.value if isinstance(control, MeanPressure) else None
-        self._begin(mean)
-        balance = self._weigh(h, control.value) if mean is None else self._weigh(h, 0.0).settled()
-        *_, certificate = self._certify(h, balance, mean)
+        balance = self._begin(p, h, control)
+        *_, certificate = self._certify(p, h, balance, mean)
         failure = "" if certificate.worst <= self.tolerance else otherwise
-        return Contact(self.p, self.u, balance.d, balance.load / self.slab.points, certificate, 0, 0, failure)
+        return Contact(p, self._u, balance.d, certificate, 0, failure)
+
+    def displace(self, p: Array) -> Array:
+        """`A p`, in a map that is valid until the next solve; collective."""
+        return self.operator.apply(p, self._u)
+
+    def lend(self) -> tuple[Array, Array, Array]:
+        """Three maps for work between solves: the next solve does not keep what is in them."""
+        return self._w, self._t, self._other
 
     # -- the steps of a solve; `mean` is the mean pressure asked for, None with a given approach -----------------------
 
-    def _begin(self, mean: float | None) -> None:
-        """Make the start admissible and forget the last solve's direction."""
-        self.t.fill(0.0)
-        self.r.fill(0.0)
-        if mean is not None:
-            load = self.slab.sum(kernels.total(self.p))[0]
+    def _begin(self, p: Array, h: Array, control: MeanPressure | Approach) -> Balance:
+        """Make the start admissible and forget the last solve's direction and residual."""
+        self._t.fill(0.0)
+        self._w.fill(0.0)
+        if isinstance(control, MeanPressure):
+            load = self.slab.sum(kernels.total(p))[0]
             if load > 0.0:
-                kernels.scale(self.p, mean * self.slab.points / load)
+                kernels.scale(p, control.value * self.slab.points / load)
             else:
-                self.p.fill(mean)
-        self.operator.apply(self.p, self.u)
+                p.fill(control.value)
+        self.operator.apply(p, self._u)
+        if isinstance(control, Approach):
+            return weigh(self.slab, p, self._u, h, control.value)
+        return weigh(self.slab, p, self._u, h, 0.0).settled()
 
-    def _weigh(self, h: Array, d: float) -> Balance:
-        load, work, gaps = self.slab.sum(*kernels.weigh(self.p, self.u, h, d))
-        return Balance(d, load, gaps, 0.5 * work)
-
-    def _certify(self, h: Array, balance: Balance, mean: float | None) -> tuple[float, float, Certificate]:
-        """Mark the working set; returns its size, its sum of gaps, and the certificate."""
-        *sums, deepest = kernels.certify(self.p, self.u, h, balance.d, self.working)
-        wrong, members, excess, deepest = self.slab.reduce(sums, [deepest])
-        complementarity = wrong / (balance.load or 1.0) / self.height
-        penetration = max(deepest / self.height, 0.0)
-        load = 0.0 if mean is None else abs(balance.load / self.slab.points / mean - 1.0)
-        return members, excess, Certificate(complementarity, penetration, load)
+    def _certify(self, p: Array, h: Array, balance: Balance, mean: float | None) -> tuple[float, float, Certificate]:
+        """Mark the working set; its size, its sum of gaps, and the certificate."""
+        return certify(self.slab, p, self._u, h, balance, mean, self.height, self._working)
 
     def _verdict(self, worst: float, iteration: int, best: float, best_at: int) -> str | None:
         """None: go on; empty: solved; else what happened instead."""
@@ -223,39 +242,47 @@ class ContactSolver:
             return f"did not converge in max_iterations = {iteration}: the certificate is {asked}"
         return None
 
-    def _turn(self, old_product: float, members: float, centred: bool) -> tuple[float, float]:
-        """Put the new search direction into `self.t`; returns `<r, t>` and `<r, z>`."""
-        z = self.preconditioner.apply(self.r, self.w)
-        sums = kernels.products(self.working, self.r, self.spare, z, self.t)
+    def _turn(
+        self, h: Array, level: float, old_product: float, members: float, centred: bool, z: Array
+    ) -> tuple[float, float]:
+        """Put the new search direction into `_t`; returns `<r, t>` and `<r, z>`.
+
+        The residual is `u - h - level` on the working set; the one before is in `_w`. The map z is free to be used.
+        """
+        kernels.residual(self._working, self._u, h, level, z)
+        self.preconditioner.apply(z, z)
+        sums = kernels.products(self._working, self._u, h, level, self._w, z, self._t)
         sum_z, sum_t, sum_old, r_z, old_z, r_t = self.slab.sum(*sums)
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)
         beta = max(0.0, (r_z - old_z + mean_z * sum_old) / old_product) if old_product > 0.0 else 0.0
         if r_z + beta * r_t <= 0.0:
             beta = 0.0
-        kernels.turn(self.working, z, beta, mean_z + beta * mean_t, self.t)
+        kernels.turn(self._working, z, beta, mean_z + beta * mean_t, self._t)
         return r_z + beta * r_t, r_z
 
-    def _descend(self, h: Array, old: Balance, slope: float, mean: float | None) -> tuple[Balance, int]:
-        """Step against `self.t`; returns the new balance and how often the step was halved."""
-        curvature = self.slab.sum(kernels.dot(self.t, self.operator.apply(self.t, self.w)))[0]
+    def _descend(
+        self, old_p: Array, h: Array, old: Balance, slope: float, mean: float | None, p: Array
+    ) -> tuple[Balance, int]:
+        """Step from `old_p` against `_t` to p, which leaves the old displacement in `_w`; returns the new balance and
+        how often the step was halved."""
+        curvature = self.slab.sum(kernels.dot(self._t, self.operator.apply(self._t, self._w)))[0]
         step = slope / curvature if curvature > 0.0 else 0.0
-        self.p, self.spare = self.spare, self.p
         for halvings in range(HALVINGS + 1):
-            load, cut = self.slab.sum(*kernels.advance(self.spare, self.t, step, self.p))
+            load, cut = self.slab.sum(*kernels.advance(old_p, self._t, step, p))
             if cut and mean is not None:
-                kernels.scale(self.p, mean * self.slab.points / load)
-            self.u, self.w = self.operator.apply(self.p, self.w), self.u
-            new = self._weigh(h, old.d)
-            if new.f - old.f <= self.round_off * new.energy or halvings == HALVINGS:
+                kernels.scale(p, mean * self.slab.points / load)
+            self._u, self._w = self.operator.apply(p, self._w), self._u
+            new = weigh(self.slab, p, self._u, h, old.d)
+            if new.f - old.f <= self._rounding * new.energy or halvings == HALVINGS:
                 break
-            self.u, self.w = self.w, self.u
+            self._u, self._w = self._w, self._u
             step *= 0.5
         return new if mean is None else new.settled(), halvings
 
-    def _separated(self, h: Array) -> Contact:
+    def _separate(self, h: Array, p: Array) -> Contact:
         """No load: no pressure, the surface just touches the body."""
-        self.p.fill(0.0)
-        self.u.fill(0.0)
+        p.fill(0.0)
+        self._u.fill(0.0)
         highest = self.slab.reduce((), [float(h.max(initial=-np.inf))])[0]
         failure = "" if np.isfinite(highest) else NOT_FINITE
-        return Contact(self.p, self.u, -highest, 0.0, Certificate(0.0, 0.0, 0.0), 0, 0, failure)
+        return Contact(p, self._u, -highest, Certificate(0.0, 0.0, 0.0), 0, failure)

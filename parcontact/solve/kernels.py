@@ -60,20 +60,21 @@ def residual(working, u, h, d, r):
 
 
 @loop
-def products(working, r, r_old, z, t):
-    """Over the working set: sums of z, t, r_old, r z, r_old z and r t."""
+def products(working, u, h, d, r_old, z, t):
+    """Over the working set, with `r = u - h - d` in the precision of maps: sums of z, t, r_old, r z, r_old z, r t."""
     sum_z, sum_t, sum_old, r_z, old_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(r.shape[0]):
+    for j in range(z.shape[0]):
         row_z, row_t, row_old, row_r_z, row_old_z, row_r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(r.shape[1]):
+        for i in range(z.shape[1]):
             weight = 1.0 if working[j, i] else 0.0
+            r = z.dtype.type(u[j, i] - h[j, i] - d)
             z_here, t_here, old_here = weight * z[j, i], weight * t[j, i], weight * r_old[j, i]
             row_z += z_here
             row_t += t_here
             row_old += old_here
-            row_r_z += r[j, i] * z_here
+            row_r_z += r * z_here
             row_old_z += old_here * z_here
-            row_r_t += r[j, i] * t_here
+            row_r_t += r * t_here
         sum_z += row_z
         sum_t += row_t
         sum_old += row_old
@@ -130,6 +131,20 @@ def advance(p_old, t, step, p):
         load += row_load
         cut += row_cut
     return load, cut
+
+
+@loop
+def clip(p):
+    """`p <- max(p, 0)`; returns its sum."""
+    load = 0.0
+    for j in range(p.shape[0]):
+        row = 0.0
+        for i in range(p.shape[1]):
+            kept = 0.0 if p[j, i] < 0.0 else p[j, i]
+            p[j, i] = kept
+            row += kept
+        load += row
+    return load
 
 
 @loop

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
+from . import kernels
 from .contact import Operator
 from .gcr import gaps_on, residual, spread, sum_on
 from .surround import Surround
@@ -41,8 +42,8 @@ class Projected:
         for field in (*self.t, *self.w):
             field.fill(0.0)
 
-    def step(self, x: Array, u: Array, h: Array, working: Set) -> None:
-        """Move x, which is then admissible but for its load; its image u is left as it was. Collective."""
+    def step(self, x: Array, u: Array, h: Array, working: Set, load: float) -> None:
+        """Move x, which is then admissible and has the sum `load`, and its image u with it; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         residual(working, u, h, total / members, self.r)
         self.surround.apply(working, self.r, self.z)
@@ -53,9 +54,12 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
+        kernels.scale(x, load / self.slab.sum(kernels.total(x))[0])
+        self.operator.apply(x, u)
+        self._keep_change(x, u)
 
-    def keep(self, x: Array, u: Array) -> None:
-        """Remember the change that the last step has come to, now that u is the image of x."""
+    def _keep_change(self, x: Array, u: Array) -> None:
+        """Of x and its image, whose old values are in the last maps of t and w."""
         for kept, new in ((self.t, x), (self.w, u)):
             np.subtract(new, kept[2], out=kept[2])
             kept[1], kept[2] = kept[2], kept[1]

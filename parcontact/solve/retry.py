@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..parallel import regrid
 from ..parallel.slab import Array, Slab
-from . import active_set
+from . import active_set, nested
 from .contact import Approach, Contact, ContactSolver, MeanPressure
 
 SHORT = 0.5  # length of a safeguarded step over the exact one
@@ -43,34 +42,23 @@ def again(
 def _attempts(
     solver: ContactSolver, h: Array, control: Control, failed: Contact, solver_on: SolverOn
 ) -> Iterator[tuple[str, Contact]]:
-    """One attempt after the other, each made when it is asked for."""
+    """One attempt after the other, each made when it is asked for, all in the map of the failed one."""
+    p = failed.p
     if np.isfinite(failed.certificate.worst):
-        yield "shorter steps", solver.solve(h, control, SHORT)
-    name = _nest(solver, h, control, solver_on)
-    contact = solver.solve(h, control)
+        yield "shorter steps", solver.solve(h, control, p, SHORT)
+    name = _start_on_coarse_grids(solver, h, control, p, solver_on)
+    contact = solver.solve(h, control, p)
     yield name, contact
     if np.isfinite(contact.certificate.worst):
-        yield "sets of points", active_set.solve(solver, h, control)
+        yield "sets of points", active_set.solve(solver, h, control, p)
 
 
-def _nest(solver: ContactSolver, h: Array, control: Control, solver_on: SolverOn) -> str:
-    """Solve loosely on coarser grids, the coarsest first, and start from there; from nothing if there is none."""
-    grids = [(solver.slab, h)]
-    while (coarse := regrid.coarser(grids[-1][0])) is not None:
-        fine, heights = grids[-1]
-        grids.append((coarse, regrid.restrict(fine, coarse, heights)))
-    below: ContactSolver | None = None
-    for slab, heights in reversed(grids[1:]):
-        here = solver_on(slab, max(LOOSE, solver.tolerance))
-        _begin(here, below)
-        here.solve(heights, control)
-        below = here
-    _begin(solver, below)
-    return "a cold start" if below is None else f"a cold start on {len(grids)} nested grids"
+def _start_on_coarse_grids(solver: ContactSolver, h: Array, control: Control, start: Array, solver_on: SolverOn) -> str:
+    """Solve loosely on coarser grids and put the start that follows into `start`: 0 if there is none."""
+    levels = nested.levels_of(solver.slab, h)
 
+    def solve(level: nested.Level, below: Array) -> Array:
+        return solver_on(level.slab, max(LOOSE, solver.tolerance)).solve(level.heights, control, below).p
 
-def _begin(solver: ContactSolver, below: ContactSolver | None) -> None:
-    """Start from the pressure on the next coarser grid if it is a number everywhere, else from none."""
-    solver.p.fill(0.0)
-    if below is not None and below.slab.sum(float(not np.all(np.isfinite(below.p))))[0] == 0.0:
-        regrid.prolong(below.slab, solver.slab, below.p, solver.p)
+    nested.descend(levels, solve, start)
+    return "a cold start" if len(levels) == 1 else f"a cold start on {len(levels)} nested grids"

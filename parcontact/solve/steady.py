@@ -21,7 +21,7 @@ import numpy as np
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .contact import Certificate, Operator
+from .contact import Certificate, Operator, certify, weigh
 from .gcr import Directions, gaps_on
 from .projected import Projected
 
@@ -32,7 +32,8 @@ PATIENCE = 25  # changes of the set without coming nearer to a solution after wh
 
 @dataclass(frozen=True)
 class SteadyContact:
-    """A solved (or given up) steady contact; p and `u = A p` are the solver's own maps.
+    """A solved (or given up) steady contact; p is the map of its start, `u = A p` the solver's, valid until it solves
+    again.
 
     It took so many projected steps and, where these did not do, so many contact sets with so many linear steps in all.
     """
@@ -75,57 +76,59 @@ class SteadySolver:
         self.slab, self.operator = slab, operator
         self.kappa = 0.1 * stiffness
         self.height, self.tolerance, self.max_steps, self.reduction = height, tolerance, max_steps, reduction
-        self.linear = Directions(slab, operator, preconditioner, directions, dtype)
-        linear = self.linear
+        self._linear = linear = Directions(slab, operator, preconditioner, directions, dtype)
         lent = (linear.t, linear.w, linear.r, linear.z)
-        self.projected = Projected(slab, operator, preconditioner, lent, dtype)
-        self.p, self.u = slab.zeros(dtype), slab.zeros(dtype)
-        self.working = np.zeros(slab.shape, dtype=np.bool_)
+        self._projected = Projected(slab, operator, preconditioner, lent, dtype)
+        self._u = slab.zeros(dtype)
+        self._working = np.zeros(slab.shape, dtype=np.bool_)
 
-    def solve(self, h: Array, mean: float) -> SteadyContact:
-        """Solve for heights h under the mean pressure, starting from the pressure in `self.p`; collective."""
-        if not self.slab.sum(kernels.total(self.p))[0] > 0.0:
-            self.p.fill(mean)
-        d, certificate, projections = self._project(h, mean)
+    def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
+        """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution
+        will be; from a uniform one where it is zero everywhere. Collective."""
+        if not self.slab.sum(kernels.total(start))[0] > 0.0:
+            start.fill(mean)
+        d, certificate, projections = self._project(start, h, mean)
         if certificate.worst <= self.tolerance:
-            return SteadyContact(self.p, self.u, d, certificate, projections, 0, 0, "")
-        return self._change_sets(h, mean, projections)
+            return SteadyContact(start, self._u, d, certificate, projections, 0, 0, "")
+        return self._change_sets(start, h, mean, projections)
 
-    def _project(self, h: Array, mean: float) -> tuple[float, Certificate, int]:
+    def _project(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate, int]:
         """Projected steps as long as they help."""
-        d, certificate = self._certify(h, mean)
+        self._admit(p, mean)
+        d, certificate = self._certify(p, h, mean)
         best, since, steps = certificate.worst, 0, 0
-        self.projected.begin()
+        self._projected.begin()
         while certificate.worst > self.tolerance and since < HALVING:
-            self.projected.step(self.p, self.u, h, self.working)
-            d, certificate = self._certify(h, mean)
-            self.projected.keep(self.p, self.u)
+            self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
+            d, certificate = self._certify(p, h, mean)
             steps += 1
             halved = certificate.worst <= 0.5 * best
             best, since = (certificate.worst, 0) if halved else (best, since + 1)
         return d, certificate, steps
 
-    def _change_sets(self, h: Array, mean: float, projections: int) -> SteadyContact:
-        """The active set, from the set of the pressure in `self.p`."""
-        x, u, slab = self.p, self.u, self.slab
+    def _change_sets(self, x: Array, h: Array, mean: float, projections: int) -> SteadyContact:
+        """The active set, from the set of the pressure x."""
+        u, slab, working, linear = self._u, self.slab, self._working, self._linear
         guess, best, since, sets, steps = np.inf, np.inf, 0, 0, 0
         while True:
-            total, members = slab.sum(*_restrict(self.working, x))
-            _add(self.working, (mean * slab.points - total) / members, x)
+            total, members = slab.sum(*_restrict(working, x))
+            _add(working, (mean * slab.points - total) / members, x)
             self.operator.apply(x, u)
-            limit = FEW if guess > FAR else self.linear.count
-            steps += max(1, self.linear.improve(x, u, h, self.working, limit, self.reduction))
+            limit = FEW if guess > FAR else linear.count
+            steps += max(1, linear.improve(x, u, h, working, limit, self.reduction))
             sets += 1
-            guess = self._next_set(h)
+            guess = self._next_set(x, h)
             if guess <= self.tolerance:
-                d, certificate = self._certify(h, mean)
+                self._admit(x, mean)
+                d, certificate = self._certify(x, h, mean)
                 if certificate.worst <= self.tolerance:
                     return SteadyContact(x, u, d, certificate, projections, sets, steps, "")
                 guess = certificate.worst
             since = 0 if guess < best else since + 1
             best = min(best, guess)
             if not np.isfinite(guess) or since >= PATIENCE or steps >= self.max_steps:
-                d, certificate = self._certify(h, mean)
+                self._admit(x, mean)
+                d, certificate = self._certify(x, h, mean)
                 failure = self._failure(certificate, since, steps)
                 return SteadyContact(x, u, d, certificate, projections, sets, steps, failure)
 
@@ -135,26 +138,26 @@ class SteadySolver:
         reason = f"no progress in {since} sets" if since >= PATIENCE else f"not converged in {steps} linear steps"
         return f"{reason}: certificate {certificate.worst:.3g}"
 
-    def _next_set(self, h: Array) -> float:
+    def _next_set(self, x: Array, h: Array) -> float:
         """Mark the next set; returns how far from a solution x seems to be."""
-        count, gaps = self.slab.sum(*gaps_on(self.working, self.u, h))
-        *sums, deepest = _choose(self.p, self.u, h, gaps / count, self.kappa, self.working)
+        count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
+        *sums, deepest = _choose(x, self._u, h, gaps / count, self.kappa, self._working)
         positive, negative, wrong, members, deepest = self.slab.reduce(sums, [deepest])
         if members == 0.0 or positive <= 0.0:
             return np.inf
         return max(wrong / positive / self.height, deepest / self.height, negative / positive)
 
-    def _certify(self, h: Array, mean: float) -> tuple[float, Certificate]:
-        """Make x admissible and recompute everything from it; the set is then that of this pressure."""
-        load, _ = self.slab.sum(*kernels.advance(self.p, self.p, 0.0, self.p))
-        kernels.scale(self.p, mean * self.slab.points / load)
-        self.operator.apply(self.p, self.u)
-        load, _, gaps = self.slab.sum(*kernels.weigh(self.p, self.u, h, 0.0))
-        d = gaps / load
-        *sums, deepest = kernels.certify(self.p, self.u, h, d, self.working)
-        wrong, _, _, deepest = self.slab.reduce(sums, [deepest])
-        error = abs(load / self.slab.points / mean - 1.0)
-        return d, Certificate(wrong / load / self.height, max(deepest / self.height, 0.0), error)
+    def _admit(self, x: Array, mean: float) -> None:
+        """Make x admissible: not negative, under the load; and u its image."""
+        load = self.slab.sum(kernels.clip(x))[0]
+        kernels.scale(x, mean * self.slab.points / load)
+        self.operator.apply(x, self._u)
+
+    def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
+        """The approach and the certificate of an admissible pressure, whose set is marked."""
+        balance = weigh(self.slab, p, self._u, h, 0.0).settled()
+        *_, certificate = certify(self.slab, p, self._u, h, balance, mean, self.height, self._working)
+        return balance.d, certificate
 
 
 @loop

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RunError
-from ..parallel import regrid
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution, wavenumbers
 from ..physics.ledger import Ledger, Measures
 from ..physics.prony import Prony
 from ..scene import Frame
+from ..solve import nested
 from ..solve.contact import Certificate
 from ..solve.steady import SteadyContact, SteadySolver
 
@@ -59,11 +59,10 @@ class SteadySliding:
     def __init__(self, base: Frame) -> None:
         self.base = base
         self.ledger = Ledger(base.slab, base.surface, base.units)
-        finest = Level(base.slab, base.fft, base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype)))
-        self.levels = [finest]
-        while (coarser := _coarser(self.levels[-1])) is not None:
-            self.levels.append(coarser)
-        self.p: Array | None = None
+        heights = base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype))
+        finest, *coarser = nested.levels_of(base.slab, heights)
+        self.levels = [Level(base.slab, base.fft, finest.heights)]
+        self.levels += [Level(level.slab, FFT(level.slab, dtype=base.fft.dtype), level.heights) for level in coarser]
         self.contact: SteadyContact | None = None
         self._speed = self._pressure = 0.0
 
@@ -153,32 +152,33 @@ class SteadySliding:
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
         appear and vanish.
         """
-        if self.p is None:
+        if self.contact is None:
             yield None
         elif pressure == self._pressure and max(speed, self._speed) <= NEAR * min(speed, self._speed):
-            yield from (self.p, None)
+            yield from (self.contact.p, None)
         else:
-            yield from (None, self.p)
+            yield from (None, self.contact.p)
 
     def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
         self.contact, self._speed, self._pressure = contact, speed, pressure
-        self.p = contact.p.copy()
 
     def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took."""
         tally, calls = self.base.slab.tally, 0.0
-        below: tuple[Level, Array] | None = None
-        for level in self.levels[:1] if start is not None else reversed(self.levels):
+
+        def solve(level: Level, p: Array) -> SteadyContact:
+            nonlocal calls
             before = tally["operator"]
-            solver = self._solver(level, velocity)
-            if start is not None:
-                solver.p[...] = start
-            elif below is not None:
-                regrid.prolong(below[0].slab, level.slab, below[1], solver.p)
-            contact = solver.solve(level.heights, mean)
+            contact = self._solver(level, velocity).solve(level.heights, mean, p)
             calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
-            below = (level, contact.p)
-        return contact, calls
+            return contact
+
+        p = self.base.slab.empty(self.base.dtype)
+        if start is None:
+            nested.descend(self.levels, lambda level, below: solve(level, below).p, p)
+        else:
+            p[...] = start
+        return solve(self.levels[0], p), calls
 
     def _solver(self, level: Level, velocity: Vector) -> SteadySolver:
         base, numerics = self.base, self.base.job.numerics
@@ -202,14 +202,6 @@ class SteadySliding:
             half_space.sliding_operator(level.fft, speed, prony),
             half_space.sliding_inverse(level.fft, speed, prony),
         )
-
-
-def _coarser(level: Level) -> Level | None:
-    """The next coarser grid, if there is one."""
-    coarse = regrid.coarser(level.slab)
-    if coarse is None:
-        return None
-    return Level(coarse, FFT(coarse, dtype=level.fft.dtype), regrid.restrict(level.slab, coarse, level.heights))
 
 
 def _stiffness(slab: Slab, operator: Convolution, dtype: type[np.floating]) -> float:

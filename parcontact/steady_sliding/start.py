@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from ..errors import InputError
+from ..march.state import State
 from ..march.step import March
 from ..physics.body import Zener
 from .sliding import SteadySliding
@@ -20,19 +21,9 @@ def begin(march: March) -> None:
     point = sliding.solve(initial.velocity, initial.pressure or 0.0)
     contact = sliding.contact
     assert contact is not None
-    material = scene.material
-    if isinstance(material, Zener):
-        material.u[...] = contact.u
-        for k, steady in enumerate(sliding.branch_maps(initial.velocity)):
-            if k in material.kept:
-                material.branches[material.kept.index(k)] = steady
-    march.p[...] = contact.p
-    if march.p_old is not None:
-        march.p_old[...] = contact.p
-    march.alpha = march.alpha_old = 1.0
-    march.d = contact.d
-    scene.solver.u[...] = contact.u
-    march.row = replace(
+    if isinstance(scene.material, Zener):
+        scene.material.begin_with(contact.u, sliding.branch_maps(initial.velocity))
+    row = replace(
         march.row,
         measures=point.measures,
         iterations=contact.steps,
@@ -40,3 +31,4 @@ def begin(march: March) -> None:
         operator_calls=round(point.operator_calls),
         seconds=point.seconds,
     )
+    march.begin_with(State(row, contact.p, None, 1.0, 1.0, contact.d))

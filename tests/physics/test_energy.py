@@ -61,9 +61,9 @@ class Driven:
 
     def to(self, u: Array, dt: float) -> Balance:
         heights = Heights(u.reshape(1, 4))
-        alpha, effective = self.zener.begin(dt, heights)
-        p = effective.copy()
-        self.zener.commit(p, heights)
+        trial = self.zener.begin(dt, heights)
+        p, alpha = trial.effective.copy(), trial.alpha
+        self.zener.commit(trial, p)
         self.energy.advance(dt, Pressed(p, alpha), Pressed(self.p, self.alpha), u)
         self.p, self.alpha = p, alpha
         return self.energy.balance
@@ -170,11 +170,12 @@ def test_sums_go_over_all_ranks(comm: MPI.Intracomm) -> None:
     p += 2.0
     u += 3.0
     elastic = ElasticEnergy(slab)
-    elastic.advance(0.0, Pressed(p, 0.5), None, u)
+    elastic.advance(0.0, Pressed(p, 0.5), Pressed(p, 0.5), u)
     assert elastic.balance.work == elastic.balance.stored == 0.5 * 0.5 * 6.0 * 12
     zener = Zener(slab, BODY, "exponential")
     energy = ZenerEnergy(slab, zener, AppliedInverse(Identity(), slab.empty))
-    alpha, effective = zener.begin(0.0, Heights(u))
-    zener.commit(effective.copy(), Heights(u))
-    energy.advance(0.0, Pressed(effective, alpha), None, u)
+    trial = zener.begin(0.0, Heights(u))
+    zener.commit(trial, trial.effective.copy())
+    pressed = Pressed(u, trial.alpha)
+    energy.advance(0.0, pressed, pressed, u)
     assert_allclose(energy.balance.stored, 0.5 * 12 * 9 * (BODY.modulus_inf + BODY.moduli.sum()), rtol=1e-14)

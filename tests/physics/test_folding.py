@@ -82,10 +82,10 @@ def stresses(body: Zener, moments: list[tuple[float, float]]) -> Array:
     found = []
     for dt, u in moments:
         heights = Heights(np.full((1, 1), u))
-        alpha, effective = body.begin(dt, heights)
-        displacement = effective.copy()
-        body.commit(displacement, heights)
-        found.append(float(alpha * displacement[0, 0]))
+        trial = body.begin(dt, heights)
+        displacement = trial.effective.copy()
+        body.commit(trial, displacement)
+        found.append(float(trial.alpha * displacement[0, 0]))
     return np.array(found)
 
 
@@ -143,7 +143,7 @@ def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
     held = [(0.0, 1.0), (dt, 1.0), (dt, 1.0)]
     whole, fewer = (stresses(Zener(POINT, DECADES, "exponential", memoryless=fast), held) for fast in ([], [0]))
     assert whole[0] == fewer[0]
-    wrong = np.abs(fewer - whole)[1:] / Zener(POINT, DECADES, "exponential").begin(dt, Heights(np.zeros((1, 1))))[0]
+    wrong = np.abs(fewer - whole)[1:] / Zener(POINT, DECADES, "exponential").begin(dt, Heights(np.zeros((1, 1)))).alpha
     assert_allclose(wrong[0], errors.memoryless_errors[0], rtol=1e-6)
     assert wrong[1] < 1e-3 * wrong[0]
 
@@ -154,7 +154,7 @@ def test_steps_that_outgrow_stiffer_branches() -> None:
     prony, steps = normal_form(1e3, [1e9, 1e6], [1.0, 1e6]), 10.0 ** np.arange(0, 8)
     whole, fewer = (Zener(POINT, prony, "exponential", memoryless=fast) for fast in ([], [1]))
     moments = [(dt, float(time)) for dt, time in zip(steps, np.cumsum(steps), strict=True)]
-    moduli = [whole.begin(dt, Heights(np.zeros((1, 1))))[0] for dt in steps]
+    moduli = [whole.begin(dt, Heights(np.zeros((1, 1)))).alpha for dt in steps]
     wrong = np.abs(stresses(fewer, moments) - stresses(whole, moments)) / moduli / np.cumsum(steps)
     found = fold_branches(prony, [Phase(moments[-1][1], 1.0, 1e7, (0.0, 0.0), jump=False)], [WAVE], "exponential", 0.5)
     assert 0.05 < wrong.max() <= found.memoryless_errors[1]

@@ -90,21 +90,23 @@ def test_travel(shift: int) -> None:
     """A pressure that grows evenly while it moves goes on so; where it would become negative it is 0."""
     p, slope = np.maximum(maps(2), 0.0)
     earlier, now, next_ = (roll(np.maximum(p + n * slope, 0.0), n * shift) for n in range(3))
-    expected_old = now.copy()
-    loops.travel(now, earlier, 2.0, 1.0, shift)
-    assert_allclose(now, next_, rtol=1e-14, atol=1e-14)
-    assert_array_equal(earlier, expected_old)
-    loops.travel(now, earlier, 1.0, 1e3, shift)
-    assert now.min() == 0.0
+    kept, out = now.copy(), np.empty_like(now)
+    loops.travel(now, earlier, 2.0, 1.0, shift, out)
+    assert_allclose(out, next_, rtol=1e-14, atol=1e-14)
+    assert_array_equal(now, kept)
+    loops.travel(now, earlier, 2.0, 1.0, shift, earlier)
+    assert_array_equal(earlier, out)
+    loops.travel(out, now, 1.0, 1e3, shift, out)
+    assert out.min() == 0.0
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_maps_of_either_precision(dtype: type[np.floating]) -> None:
     p, p_old = (np.maximum(field, 0.0).astype(dtype) for field in maps(2))
     expected = roll(np.maximum(2.0 * p - roll(p_old, 2), 0.0), 2)
-    loops.travel(p, p_old, 2.0, 1.0, 2)
-    assert p.dtype == dtype
-    assert_allclose(p, expected, rtol=1e-6, atol=1e-6)
+    out = np.empty_like(p)
+    loops.travel(p, p_old, 2.0, 1.0, 2, out)
+    assert_allclose(out, expected, rtol=1e-6, atol=1e-6)
 
 
 def test_tangential() -> None:

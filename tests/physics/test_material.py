@@ -29,17 +29,17 @@ def body(prony: Prony, integrator: Integrator = "exponential") -> Zener:
 def push(body: Zener, u: float, dt: float) -> float:
     """Prescribe the displacement of a point; returns its total pressure."""
     heights = Heights(np.full((1, 1), u))
-    alpha, effective = body.begin(dt, heights)
-    displacement = effective.copy()
-    body.commit(displacement, heights)
-    return float(alpha * displacement[0, 0])
+    trial = body.begin(dt, heights)
+    displacement = trial.effective.copy()
+    body.commit(trial, displacement)
+    return float(trial.alpha * displacement[0, 0])
 
 
 def load(body: Zener, p: float, dt: float) -> float:
     """Prescribe the total pressure of a point; returns its displacement."""
     heights = Heights(np.zeros((1, 1)))
-    alpha, _ = body.begin(dt, heights)
-    body.commit(np.full((1, 1), p / alpha), heights)
+    trial = body.begin(dt, heights)
+    body.commit(trial, np.full((1, 1), p / trial.alpha))
     return float(body.u[0, 0])
 
 
@@ -55,7 +55,7 @@ def branch(body: Zener, k: int) -> float:
 def test_coefficients_of_eq_8() -> None:
     """alpha, beta and gamma of Eq. (8), printed to 1e-9 of their size."""
     made = body(TWO, "backward-euler")
-    alpha, _ = made.begin(DT, Heights(np.zeros((1, 1))))
+    alpha = made.begin(DT, Heights(np.zeros((1, 1)))).alpha
     decay, gain = made.coefficients(DT)
     g0, g1, eta1 = (np.array(values) for values in BRANCHES)
     both = g0 + g1
@@ -193,23 +193,22 @@ def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
     first, second = Zener(slab, prony, integrator), Zener(slab, prony, integrator)
     for offset, dt in ((0, 0.0), (1, 1e-3), (5, 1e-3), (7, 2e-3), (-1, 1e-4)):
         here = Heights(np.roll(base, offset, axis=1))
-        alpha, effective = first.begin(dt, here)
-        same_alpha, same = second.begin(dt, Heights(base, offset))
-        assert alpha == same_alpha
-        assert_allclose(same, effective, rtol=0, atol=1e-15)
-        displacement = effective + rng.uniform(size=slab.shape)
-        first.commit(displacement, here)
-        second.commit(displacement, Heights(base, offset))
+        trial, same = first.begin(dt, here), second.begin(dt, Heights(base, offset))
+        assert trial.alpha == same.alpha
+        assert_allclose(same.effective, trial.effective, rtol=0, atol=1e-15)
+        displacement = trial.effective + rng.uniform(size=slab.shape)
+        first.commit(trial, displacement)
+        second.commit(same, displacement)
         assert_allclose(second.u, first.u, rtol=0, atol=1e-14)
 
 
 def test_elastic_heights() -> None:
     slab = Slab(MPI.COMM_SELF, 5, 2)
     base, made = np.arange(10.0).reshape(2, 5), Elastic(slab, 3.0)
-    assert made.begin(0.0, Heights(base))[1] is base
-    modulus, moved = made.begin(1.0, Heights(base, 2))
-    assert modulus == 3.0
-    np.testing.assert_array_equal(moved, np.roll(base, 2, axis=1))
+    assert made.begin(0.0, Heights(base)).effective is base
+    trial = made.begin(1.0, Heights(base, 2))
+    assert trial.alpha == 3.0
+    np.testing.assert_array_equal(trial.effective, np.roll(base, 2, axis=1))
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)

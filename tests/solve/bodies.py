@@ -55,7 +55,6 @@ class Kept:
     p: Map
     u: Map
     d: float
-    load: float
     certificate: Certificate
     iterations: int
     failure: str
@@ -68,7 +67,6 @@ def keep(contact: Contact) -> Kept:
         contact.p.astype(np.float64),
         contact.u.astype(np.float64),
         contact.d,
-        contact.load,
         contact.certificate,
         contact.iterations,
         contact.failure,

@@ -24,12 +24,12 @@ def test_agrees_with_the_projected_method(boundary: str, kernel: str, mean: floa
     """Under a load, and at the approach that comes with it."""
     h = rough(64)
     options: Any = {"boundary": boundary, "kernel": kernel, "tolerance": TIGHT}
-    expected = keep(solver(h, **options).solve(h, MeanPressure(mean)))
+    expected = keep(solver(h, **options).solve(h, MeanPressure(mean), np.zeros_like(h)))
     controls: list[MeanPressure | Approach] = [MeanPressure(mean)]
     if np.count_nonzero(expected.p) < h.size or boundary == "free":
         controls.append(Approach(expected.d))
     for control in controls:
-        found = active_set.solve(solver(h, **options), h, control)
+        found = active_set.solve(solver(h, **options), h, control, np.zeros_like(h))
         assert found.converged
         assert found.certificate.worst <= TIGHT
         assert_allclose(found.p, expected.p, rtol=0, atol=1e-9 * expected.p.max())
@@ -46,11 +46,9 @@ def test_cells_much_longer_than_wide(seed: int, stretch: float, control: str) ->
     contact."""
     h = white((16, 16), seed)
     body = solver(h, (1.0, stretch), tolerance=1e-8)
-    start = body.judge(h, MeanPressure(1.0), "")
-    pressure = body.preconditioner.apply(h - h.mean(), start.p.copy())
+    pressure = body.preconditioner.apply(h - h.mean(), np.empty_like(h))
     half: MeanPressure | Approach = MeanPressure(-0.5 * pressure.min()) if control == "load" else Approach(-h.max() / 2)
-    body.p.fill(0.0)
-    found = active_set.solve(body, h, half)
+    found = active_set.solve(body, h, half, np.zeros_like(h))
     assert found.converged
     assert found.certificate.worst <= 1e-8
     assert found.p.min() >= 0.0
@@ -63,8 +61,7 @@ def test_from_full_contact_to_none() -> None:
     nowhere, so that nothing says how far to go."""
     h = rough(64)
     body = solver(h)
-    body.p.fill(1.0)
-    found = active_set.solve(body, h, Approach(-1.01 * h.max()))
+    found = active_set.solve(body, h, Approach(-1.01 * h.max()), np.ones_like(h))
     assert found.converged
     assert np.all(found.p == 0.0)
 
@@ -72,7 +69,7 @@ def test_from_full_contact_to_none() -> None:
 def test_it_says_when_it_has_found_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(active_set, "SETS", 1)
     h = rough(64)
-    found = active_set.solve(solver(h), h, MeanPressure(0.1))
+    found = active_set.solve(solver(h), h, MeanPressure(0.1), np.zeros_like(h))
     assert found.failure == "found no contact among 1 sets of points"
     assert found.certificate.worst > 1e-6
 
@@ -88,7 +85,7 @@ def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approa
         h = slab.empty()
         h[...] = white((3, 24), 5)[slab.rows]
         body = ContactSolver(slab, HalfSpace(size).operator(fft), HalfSpace(size).inverse(fft), 1.0, 1e-11, 500)
-        return slab, active_set.solve(body, h, control)
+        return slab, active_set.solve(body, h, control, slab.zeros())
 
     slab, together = solved(comm)
     _, alone = solved(MPI.COMM_SELF)

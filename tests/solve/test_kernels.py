@@ -69,11 +69,11 @@ def test_residual(shape: tuple[int, int], dtype: type[np.floating]) -> None:
 
 @SHAPES
 def test_products(shape: tuple[int, int], dtype: type[np.floating]) -> None:
-    """Residuals are zero outside their working set, the last one's is another set."""
+    """Of the residual that `residual` makes, to the precision of the maps; the last one's is another set."""
     maps = Maps(shape, dtype)
-    maps.r[~maps.working] = 0.0
     inside = maps.working
-    sums = kernels.products(maps.working, maps.r, maps.old, maps.z, maps.t)
+    kernels.residual(maps.working, maps.u, maps.h, 0.3, maps.r)
+    sums = kernels.products(maps.working, maps.u, maps.h, 0.3, maps.old, maps.z, maps.t)
     r, old, z, t = (maps.wide(name)[inside] for name in ("r", "old", "z", "t"))
     for found, terms in zip(sums, (z, t, old, r * z, old * z, r * t), strict=True):
         assert maps.close(found, terms)
@@ -106,6 +106,14 @@ def test_advance(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     assert maps.close(cut, np.maximum(-free, 0.0))
     assert kernels.advance(maps.p, maps.t, 0.0, maps.r)[1] == 0.0
     assert np.array_equal(maps.r, maps.p)
+
+
+@SHAPES
+def test_clip(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    expected = np.maximum(maps.z, 0.0)
+    assert maps.close(kernels.clip(maps.z), expected.astype(np.float64))
+    assert np.array_equal(maps.z, expected)
 
 
 @SHAPES

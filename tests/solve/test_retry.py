@@ -34,7 +34,7 @@ def factory(height: float, **options: Any) -> Callable[[Slab, float], ContactSol
 def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options: Any) -> tuple[ContactSolver, Any, Any]:
     """A solver after a solve that failed and its retry: the solver, the first contact, what came of the second."""
     body = solver(h, **options)
-    first = body.solve(h, control)
+    first = body.solve(h, control, np.zeros_like(h))
     assert first.failure
     return body, first, retry.again(body, h, control, first, factory(np.ptp(h)))
 
@@ -42,7 +42,7 @@ def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options:
 def test_shorter_steps_go_on_from_where_it_stood() -> None:
     """Iterations run out just before the end."""
     h = rough(128)
-    enough = solver(h).solve(h, LOAD).iterations
+    enough = solver(h).solve(h, LOAD, np.zeros_like(h)).iterations
     body, first, (contact, tried) = failed_and_again(h, max_iterations=enough - 1)
     assert contact.converged
     assert tried == ["shorter steps"]
@@ -55,11 +55,12 @@ def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float
     """The nested start knows nothing of it: the contact is that of a good start, to the tolerance."""
     h = rough(128)
     body, good = solver(h, tolerance=1e-9), solver(h, tolerance=1e-9)
-    body.p[3, 4] = bad
+    start = np.zeros_like(h)
+    start[3, 4] = bad
     with np.errstate(invalid="ignore"):
-        first = body.solve(h, control)
+        first = body.solve(h, control, start)
         contact, tried = retry.again(body, h, control, first, factory(np.ptp(h)))
-    expected = good.solve(h, control)
+    expected = good.solve(h, control, np.zeros_like(h))
     assert "not finite" in first.failure
     assert tried == ["a cold start on 3 nested grids"]
     assert contact.converged
@@ -69,10 +70,11 @@ def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float
 def test_a_nested_start_saves_iterations() -> None:
     """On the finest grid; so it helps where a cold start runs out of them."""
     h = rough(256)
-    cold = solver(h).solve(h, LOAD).iterations
+    cold = solver(h).solve(h, LOAD, np.zeros_like(h)).iterations
     body = solver(h)
-    retry._nest(body, h, LOAD, factory(np.ptp(h)))
-    assert body.solve(h, LOAD).iterations <= 0.8 * cold
+    start = np.zeros_like(h)
+    assert retry._start_on_coarse_grids(body, h, LOAD, start, factory(np.ptp(h))) == "a cold start on 4 nested grids"
+    assert body.solve(h, LOAD, start).iterations <= 0.8 * cold
 
 
 def test_everything_is_tried_before_giving_up() -> None:
@@ -89,7 +91,7 @@ def test_heights_that_are_not_finite_cannot_be_helped() -> None:
     body = solver(h)
     h[0, 0] = np.nan
     with np.errstate(invalid="ignore"):
-        contact, tried = retry.again(body, h, LOAD, body.solve(h, LOAD), factory(1.0))
+        contact, tried = retry.again(body, h, LOAD, body.solve(h, LOAD, np.zeros_like(h)), factory(1.0))
     assert "not finite" in contact.failure
     assert len(tried) == 1
 
@@ -100,9 +102,9 @@ def test_grids_that_cannot_be_halved(shape: tuple[int, int], control: MeanPressu
     """Along a direction of few or odd points they stay as they are."""
     h = np.random.default_rng(1).standard_normal(shape)
     body = solver(h, tolerance=1e-9)
-    body.p.fill(np.inf)
     with np.errstate(invalid="ignore"):
-        contact, tried = retry.again(body, h, control, body.solve(h, control), factory(np.ptp(h)))
+        first = body.solve(h, control, np.full_like(h, np.inf))
+        contact, tried = retry.again(body, h, control, first, factory(np.ptp(h)))
     assert contact.converged
     grids = {37: 1, 1: 2, 6: 3}[shape[0]]
     assert tried == ["a cold start" if grids == 1 else f"a cold start on {grids} nested grids"]
@@ -115,10 +117,10 @@ def test_all_ranks_agree(comm: MPI.Intracomm) -> None:
     slab = Slab(comm, 64, 64)
     h = whole[slab.rows].copy()
     body = factory(np.ptp(whole))(slab, 1e-9)
-    body.p.fill(np.inf)
     with np.errstate(invalid="ignore"):
-        contact, _ = retry.again(body, h, LOAD, body.solve(h, LOAD), factory(np.ptp(whole)))
-    alone = solver(whole, tolerance=1e-9).solve(whole, LOAD)
+        first = body.solve(h, LOAD, np.full_like(h, np.inf))
+        contact, _ = retry.again(body, h, LOAD, first, factory(np.ptp(whole)))
+    alone = solver(whole, tolerance=1e-9).solve(whole, LOAD, np.zeros_like(whole))
     assert contact.converged
     assert_allclose(contact.p, alone.p[slab.rows], atol=1e-7 * alone.p.max())
     assert comm.allgather(contact.iterations) == [contact.iterations] * comm.size

@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.job import Job
-from parcontact.march.step import March, run
+from parcontact.march.loop import run
+from parcontact.march.step import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import Zener
 from parcontact.record.row import Row

@@ -9,7 +9,8 @@ import numpy as np
 from parcontact.errors import RunError
 from parcontact.job import timeline as clock
 from parcontact.job.timeline import Step
-from parcontact.march.step import March, run
+from parcontact.march.loop import run
+from parcontact.march.step import March
 from parcontact.parallel.slab import Array
 from parcontact.record.row import Row
 
@@ -118,7 +119,7 @@ class Witness:
         grid, prony = scene.job.grid, scene.frame.prony
         stiffest = prony.modulus_inf + float(prony.moduli.sum())
         scales.energy = max(scales.energy, abs(row.work), abs(row.stored), abs(row.dissipated))
-        scales.force = max(scales.force, row.measures.pressure * grid.lx * grid.ly * stiffest / self.march.alpha)
+        scales.force = max(scales.force, row.measures.pressure * grid.lx * grid.ly * stiffest / self.march.state.alpha)
         slack = ENERGY * scales.energy + ROUNDINGS * EPS * scales.length * scales.force
         sums = f"work {row.work:g}, stored {row.stored:g}, dissipated {row.dissipated:g} J"
         closes = scene.job.numerics.integrator == "exponential"
@@ -138,7 +139,7 @@ class Witness:
     # -- how exact it can be -------------------------------------------------------------------------------------------
 
     def _blur(self) -> tuple[float, float]:
-        scene, modulus = self.march.scene, self.march.alpha * self.march.scene.units.modulus
+        scene, modulus = self.march.scene, self.march.state.alpha * self.march.scene.units.modulus
         return 2.0 * scene.job.numerics.tolerance * scene.frame.height * modulus, 2.0 * self.scales.length * modulus
 
     def _beyond(self, step: Step) -> bool:
@@ -147,7 +148,7 @@ class Witness:
         if step.control == "approach":
             return False
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
-        alpha, _ = scene.material.begin(step.dt, scene.path.at(step.position))
+        alpha = scene.material.begin(step.dt, scene.path.at(step.position)).alpha
         strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
         return DIGITS * EPS * strain * max(grid.lx, grid.ly) > scene.job.numerics.tolerance * scene.frame.height
 

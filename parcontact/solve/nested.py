@@ -1,0 +1,55 @@
+"""Nested grids: a contact is solved on the coarsest grid first, and the next finer one starts from what was found."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from ..parallel import regrid
+from ..parallel.slab import Array, Slab
+
+
+@dataclass(frozen=True)
+class Level:
+    """One grid: who owns which rows, and the heights on it."""
+
+    slab: Slab
+    heights: Array
+
+
+def levels_of(slab: Slab, heights: Array) -> list[Level]:
+    """A grid and all coarser ones, the finest first; collective."""
+    levels = [Level(slab, heights)]
+    while (coarse := regrid.coarser(levels[-1].slab)) is not None:
+        levels.append(Level(coarse, regrid.restrict(levels[-1].slab, coarse, levels[-1].heights)))
+    return levels
+
+
+class OnGrid(Protocol):
+    """Whatever is known of a level, at least its grid."""
+
+    @property
+    def slab(self) -> Slab: ...
+
+
+L = TypeVar("L", bound=OnGrid)
+
+
+def descend(levels: Sequence[L], solve: Callable[[L, Array], Array], start: Array) -> None:
+    """Put a start for the finest grid into `start`: the solution on the next coarser one, 0 if there is none.
+
+    `solve(level, start)` returns the pressure on a level; the next starts from 0 if it is not finite. Collective.
+    """
+    below: tuple[L, Array] | None = None
+    for level in reversed(levels):
+        here = start if level is levels[0] else level.slab.empty(start.dtype)
+        here.fill(0.0)
+        if below is not None and _is_finite(below[0].slab, below[1]):
+            regrid.prolong(below[0].slab, level.slab, below[1], here)
+        if level is not levels[0]:
+            below = level, solve(level, here)
+
+
+def _is_finite(slab: Slab, p: Array) -> bool:
+    return slab.sum(float(not np.all(np.isfinite(p))))[0] == 0.0
