@@ -10,7 +10,7 @@ from itertools import pairwise
 from .. import scene
 from ..effects import decisions as calls_for
 from ..job import Job
-from ..march import step as march
+from ..march import loop
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..parallel.tally import Tally
@@ -45,7 +45,7 @@ NAMES = tuple(field.name for field in fields(Outcome))
 
 def warm_up(job: Job, slab: Slab) -> None:
     """Make the first steps of a job, so that no case pays for compiled loops and transform plans; collective."""
-    march.run(March(scene.build(job, slab)), [lambda state: state.row.step >= FIRST_STEPS])
+    loop.run(March(scene.build(job, slab)), [lambda state: state.row.step >= FIRST_STEPS])
 
 
 def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
@@ -60,7 +60,7 @@ def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
         return slab.reduce((), [float(stopped())])[0] > 0.0
 
     began, tally = time.process_time(), slab.tally.copy()
-    if march.run(marching, [note]):
+    if loop.run(marching, [note]):
         return None
     counted = Tally(slab.tally.since(tally))
     seconds = slab.sum(time.process_time() - began)[0]
