@@ -139,9 +139,12 @@ def plot(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..record import plots
 
-    picture = ranks.on_root(world, lambda: plots.plot(options.directory))
+    names = ("format", "panels", "over", "log", "compare", "movie", "out")
+    wanted = plots.Options(**{name: getattr(options, name) for name in names})
+    pictures = ranks.on_root(world, lambda: plots.plot(options.directories, wanted))
     if world.rank == 0:
-        print(f"picture: {picture}")
+        for picture in pictures:
+            print(f"picture: {picture}")
     return DONE
 
 

@@ -144,8 +144,8 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("file", type=Path)
     info.set_defaults(act=verbs.info)
 
-    plot = found.add_parser("plot", help="draw a picture of a run")
-    plot.add_argument("directory", type=Path, help="output directory of a run")
+    plot = found.add_parser("plot", help="draw pictures of runs and friction curves, compare them, make a movie")
+    _plot_arguments(plot)
     plot.set_defaults(act=verbs.plot)
 
     doctor = found.add_parser("doctor", help="run small hard cases on this machine, and say what came out of each")
@@ -158,6 +158,20 @@ def _job_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("job", help="job file (YAML)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
     parser.add_argument("--out", metavar="DIR", type=_directory, help="output directory")
+
+
+def _plot_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run or curve")
+    parser.add_argument("--format", choices=("png", "pdf", "svg"), default="", help="default: that of --out, else png")
+    text = "which panels, in this order: friction,area,approach,gap,pressure,load,energy,steady,maps (default: all)"
+    parser.add_argument("--panels", metavar="NAME,...", type=_names, default=(), help=text)
+    text = "what is along the x axis (default: as the job suggests)"
+    parser.add_argument("--over", choices=("time", "distance", "velocity", "load"), default="", help=text)
+    parser.add_argument("--log", metavar="x,y", type=_names, default=(), help="logarithmic axes: x, y or x,y")
+    parser.add_argument("--compare", action="store_true", help="several directories in one picture, comparison.png")
+    text = "a movie of this map over its saved instants instead (GIF): pressure, displacement, gap or height"
+    parser.add_argument("--movie", metavar="FIELD", default="", help=text)
+    parser.add_argument("--out", metavar="FILE", type=Path, help="the picture (default: picture.png in the directory)")
 
 
 # -- values -----------------------------------------------------------------------------------------------------------
@@ -184,6 +198,10 @@ def _count(text: str) -> int:
 
 def _counts(text: str) -> tuple[int, ...]:
     return tuple(_count(part) for part in text.split(","))
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(filter(None, (part.strip() for part in text.split(","))))
 
 
 def _network(text: str) -> tuple[float, float]:

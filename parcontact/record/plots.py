@@ -1,62 +1,185 @@
-"""A picture of a run, finished or not: what was measured over time, distance or load, and the last saved maps.
+"""Pictures of runs, finished or not, and of friction curves: what was measured, and the last saved maps.
 
 Which panels there are follows from the job: friction if the surface slides, energies if they were asked for, curves
 over the load if all stages are single solves, pressures along a line through a sphere beside Hertz's.
 """
 
+import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from . import steady_plot
-from .pictures.histories import histories, numbers
+from . import hdf5
+from .pictures import charts, histories, movie, steady, style
+from .pictures.charts import Chart
 from .pictures.maps import maps
 from .pictures.run import Panel, Run
 
-PICTURE = "picture.png"
-STYLE: dict[Any, Any] = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": 10,
-    "font.size": 9,
-    "grid.alpha": 0.25,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "lines.linewidth": 1.4,
-}
+FORMATS = ("png", "pdf", "svg")
+PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "steady", "maps")
+LINE = 68  # letters of a title
 
 
-def plot(directory: Path) -> Path:
-    """Draw the run in a directory; returns the picture's path. Raises InputError where there is no run."""
-    if not (directory / "measures.csv").is_file():
-        steady = directory / "steady.csv"
-        if steady.is_file():
-            return steady_plot.plot(steady)
-        raise InputError(f"{directory} holds no run: it has no measures.csv")
-    run = Run(directory)
-    with rc_context(STYLE):
-        title = run.job.title or directory.name
-        figure = _figure(title if run.curves else f"{title}\n{numbers(run)}", [list(histories(run)), maps(run)])
-        figure.savefig(directory / PICTURE, dpi=150)
-    return directory / PICTURE
+@dataclass(frozen=True)
+class Options:
+    """What is asked for beyond the directories; '' and () leave it to what they hold. `out` is a file."""
+
+    format: str = ""
+    panels: Sequence[str] = ()
+    over: str = ""
+    log: Sequence[str] = ()
+    compare: bool = False
+    movie: str = ""
+    out: Path | None = None
 
 
-def _figure(title: str, groups: Sequence[Sequence[Panel]]) -> Figure:
-    """Groups of panels below each other, each in even rows of at most three."""
+def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path]:
+    """Draw what is in each directory, or compare them in one picture; returns the pictures' paths.
+
+    Raises InputError where there is nothing to draw.
+    """
+    if options.out and len(directories) > 1 and not options.compare:
+        raise InputError("--out names one picture: give one directory, or --compare several in one")
+    if unknown := [name for name in options.panels if name not in PANELS]:
+        raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(PANELS)}")
+    if unknown := [name for name in options.log if name not in ("x", "y")]:
+        raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y or x,y")
+    with rc_context(style.RC):
+        if options.movie:
+            return [_movie(directory, options) for directory in directories]
+        if options.compare:
+            return [_save(_comparison(directories, options), Path("comparison"), options)]
+        return [_save(_picture(directory, options), directory / "picture", options) for directory in directories]
+
+
+def draw_steady(table: Path) -> Path:
+    """Draw steady.csv alone, beside it; returns the picture's path."""
+    with rc_context(style.RC):
+        figure = _figure("", [_steady(table.parent, Options())])
+        return _save(figure, table.with_suffix(""), Options())
+
+
+def _movie(directory: Path, options: Options) -> Path:
+    target = options.out or directory / f"{options.movie}.gif"
+    if target.suffix != ".gif":
+        raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
+    return movie.make(directory, options.movie, target)
+
+
+def _save(figure: Figure, stem: Path, options: Options) -> Path:
+    target = options.out or stem.with_name(f"{stem.name}.{options.format or FORMATS[0]}")
+    kind = options.format or target.suffix.lstrip(".")
+    if kind not in FORMATS:
+        raise InputError(f"{target}: pictures are {', '.join(FORMATS)}; say which with --format")
+    try:
+        figure.savefig(target, dpi=style.DPI, format=kind)
+    except OSError as error:
+        raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
+    return target
+
+
+def _picture(directory: Path, options: Options) -> Figure:
+    """All that there is in a directory."""
+    groups: list[Sequence[Panel]] = []
+    title = directory.absolute().name
+    if (directory / "measures.csv").is_file():
+        run = Run(directory)
+        title = run.job.title or title
+        title = "\n".join(textwrap.wrap(title, LINE)) + ("" if run.curves else f"\n{histories.numbers(run)}")
+        found = _chosen(histories.charts(run, options.over), options)
+        groups = [_panels(found, options), maps(run) if _wanted("maps", options) else []]
+    if (directory / steady.TABLE).is_file() and _wanted("steady", options):
+        groups.insert(1, _steady(directory, options))
+    elif not groups:
+        raise InputError(
+            f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"
+        )
+    if options.panels and not any(groups):
+        raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
+    return _figure(title, groups)
+
+
+def _comparison(directories: Sequence[Path], options: Options) -> Figure:
+    """The lines of all directories in one picture."""
+    names = _names(directories)
+    found: list[tuple[str, Sequence[Chart]]] = []
+    for name, directory in zip(names, directories, strict=True):
+        lines: list[Chart] = []
+        if (directory / "measures.csv").is_file():
+            lines += _chosen(histories.charts(Run(directory), options.over), options)
+        if (directory / steady.TABLE).is_file() and _wanted("steady", options):
+            lines += steady.charts(directory, options.over)
+        if not lines:
+            raise InputError(f"{directory} holds nothing to compare")
+        found.append((name, lines))
+    together = charts.compared(found)
+    return _figure("", [_panels(together, options)], legend=True)
+
+
+def _names(directories: Sequence[Path]) -> list[str]:
+    """What tells directories apart: the last part of their paths, or as many as it takes."""
+    parts = [directory.absolute().parts for directory in directories]
+    for count in range(1, max(map(len, parts), default=1) + 1):
+        names = ["/".join(part[-count:]) for part in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [str(directory) for directory in directories]
+
+
+def _steady(directory: Path, options: Options) -> list[Panel]:
+    return _panels(steady.charts(directory, options.over), options)
+
+
+def _wanted(key: str, options: Options) -> bool:
+    return not options.panels or key in options.panels
+
+
+def _chosen(found: Sequence[Chart], options: Options) -> list[Chart]:
+    """In the order in which they were asked for."""
+    if not options.panels:
+        return list(found)
+    return [chart for name in options.panels for chart in found if chart.key == name]
+
+
+def _panels(found: Sequence[Chart], options: Options) -> list[Panel]:
+    return [partial(charts.draw, chart, log=options.log) for chart in found]
+
+
+def _figure(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False) -> Figure:
+    """Groups of panels below each other, each in even rows; with `legend` one for all panels, above them."""
     rows = [row for group in groups for row in _rows(group)]
-    figure = Figure(figsize=(11.5, 0.6 + 3.0 * len(rows)), layout="constrained")
-    figure.suptitle(title, fontsize=11)
+    height = 0.25 + 0.2 * (title.count("\n") + 1) + style.HEIGHT * len(rows)
+    figure = Figure(figsize=(style.WIDTH, height), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize=11)
+    drawn = []
     for part, panels in zip(figure.subfigures(len(rows) or 1, 1, squeeze=False)[:, 0], rows, strict=False):
         for panel, axes in zip(panels, part.subplots(1, len(panels), squeeze=False)[0], strict=True):
             panel(axes)
+            drawn.append(axes)
+    if legend and drawn:
+        _legend_above(figure, drawn)
     return figure
 
 
 def _rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
-    count = -(-len(group) // 3)
+    count = -(-len(group) // style.COLUMNS)
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
+
+
+def _legend_above(figure: Figure, drawn: Sequence[Axes]) -> None:
+    """One legend of what all panels show, in place of theirs."""
+    found: dict[str, Artist] = {}
+    for axes in drawn:
+        found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        if legend := axes.get_legend():
+            legend.remove()
+    columns = max(1, min(len(found), LINE // (8 + max(map(len, found)))))
+    figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=columns)

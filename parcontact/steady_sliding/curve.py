@@ -11,7 +11,7 @@ from .. import scene
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Slab
-from ..record import marker, steady_plot
+from ..record import marker
 from ..record.directory import Directory
 from .sliding import Point, SteadySliding
 
@@ -124,5 +124,7 @@ class _Table:
         self._file.close()
         if self._waves:
             self._waves.close()
-        picture = steady_plot.plot(self.path)
+        from ..record import plots  # matplotlib is slow to import, and for pictures only
+
+        picture = plots.draw_steady(self.path)
         self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from ...job import Cylinder, Elastic, Job, Sphere
 from ...parallel.slab import Array
 from ...theory import hertz
-from .run import Fields, Panel, Run, scaled, size_of
+from . import style, units
+from .run import Fields, Panel, Run
 
 INSTANTS = 5  # at most so many lines in one panel
 
@@ -32,20 +33,20 @@ def _chosen(run: Run, fields: Fields) -> list[tuple[int, str]]:
         time = fields.file["t"][index]
         at = np.flatnonzero(run.column("step") == fields.steps[index])
         value, unit = (time, "s") if run.lasts else (float(load[at[0]]) if at.size else np.nan, unit)
-        label, (shown,) = scaled(unit, np.array([value]))
-        found.append((index, f"{shown[0]:.3g} {label}"))
+        found.append((index, units.text(value, unit)))
     return found
 
 
 def _draw_curves(axes: Axes, curves: Sequence[Curve]) -> tuple[float, float]:
     """Draw pressures on lines; returns the units of length [m] and pressure [Pa]."""
-    length, distances = scaled("m", *(curve.along for curve in curves))
-    unit, pressures = scaled("Pa", *(curve.pressure for curve in curves))
+    length, distances = units.scaled("m", *(curve.along for curve in curves))
+    unit, pressures = units.scaled("Pa", *(curve.pressure for curve in curves))
     for number, (curve, x, p) in enumerate(zip(curves, distances, pressures, strict=True)):
         shade = 0.85 * number / (len(curves) - 1) if len(curves) > 1 else 0.45
-        axes.plot(x, p, color=colormaps["plasma"](shade), label=curve.name)
+        axes.plot(x, p, color=colormaps[style.SEQUENCE](shade), label=curve.name)
     axes.set(xlabel=f"[{length}]", ylabel=f"pressure [{unit}]")
-    return size_of(length, "m"), size_of(unit, "Pa")
+    axes.locator_params(nbins=5)
+    return units.size_of(length, "m"), units.size_of(unit, "Pa")
 
 
 def strips(run: Run, fields: Fields) -> Panel:
@@ -71,7 +72,7 @@ def profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
     curves = []
     for index, name in _chosen(run, fields):
-        moved = run.timeline[int(fields.steps[index])].position
+        moved = run.moved(int(fields.steps[index]))
         x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
         line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
         curves.append(Curve(name, y if across else x, line))

@@ -6,11 +6,12 @@ import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
+from matplotlib.ticker import MaxNLocator
 
 from ...job import Cylinder, Sphere
 from ...parallel.slab import Array
-from . import lines
-from .run import Fields, Panel, Run, scaled
+from . import lines, units
+from .run import Fields, Panel, Run
 
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
 
@@ -25,7 +26,8 @@ def maps(run: Run) -> list[Panel]:
 
 
 def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
-    pressure, gap, displacement = (fields.last(name) for name in ("pressure", "gap", "displacement"))
+    names = ("pressure", "gap", "displacement", "height")
+    pressure, gap, displacement, height = (fields.last(name) for name in names)
     if not fields.saved:
         return
     if min(fields.x.size, fields.y.size) <= STRIP:
@@ -36,16 +38,17 @@ def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
     if pressure is not None and len(run.job.surface) == 1 and rounds:
         yield lines.profiles(run, fields, rounds[0])
     time = float(fields.file["t"][fields.saved[-1]])
-    unit, (shown,) = scaled("s", np.array([time]))
-    when = f" at {shown[0]:.4g} {unit}" if run.lasts else ""
+    when = f" at {units.text(time, 's', 4)}" if run.lasts else ""
     window = _window(pressure)
     if pressure is not None:
         yield _map(fields, np.where(pressure > 0.0, pressure, np.nan), "pressure", "Pa", when, window)
     if gap is not None:
         open_ = gap if pressure is None else np.where(pressure > 0.0, np.nan, gap)
-        yield _map(fields, open_, "gap", "m", f"{when}; contact black", window, "Blues_r", "k")
+        yield _map(fields, open_, "gap", "m", f"{when}\n(contact black)", window, "Blues_r", "k")
     elif displacement is not None:
         yield _map(fields, displacement, "displacement", "m", when, window, "viridis")
+    if height is not None:
+        yield _map(fields, height, "height", "m", f"{when}\n(up is into the body)", window, "cividis")
 
 
 def _window(pressure: Array | None) -> tuple[slice, slice]:
@@ -73,29 +76,36 @@ def _map(
     blank: str = "0.92",
 ) -> Panel:
     x, y = fields.x, fields.y
-    label, (shown,) = scaled(unit, values)
-    length, (right, top) = scaled("m", np.append(x, 2 * x[-1] - x[-2]), np.append(y, 2 * y[-1] - y[-2]))
+    label, (shown,) = units.scaled(unit, values)
+    length, (right, top) = units.scaled("m", edges(x), edges(y))
 
     def draw(axes: Axes) -> None:
         axes.set_facecolor(blank)
         axes.grid(False)
         part = shown[window]
         columns, lines = slice(window[1].start, _edge(window[1])), slice(window[0].start, _edge(window[0]))
-        lowest, highest = _range(part)
+        lowest, highest = colour_range(part)
         colored = Normalize(lowest, highest)
         mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=colors, norm=colored, rasterized=True)
         axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=name + when, aspect="equal")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
         beyond = "max" if np.nanmax(part, initial=-np.inf) > highest else "neither"
-        axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]", extend=beyond)
+        axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]", extend=beyond, shrink=0.9)
 
     return draw
+
+
+def edges(points: Array) -> Array:
+    """Of cells that begin at points of equal spacing."""
+    return np.append(points, 2 * points[-1] - points[-2])
 
 
 def _edge(part: slice) -> int | None:
     return None if part.stop is None else part.stop + 1
 
 
-def _range(values: Array) -> tuple[float, float]:
+def colour_range(values: Array) -> tuple[float, float]:
     """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others."""
     finite = values[np.isfinite(values)]
     if not finite.size:

@@ -1,4 +1,4 @@
-"""What a picture of a run is drawn from, and in which units."""
+"""What a picture of a run is drawn from."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -16,15 +16,17 @@ from ...job.timeline import Timeline
 from ...parallel.slab import Array
 from .. import hdf5, measures
 
-PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 Panel = Callable[[Axes], None]
+RESOLVED = "job.resolved.yaml"
+SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady")  # versions differ in other sections
+STEADY_RESOLVED = "steady.resolved.yaml"
 
 
 class Run:
     """A run's job and rows. The rows before the first load of a body at rest are left out: nothing has happened yet."""
 
     def __init__(self, directory: Path) -> None:
-        self.directory, self.job = directory, _job(directory / "job.resolved.yaml")
+        self.directory, self.job = directory, _job(directory / RESOLVED)
         self._columns = {name: np.array(values) for name, values in measures.read(directory / "measures.csv").items()}
         if not self._columns["step"].size:
             raise InputError(f"{directory} holds no step yet")
@@ -48,16 +50,35 @@ class Run:
         pressure = self.column("pressure")
         return ("force", "N", pressure * self.area) if self.free else ("pressure", "Pa", pressure)
 
+    @property
+    def signed(self) -> Array:
+        """Friction along x, positive where it opposes motion along +x: `friction_x`."""
+        x, y = self.column("force_x"), self.column("force_y")
+        force = np.hypot(x, y)
+        return -self.column("friction") * np.divide(x, force, out=np.zeros_like(force), where=force > 0.0)
+
+    @property
+    def backwards(self) -> bool:
+        """Whether the surface moves along x only, and towards -x in a stage: the magnitude of friction has a cusp."""
+        velocities = [stage.velocity for stage in self.job.history]
+        return any(x < 0.0 for x, _ in velocities) and not any(y for _, y in velocities)
+
     @cached_property
     def timeline(self) -> Timeline:
         """What the job says about each step."""
         last = float(self._columns["time"][-1])
-        return self.job.timeline(last)
+        return Timeline(self.job.history, self.job.grid, last, self.job.initial.pressure)
 
     @property
     def stages(self) -> NDArray[np.int64]:
-        """The stage of every row; the initial state belongs to the first."""
-        return np.array([self.timeline.span(int(n)).index if n else 0 for n in self.column("step")])
+        """The stage of every row, -1 where the job knows of none; the initial state belongs to the first."""
+        steps = self.column("step").astype(int).tolist()
+        known = len(self.timeline)
+        return np.array([self.timeline.span(max(n, 1)).index if max(n, 1) <= known else -1 for n in steps])
+
+    def moved(self, step: int) -> tuple[float, float]:
+        """Where the surface is after a step [m]; where it began if the job does not know of that step."""
+        return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
     @property
     def lasts(self) -> bool:
@@ -88,24 +109,21 @@ class Fields:
         return field if field is not None and np.isfinite(field).all() else None
 
 
+def box(directory: Path) -> float:
+    """The area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
+    for name in (STEADY_RESOLVED, RESOLVED):
+        if (directory / name).is_file():
+            grid = _job(directory / name).grid
+            return grid.lx * grid.ly if grid.boundary == "free" else 0.0
+    return 0.0
+
+
 def _job(path: Path) -> Job:
-    """The resolved job; its files of heights need not be there any more."""
+    """What pictures show of the resolved job; its files of heights need not be there any more."""
     try:
         data = yamltext.parse(path.read_bytes(), str(path)).data
+        data = {name: data[name] for name in SHOWN if name in data}
         data["surface"] = [{"shape": "flat"} if shape["shape"] == "file" else shape for shape in data["surface"]]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:
         raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
-
-
-def scaled(unit: str, *series: Array) -> tuple[str, list[Array]]:
-    """The unit with the prefix that suits the largest value, and the series in it."""
-    largest = max((float(np.abs(values[np.isfinite(values)]).max(initial=0.0)) for values in series), default=0.0)
-    power = 3 * int(np.floor((np.log10(largest) + 1e-9) / 3)) if largest > 0.0 else 0
-    power = min(max(power, min(PREFIXES)), max(PREFIXES))
-    return PREFIXES[power] + unit, [values / 10.0**power for values in series]
-
-
-def size_of(label: str, unit: str) -> float:
-    """What a unit with its prefix stands for."""
-    return 10.0 ** next(power for power, prefix in PREFIXES.items() if prefix + unit == label)
