@@ -36,20 +36,6 @@ class Instant(NamedTuple):
     contact_area: float
 
 
-def run(job: Job, everyone: Slab, alone: Slab, gamma: float, waves: WavesOf, quiet: bool) -> None:
-    """Write theory.csv into the output directory of the job, on root, of which `alone` is the slab; collective."""
-    problem = ""
-    if everyone.root:
-        try:
-            path = write(job, predict(job, alone, gamma, waves))
-            if not quiet:
-                print(f"Persson's theory, gamma {gamma:g}, {waves} of waves: {path}", flush=True)
-        except InputError as error:
-            problem = str(error)
-    if problem := everyone.agree(problem):
-        raise InputError(problem)
-
-
 def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Instant]:
     """The rows for a job, the initial state first; `slab` must be that of one rank.
 

@@ -18,6 +18,7 @@
 # In a job array %a stands for the index, and each of its jobs is a chain of its own:
 #
 #   JOB="job.yaml --set surface.0.seed=%a --out out/seed-%a" qsub -J 1-8 -v JOB pbs.sh     (with Torque, -t 1-8)
+#   JOB="job.yaml --case %a" qsub -J 0-8 -v JOB pbs.sh        (the nine cases of a job with a sweep)
 #
 # To end the chain, delete the job: qdel <id>.
 

@@ -19,6 +19,7 @@
 # In a job array %a stands for the index, and each of its jobs is a chain of its own:
 #
 #   sbatch --array=1-8 slurm.sh job.yaml --set surface.0.seed=%a --out out/seed-%a
+#   sbatch --array=0-8 slurm.sh job.yaml --case %a            (the nine cases of a job with a sweep)
 #
 # The end of a job is SLURM_JOB_END_TIME, which parcontact knows. To end the chain, cancel the job: scancel <id>.
 

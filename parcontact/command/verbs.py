@@ -9,37 +9,57 @@ from . import ranks
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from ..job import Job
+    from ..job import Case, Job
     from ..parallel.mpi import MPI
+    from ..parallel.slab import Slab
+
+    Act = Callable[[Job, Slab], int]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: stopped early, run again
 
 
 def run(options: argparse.Namespace) -> int:
     world = ranks.start()
-    job = _load(options, world)
-    if not job.history:
-        return _curve(options, job, world)
-    from ..parallel.slab import Slab
     from ..run import runner
 
     chosen = runner.Options(options.quiet, options.restart, options.until, options.wall)
-    return runner.run(job, Slab(world, *job.grid.points), chosen)
+
+    def act(job: Job, slab: Slab) -> int:
+        return runner.run(job, slab, chosen) if job.history else _curve(options, job, slab)
+
+    return _each_case(options, world, act)
 
 
 def steady(options: argparse.Namespace) -> int:
-    world = ranks.start()
-    return _curve(options, _load(options, world), world)
+    return _each_case(options, ranks.start(), lambda job, slab: _curve(options, job, slab))
 
 
-def _curve(options: argparse.Namespace, job: Job, world: MPI.Intracomm) -> int:
+def _each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
+    """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective."""
     from ..parallel.slab import Slab
+    from ..run import sweep
+
+    cases, chosen = ranks.on_root(world, lambda: _cases(options))
+    if not cases[0].settings:
+        return act(cases[0].job, Slab(world, *cases[0].job.grid.points))
+    return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act, options.quiet, runs)
+
+
+def _cases(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:
+    """All cases of a job, and those that the command line is about."""
+    from .. import job as jobs
+
+    cases = jobs.load_cases(options.job, _overrides(options))
+    return cases, jobs.choose(cases, options.case)
+
+
+def _curve(options: argparse.Namespace, job: Job, slab: Slab) -> int:
     from ..steady_sliding import curve
 
     wanted = curve.request(job, getattr(options, "velocities", ()), getattr(options, "pressures", ()))
-    return curve.run(job, Slab(world, *job.grid.points), wanted, options.quiet)
+    return curve.run(job, slab, wanted, options.quiet)
 
 
 def check(options: argparse.Namespace) -> int:
@@ -47,12 +67,16 @@ def check(options: argparse.Namespace) -> int:
     if ranks.is_root():
         from .. import job as jobs
 
-        job = jobs.load(options.job, _overrides(options))
+        cases, chosen = _cases(options)
+        job = chosen[0].job
         print(jobs.describe(job))
         if job.included:
             print(f"\n{job.included}")
-        for warning in job.warnings:
+        for warning in dict.fromkeys(text for case in chosen for text in case.job.warnings):
             print(f"warning: {warning}")
+        if cases[0].settings:
+            print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
+            print("\n".join(map(str, chosen)))
     return DONE
 
 
@@ -68,6 +92,7 @@ def plan(options: argparse.Namespace) -> int:
     job = _load(options, world)
     counts = options.ranks or tuple(sorted({1, world.size, *({machine.cores()} if world.size == 1 else ())}))
     words = [options.job, *(word for change in options.set for word in ("--set", change))]
+    words += [] if options.case is None else ["--case", str(options.case)]
     wanted = making.Wanted(counts, words, options.seconds, options.cores, options.network)
     slab = Slab(world, *job.grid.points)
     if options.sample:
@@ -85,10 +110,16 @@ def theory(options: argparse.Namespace) -> int:
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
 
-    job = _load(options, world)
-    everyone, alone = (Slab(comm, *job.grid.points) for comm in (world, MPI.COMM_SELF))
-    prediction.run(job, everyone, alone, options.gamma, options.waves, options.quiet)
-    return DONE
+    def act(job: Job, slab: Slab) -> int:
+        alone = Slab(MPI.COMM_SELF, *job.grid.points)
+        path = ranks.on_root(
+            world, lambda: prediction.write(job, prediction.predict(job, alone, options.gamma, options.waves))
+        )
+        if slab.root and not options.quiet:
+            print(f"Persson's theory, gamma {options.gamma:g}, {options.waves} of waves: {path}", flush=True)
+        return DONE
+
+    return _each_case(options, world, act, runs=False)
 
 
 def fit(options: argparse.Namespace) -> int:
@@ -120,7 +151,7 @@ def study(options: argparse.Namespace) -> int:
     job, words = _load(options, world), _overrides(options)
 
     def make(changes: Sequence[str]) -> Job:
-        return ranks.on_root(world, lambda: jobs.load(options.job, [*words, *changes]))
+        return ranks.on_root(world, lambda: jobs.load(options.job, [*words, *changes], options.case))
 
     return runner.run(job, make, Slab(world, *job.grid.points), options.quiet)
 
@@ -164,7 +195,7 @@ def _load(options: argparse.Namespace, world: MPI.Intracomm) -> Job:
     """Root reads the job; the others get what it found; collective."""
     from .. import job as jobs
 
-    return ranks.on_root(world, lambda: jobs.load(options.job, _overrides(options)))
+    return ranks.on_root(world, lambda: jobs.load(options.job, _overrides(options), options.case))
 
 
 def _overrides(options: argparse.Namespace) -> list[str]:

@@ -158,6 +158,7 @@ def _job_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("job", help="job file (YAML)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
     parser.add_argument("--out", metavar="DIR", type=_directory, help="output directory")
+    parser.add_argument("--case", metavar="I", type=_natural, help="one case of the job's sweep, from 0 (default: all)")
 
 
 def _plot_arguments(parser: argparse.ArgumentParser) -> None:
@@ -193,6 +194,12 @@ def _seconds(text: str) -> float:
 def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"must be positive whole numbers, got {text!r}")
+    return int(text)
+
+
+def _natural(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number of zero or more, got {text!r}")
     return int(text)
 
 

@@ -1,14 +1,17 @@
 """A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
 
 from ..errors import JobError
-from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady, log_range
+from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady
 from .material import Dma, Elastic, PronyBranch, Zener, ZenerBranch
-from .model import Job, describe, load
+from .model import Job, describe
+from .reading import Case, choose, load, load_cases
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
 from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
+from .values import log_range
 
 __all__ = [
+    "Case",
     "Checkpoint",
     "Control",
     "Cylinder",
@@ -34,7 +37,9 @@ __all__ = [
     "Wave",
     "Zener",
     "ZenerBranch",
+    "choose",
     "describe",
     "load",
+    "load_cases",
     "log_range",
 ]

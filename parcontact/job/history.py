@@ -11,14 +11,13 @@ from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create
 
 from .fault import Fault, quote, refuse
 from .part import Part, Rule
-from .values import Flag, NonNegative, Positive, Real, Vector, listed
+from .values import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 
 Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
 Control = Literal["pressure", "force", "approach"]
 CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
 PRESSURE = "a pressure [Pa] of zero or more"
 FORCE = "a force [N] of zero or more"
-MOST_OF_A_RANGE = 100_000
 APPROACH = "a finite approach [m]"
 
 
@@ -159,27 +158,6 @@ class Initial(Part):
     pressure: Positive | None = Field(default=None, description="a positive pressure [Pa]")
 
     rules = (Rule(("state", "velocity", "pressure"), _steady_start),)
-
-
-def log_range(text: str) -> tuple[float, ...]:
-    """`a:b:n` as n positive numbers from a to b, equally spaced in their logarithm.
-
-    Raises ValueError with the rest of the sentence "... must be" for other text.
-    """
-    parts = text.split(":")
-    try:
-        a, b, n = float(parts[0]), float(parts[1]), int(parts[2])
-    except (ValueError, IndexError):
-        parts = []
-    if len(parts) != 3:
-        raise ValueError("numbers or a range first:last:count like 1e-3:1e2:31")
-    if not (0 < a < math.inf and 0 < b < math.inf):
-        raise ValueError("a range first:last:count with first and last positive")
-    if not 1 <= n <= MOST_OF_A_RANGE:
-        raise ValueError(f"a range first:last:count with a count from 1 to {MOST_OF_A_RANGE}")
-    if n == 1 and a != b:
-        raise ValueError("a range first:last:count with a count of at least 2, or first and last the same")
-    return (*(a * (b / a) ** (i / (n - 1)) for i in range(n - 1)), b)
 
 
 def _numbers(value: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from .fault import quote
 from .source import Key, Mistake, Place, Source, shorten
+from .sweep import SWEEP, Setting, Sweep, refuse_overrides, take
 from .yamltext import parse, read, read_with_content
 
 MATERIAL: Key = ("material",)
@@ -17,11 +18,23 @@ OURS = Path(__file__).parents[1] / "materials"  # compounds that come with the p
 
 
 class Override(NamedTuple):
-    """`key.path=value` from the command line."""
+    """`key.path=value` from the command line, or of a case of a sweep; `place` is that of the key."""
 
     path: Key
     source: Source
     place: Place
+
+    @property
+    def name(self) -> str:
+        return ".".join(map(str, self.path))
+
+
+class Reading(NamedTuple):
+    """What was read: the data of one job, or of one case, the file of its material, and its sweep if that is sound."""
+
+    source: Source
+    included: Included | None
+    sweep: Sweep | None
 
 
 class Included(NamedTuple):
@@ -34,13 +47,23 @@ class Included(NamedTuple):
         return f"material: included from {self.path} (SHA-256 {self.sha256})"
 
 
-def read_job(path: Path, overrides: tuple[str, ...]) -> tuple[Source, Included | None]:
-    """The source of a job with its overrides and its included material, and the file of that."""
+def read_job(path: Path, overrides: tuple[str, ...], case: int = 0) -> Reading:
+    """The source of a job with its overrides, the settings of a case if it has a sweep, and its included material."""
     source = read(path, str(path))
     if () in source.broken:
         source.data = None
     parsed = [_parse(text, source) for text in overrides]
-    wanted = [override for override in parsed if override is not None]
+    of_job = [override for override in parsed if override is not None]
+    for override in of_job:
+        if override.path[:1] == SWEEP:
+            _apply(source, override)
+    sweep = take(source)
+    wanted = [override for override in of_job if override.path[:1] != SWEEP]
+    if sweep is None:
+        source.broken.add(())
+    elif sweep:
+        refuse_overrides(sweep, [(override.name, override.place) for override in wanted], source)
+        wanted += [_of_case(setting) for setting in sweep.case(min(max(case, 0), len(sweep) - 1))]
     early = [override for override in wanted if override.path in (MATERIAL, INCLUDE)]
     before = tuple(_given(source))
     for override in early:
@@ -49,7 +72,12 @@ def read_job(path: Path, overrides: tuple[str, ...]) -> tuple[Source, Included |
     for override in wanted:
         if override not in early:
             _apply(source, override)
-    return source, included
+    return Reading(source, included, sweep)
+
+
+def _of_case(setting: Setting) -> Override:
+    path: Key = tuple(setting.name.split("."))
+    return Override(path, Source(setting.value, {(): setting.place}), setting.key_place)
 
 
 def _given(source: Source) -> dict[str, Any]:

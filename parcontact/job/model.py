@@ -1,36 +1,30 @@
-"""A job: what is simulated and how, read from a YAML file into frozen sections.
+"""A job: what is simulated and how, as frozen sections.
 
-`load` reads a job file and names every mistake in it with file, line and column; `Job.resolved` is the job as YAML with
-every default filled in; `describe` is a table of it to read. SI units everywhere. No MPI and no maps here.
+`Job.resolved` is the job as YAML with every default filled in; `describe` is a table of it to read. SI units
+everywhere. No MPI and no maps here.
 """
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, create_model, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from ..errors import JobError
 from . import advice, extension, limits, table
-from .fault import Fault, faults_of
+from .fault import Fault
 from .history import Initial, Stage, Steady
-from .loading import Included, read_job
+from .loading import Included
 from .material import Elastic, Material, Zener
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
-from .source import Key, Mistake, Source, shorten
 from .study import Study
 from .surface import Rough, Shape
 from .timeline import Timeline
 from .yamltext import dump
-
-MANY_MISTAKES = 40  # more are not shown one by one
-SHOWN_MISTAKES = 20  # of so many
 
 
 def _kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
@@ -141,6 +135,11 @@ class Job(Part):
         if isinstance(context, Context):
             self._path, self._included = context.path, context.included
 
+    @classmethod
+    def words(cls) -> tuple[str, ...]:
+        """The sections, and the sweep, which is gone once a case is read."""
+        return (*super().words(), "sweep")
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Job) and dict(self) == dict(other)
 
@@ -209,42 +208,6 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
     given = data.get(section, {})
     if isinstance(given, dict) and given.get(key) is None:
         data[section] = {**given, key: value}
-
-
-def load(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Job:
-    """Reads a job file; `overrides` are texts like `grid.points=512`. Raises JobError with every mistake."""
-    source, included = read_job(Path(path), tuple(overrides))
-    if () not in source.broken:
-        try:
-            job = Job.model_validate(source.data, context=Context(Path(path).absolute(), included))
-            if not source.mistakes:
-                return job
-        except ValidationError as error:
-            source.mistakes += _mistakes(source, error)
-    ordered = sorted(source.mistakes, key=lambda mistake: (mistake.place.origin != str(path), mistake.place))
-    raise JobError(_first(list(dict.fromkeys(map(str, ordered)))))
-
-
-def _first(mistakes: list[str]) -> list[str]:
-    """All mistakes, or the first of them and a count where they are more than anybody reads."""
-    if len(mistakes) <= MANY_MISTAKES:
-        return mistakes
-    return [*mistakes[:SHOWN_MISTAKES], f"... and {len(mistakes) - SHOWN_MISTAKES} more mistakes"]
-
-
-def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
-    """The faults that the sections found, at their places; not those about data that could not be read."""
-    untrusted = source.untrusted()
-    for fault in faults_of(error):
-        path = source.written(fault.path)
-        if path in untrusted or source.within_broken(path):
-            continue
-        place = source.key_place(path) if fault.at_key else source.place(path)
-        yield Mistake(place, f"{_name(path)} {fault.predicate}")
-
-
-def _name(path: Key) -> str:
-    return ".".join(shorten(str(step)) for step in path) or "the job"
 
 
 def describe(job: Job) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,8 @@ from .source import shorten
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
 MOST_SEED = 2**128 - 1
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
+
+MOST_OF_A_RANGE = 100_000
 
 
 def _whole(value: Any) -> Any:
@@ -55,6 +58,27 @@ def from_home(path: Path) -> Path:
         return path.expanduser()
     except RuntimeError:
         refuse(Fault(f"must be the name of a file, got {str(path)!r}: there is no such user"))
+
+
+def log_range(text: str) -> tuple[float, ...]:
+    """`a:b:n` as n positive numbers from a to b, equally spaced in their logarithm.
+
+    Raises ValueError with the rest of the sentence "... must be" for other text.
+    """
+    parts = text.split(":")
+    try:
+        a, b, n = float(parts[0]), float(parts[1]), int(parts[2])
+    except (ValueError, IndexError):
+        parts = []
+    if len(parts) != 3:
+        raise ValueError("numbers or a range first:last:count like 1e-3:1e2:31")
+    if not (0 < a < math.inf and 0 < b < math.inf):
+        raise ValueError("a range first:last:count with first and last positive")
+    if not 1 <= n <= MOST_OF_A_RANGE:
+        raise ValueError(f"a range first:last:count with a count from 1 to {MOST_OF_A_RANGE}")
+    if n == 1 and a != b:
+        raise ValueError("a range first:last:count with a count of at least 2, or first and last the same")
+    return (*(a * (b / a) ** (i / (n - 1)) for i in range(n - 1)), b)
 
 
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]

@@ -183,7 +183,7 @@ def test_an_include_is_searched_beside_the_job_only(tmp_path: Path) -> None:
     assert "must name a material file, got 'm' (looked for m.yaml and materials/m.yaml beside the job file" in mistake
     beside = tmp_path / "deep" / "materials" / "m.yaml"
     beside.write_bytes(b"abc: 1\n")
-    _, included = read_job(tmp_path / "deep" / "job.yaml", ())
+    included = read_job(tmp_path / "deep" / "job.yaml", ()).included
     assert included is not None
     assert included.path == beside
     # printf 'abc: 1\n' | sha256sum

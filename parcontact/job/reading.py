@@ -1,0 +1,135 @@
+"""From a job file to jobs: one, or the cases of a sweep; every mistake is named with file, line and column."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from ..errors import InputError, JobError
+from .fault import faults_of
+from .loading import read_job
+from .model import Job
+from .part import Context
+from .source import Key, Mistake, Source, shorten
+from .sweep import Sweep
+
+MANY_MISTAKES = 40  # more are not shown one by one
+SHOWN_MISTAKES = 20  # of so many
+CASES = "cases"  # where in the output directory of a job its cases have theirs
+
+
+class Case(NamedTuple):
+    """One case of a sweep: its number, what distinguishes it, and its job, with an output directory of its own.
+
+    The only case of a job without a sweep has no settings, and the output directory of the job.
+    """
+
+    number: int
+    settings: dict[str, Any]
+    job: Job
+
+    def __str__(self) -> str:
+        settings = ", ".join(f"{key} = {value}" for key, value in self.settings.items())
+        return f"case {self.number}: {settings}"
+
+
+def load(path: str | os.PathLike[str], overrides: Sequence[str] = (), case: int | None = None) -> Job:
+    """Reads a job file; `overrides` are texts like `grid.points=512`. Raises JobError with every mistake.
+
+    Of a job with a sweep it reads one `case`, and raises InputError if none is chosen or there is no such case.
+    """
+    if case is not None:
+        return choose(load_cases(path, overrides), case)[0].job
+    found, mistakes, sweep = _read(Path(path), overrides, 0)
+    if found is None:
+        raise JobError(_told(Path(path), mistakes))
+    if sweep:
+        sentence = f"sweep has {len(sweep)} cases, numbered from 0; choose one of them with --case"
+        raise JobError([str(Mistake(sweep.place, sentence))])
+    return found.job
+
+
+def load_cases(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> tuple[Case, ...]:
+    """Reads all cases of a job, one if it has no sweep; else as `load`. A mistake names the first case that has it."""
+    first, mistakes, sweep = _read(Path(path), overrides, 0)
+    if not sweep:
+        if first is None:
+            raise JobError(_told(Path(path), mistakes))
+        return (first,)
+    read = [(first, mistakes), *(_read(Path(path), overrides, index)[:2] for index in range(1, len(sweep)))]
+    common = set(mistakes).intersection(*(told for _, told in read))
+    found = {mistake: index for index, (_, told) in reversed(list(enumerate(read))) for mistake in told}
+    if found:
+        raise JobError(_told(Path(path), [_in_case(*one, sweep, one[0] in common) for one in found.items()]))
+    return tuple(case for case, _ in read if case)
+
+
+def choose(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
+    """All cases, or the one of a number; raises InputError if there is none."""
+    if number is None:
+        return cases
+    if not cases[0].settings:
+        raise InputError(f"--case {number}: the job has no sweep")
+    if not 0 <= number < len(cases):
+        raise InputError(f"--case {number}: the sweep has {len(cases)} cases, numbered from 0")
+    return cases[number : number + 1]
+
+
+def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistake:
+    """A mistake, with the case that has it unless all have it or it points at the sweep itself."""
+    settings = sweep.case(index)
+    if common or any(mistake.place in (one.place, one.key_place) for one in settings):
+        return mistake
+    return mistake._replace(sentence=f"{mistake.sentence} (in case {index}: {', '.join(map(str, settings))})")
+
+
+def _read(path: Path, overrides: Sequence[str], index: int) -> tuple[Case | None, list[Mistake], Sweep | None]:
+    """A case, or its mistakes; and the sweep that it belongs to, if that is sound."""
+    source, included, sweep = read_job(path, tuple(overrides), index)
+    if () not in source.broken:
+        try:
+            job = Job.model_validate(source.data, context=Context(path.absolute(), included))
+            if not source.mistakes:
+                return _case(job, index, sweep), [], sweep
+        except ValidationError as error:
+            source.mistakes += _mistakes(source, error)
+    return None, source.mistakes, sweep
+
+
+def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
+    if not sweep or index >= len(sweep):
+        return Case(index, {}, job)
+    output = job.output.model_copy(update={"directory": job.output.directory / CASES / f"{index:03d}"})
+    settings = {setting.name: setting.value for setting in sweep.case(index)}
+    return Case(index, settings, job.model_copy(update={"output": output}))
+
+
+def _told(path: Path, mistakes: list[Mistake]) -> list[str]:
+    ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != str(path), mistake.place))
+    return _first(list(dict.fromkeys(map(str, ordered))))
+
+
+def _first(mistakes: list[str]) -> list[str]:
+    """All mistakes, or the first of them and a count where they are more than anybody reads."""
+    if len(mistakes) <= MANY_MISTAKES:
+        return mistakes
+    return [*mistakes[:SHOWN_MISTAKES], f"... and {len(mistakes) - SHOWN_MISTAKES} more mistakes"]
+
+
+def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
+    """The faults that the sections found, at their places; not those about data that could not be read."""
+    untrusted = source.untrusted()
+    for fault in faults_of(error):
+        path = source.written(fault.path)
+        if path in untrusted or source.within_broken(path):
+            continue
+        place = source.key_place(path) if fault.at_key else source.place(path)
+        yield Mistake(place, f"{_name(path)} {fault.predicate}")
+
+
+def _name(path: Key) -> str:
+    return ".".join(shorten(str(step)) for step in path) or "the job"

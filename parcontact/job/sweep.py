@@ -1,0 +1,121 @@
+"""The `sweep` section: one job, many cases.
+
+A sweep is a list of mappings from keys of the job to lists of values. Keys within one mapping move together, mappings
+multiply: cases are numbered from 0, those of the last mapping the fastest.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from .fault import quote
+from .source import Key, Mistake, Place, Source, shorten
+from .values import log_range
+
+SWEEP: Key = ("sweep",)
+MAX_CASES = 1000
+FIXED = ("sweep", "output.directory")  # keys that are the same in all cases
+
+
+class Setting(NamedTuple):
+    """One value that one key has in some cases, and where both were written."""
+
+    name: str
+    value: Any
+    key_place: Place
+    place: Place
+
+    def __str__(self) -> str:
+        return f"{self.name} = {self.value}"
+
+
+Axis = list[tuple[Setting, ...]]  # the settings that each step of one mapping makes together
+
+
+class Sweep:
+    """The mappings of a sweep; none without one."""
+
+    def __init__(self, axes: list[Axis], place: Place) -> None:
+        self.axes, self.place = axes, place
+
+    def __len__(self) -> int:
+        """The number of cases; 0 if the job has no sweep."""
+        return math.prod(map(len, self.axes)) if self.axes else 0
+
+    def case(self, index: int) -> tuple[Setting, ...]:
+        """What distinguishes a case."""
+        moves = next(itertools.islice(itertools.product(*self.axes), index, None))
+        return tuple(itertools.chain(*moves))
+
+
+def take(source: Source) -> Sweep | None:
+    """Take the sweep out of a job; None if it has mistakes, which `source` then holds."""
+    data = source.data if isinstance(source.data, dict) else {}
+    section, place = data.pop("sweep", None), source.place(SWEEP)
+    if section is None:
+        return Sweep([], place)
+    mistakes = len(source.mistakes)
+    sweep = Sweep(list(_axes(section, source)), place)
+    if len(sweep) > MAX_CASES:
+        source.mistakes.append(Mistake(place, f"sweep has {len(sweep)} cases, and {MAX_CASES} is the most"))
+    return sweep if len(source.mistakes) == mistakes and not source.within_broken(SWEEP) else None
+
+
+def _axes(section: Any, source: Source) -> Iterator[Axis]:
+    seen: dict[str, Place] = {}
+    listed = isinstance(section, list)
+    for index, mapping in enumerate(section if listed else [section]):
+        path: Key = (*SWEEP, index) if listed else SWEEP
+        if not isinstance(mapping, dict) or not mapping:
+            what = "sweep must be a list of mappings from keys to lists of values"
+            source.mistakes.append(Mistake(source.place(path), f"{what}, got {quote(mapping)}"))
+            continue
+        columns = [_column(name, values, path, source, seen) for name, values in mapping.items()]
+        if all(columns) and len({len(column) for column in columns}) > 1:
+            counts = ", ".join(f"{len(column)} of {shorten(column[0].name)}" for column in columns)
+            sentence = f"keys of one mapping move together and need as many values each, got {counts}"
+            source.mistakes.append(Mistake(source.place(path), sentence))
+            continue
+        yield list(zip(*columns, strict=False))  # they are as long as each other, unless one has mistakes
+
+
+def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, Place]) -> list[Setting]:
+    """All values of one key; an empty list, and a mistake in `source`, if they are none."""
+    place, key_place = source.place((*path, name)), source.key_place((*path, name))
+    settings: list[Setting] = []
+    if any(name == fixed or name.startswith(f"{fixed}.") for fixed in FIXED):
+        source.mistakes.append(Mistake(key_place, f"{shorten(name)} cannot be swept"))
+    elif other := next((one for one in seen if _overlap(one, name)), ""):
+        sentence = f"{shorten(name)} is swept a second time, first as {shorten(other)} at {seen[other]}"
+        source.mistakes.append(Mistake(key_place, sentence))
+    elif not all(name.split(".")):
+        source.mistakes.append(Mistake(key_place, f"must be a key of the job like grid.points, got {quote(name)}"))
+    elif isinstance(values, list) and values:
+        places = [source.place((*path, name, index)) for index in range(len(values))]
+        settings = [Setting(name, value, key_place, at) for value, at in zip(values, places, strict=True)]
+    else:
+        try:
+            settings = [Setting(name, value, key_place, place) for value in log_range(str(values))]
+        except ValueError:
+            sentence = f"{shorten(name)} needs a list of values or a range first:last:count, got {quote(values)}"
+            source.mistakes.append(Mistake(place, sentence))
+    seen[name] = key_place
+    return settings
+
+
+def _overlap(one: str, other: str) -> bool:
+    """Whether one key is the other or within it."""
+    return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
+
+
+def refuse_overrides(sweep: Sweep, overrides: list[tuple[str, Place]], source: Source) -> None:
+    """A mistake for each override of a key that is swept."""
+    names = {setting.name for axis in sweep.axes for setting in axis[0]}
+    for name, place in overrides:
+        if found := next((swept for swept in names if _overlap(swept, name)), ""):
+            advice = f"change the sweep instead, like --set 'sweep=[{{{shorten(found)}: [...]}}]'"
+            sentence = f"{shorten(found)} is swept; {advice}"
+            source.mistakes.append(Mistake(place, sentence))

@@ -1,0 +1,68 @@
+"""What a slide comes to: its highest friction, its dynamic friction, and the contact area meanwhile.
+
+The slide of a history is its last stretch at one velocity that is not zero, over all stages that have it. After the
+paper (Sec. 3.1), mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its
+distance. That is not yet the friction of steady sliding, which may take a longer slide (`parcontact steady` finds it).
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import takewhile
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..job import Stage
+
+DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
+ROUND_OFF = 1e-9  # relative: instants this close are the same
+
+
+class Slide(NamedTuple):
+    """`mu_max` and the distance [m] from the start of the slide to it; means over the last three quarters of it."""
+
+    mu_max: float
+    mu_max_distance: float
+    mu_dyn: float
+    contact_area: float
+
+
+def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC) -> float:
+    """The mean of values over the last share of a distance, by trapezoids; both of shape (n,), distances ascending."""
+    x, y = np.asarray(distance, float), np.asarray(values, float)
+    start = x[-1] - share * (x[-1] - x[0])
+    inside = x > start
+    x, y = np.append(start, x[inside]), np.append(np.interp(start, x, y), y[inside])
+    return float(np.trapezoid(y, x) / (x[-1] - x[0]))
+
+
+def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Slide | None:
+    """The slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows so far.
+
+    None where nothing slides, or has not slid yet.
+    """
+    during = _during(history, np.asarray(columns["time"], float))
+    distance, friction, area = (np.asarray(columns[name], float)[during] for name in _COLUMNS)
+    if distance.size < 2 or distance[-1] == distance[0]:
+        return None
+    start = distance[0]
+    highest = int(np.argmax(friction[1:])) + 1
+    means = mean_over_end(distance, friction), mean_over_end(distance, area)
+    return Slide(float(friction[highest]), float(distance[highest] - start), *means)
+
+
+_COLUMNS = ("distance", "friction", "contact_area")
+
+
+def _during(history: Sequence[Stage], time: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The rows of the slide: the last one before it begins, and those to its end."""
+    ends = np.cumsum([0.0, *(stage.seconds for stage in history)])
+    sliding = [index for index, stage in enumerate(history) if any(stage.velocity) and stage.seconds]
+    if not sliding:
+        return np.zeros(0, np.intp)
+    last = sliding[-1]
+    same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
+    start, end = ends[min(same)], ends[last + 1]
+    round_off = ROUND_OFF * (end - start)
+    before = np.flatnonzero(time <= start + round_off)[-1:]
+    return np.append(before, np.flatnonzero((time > start + round_off) & (time <= end + round_off)))

@@ -1,0 +1,126 @@
+"""sweep.csv: what the cases of a sweep have come to, a row each; sweep_mean.csv: their means over seeds."""
+
+import csv
+import fcntl
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from io import StringIO
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Any
+
+from ..job import Case
+from . import files, measures, slide
+
+RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
+COLUMNS = ("state", *RESULTS, "residual", "error_friction", "error_area", "seconds", *(f"theory_{n}" for n in RESULTS))
+SEED = "seed"  # the last word of keys over whose values means are taken
+FAILURE = ".failure"  # why a case has failed
+
+
+def write(directory: Path, cases: Sequence[Case]) -> None:
+    """Both tables in the directory of a sweep, from what its cases have left in theirs; root only.
+
+    Several programs, each with a case, may do so at a time.
+    """
+    with _alone(directory):
+        rows = [_row(case) for case in cases]
+        keys = list(cases[0].settings)
+        _save(directory / "sweep.csv", ["case", *keys, *COLUMNS], rows)
+        if any(key.split(".")[-1] == SEED for key in keys):
+            _save(directory / "sweep_mean.csv", *_means(rows, keys))
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """The rows of a table, numbers as such, an empty field as nan."""
+    with path.open(newline="") as file:
+        return [{key: _number(text) for key, text in row.items()} for row in csv.DictReader(file)]
+
+
+def fail(case: Case, reason: str) -> None:
+    """Leave in the directory of a case why it has failed, or that it has not; root only."""
+    path = case.job.output.directory / FAILURE
+    with suppress(OSError):
+        if reason:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{reason}\n")
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _row(case: Case) -> dict[str, Any]:
+    directory = case.job.output.directory
+    row: dict[str, Any] = {"case": case.number, **case.settings, "state": _state(case)}
+    for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
+        columns = measures.read(directory / name) if (directory / name).is_file() else {"time": []}
+        if columns["time"]:
+            found = slide.measure(case.job.history, columns)
+            row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
+            row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
+        if columns["time"] and not prefix:
+            row["seconds"] = math.fsum(columns["seconds"])
+            row |= {
+                name: max(columns[name]) for name in ("residual", "error_friction", "error_area") if name in columns
+            }
+    return row
+
+
+def _state(case: Case) -> str:
+    """done | failed | begun | -"""
+    directory = case.job.output.directory
+    if (directory / FAILURE).is_file():
+        return "failed"
+    table = directory / ("measures.csv" if case.job.history else "steady.csv")
+    if not table.is_file():
+        return "-"
+    columns = measures.read(table)
+    if not case.job.history:
+        return "done"
+    return "done" if columns["step"] and columns["step"][-1] >= len(case.job.timeline()) else "begun"
+
+
+def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:
+    """Mean, standard deviation of a single case and number over the cases that differ by their seeds only."""
+    kept = [key for key in keys if key.split(".")[-1] != SEED]
+    names = [name for name in COLUMNS if name in RESULTS or name.startswith("theory_")]
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault(repr([row[key] for key in kept]), []).append(row)
+    table = []
+    for group in groups.values():
+        out = {key: group[0][key] for key in kept} | {"number": sum(row["state"] == "done" for row in group)}
+        for name in names:
+            values = [row[name] for row in group if row["state"] == "done" and name in row]
+            if values:
+                out |= {f"{name}_mean": fmean(values), f"{name}_std": stdev(values) if len(values) > 1 else ""}
+        table.append(out)
+    return [*kept, "number", *(f"{name}_{what}" for name in names for what in ("mean", "std"))], table
+
+
+def _save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+    text = StringIO()
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({key: _text(value) for key, value in row.items()} for row in rows)
+    files.write(path, text.getvalue())
+
+
+def _text(value: Any) -> Any:
+    return ("" if value != value else repr(value)) if isinstance(value, float) else value
+
+
+def _number(text: str) -> Any:
+    with suppress(ValueError):
+        return float(text or "nan")
+    return text
+
+
+@contextmanager
+def _alone(directory: Path) -> Iterator[None]:
+    """One at a time, where the file system knows locks: the last one to write has seen what all others left."""
+    directory.mkdir(parents=True, exist_ok=True)
+    with (directory / ".sweep.lock").open("w") as file:
+        with suppress(OSError):
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield

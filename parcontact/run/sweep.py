@@ -1,0 +1,63 @@
+"""The cases of a sweep, one after the other; those that have finished are passed over."""
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from ..errors import InputError, RunError
+from ..job import Case, Job
+from ..parallel.slab import Slab
+from ..record import sweep_table
+from .runner import AGAIN, DONE
+
+FAILED = 1
+STOP = "stop"  # a file of this name in the directory of the sweep ends it after the case that runs
+
+
+def run(
+    cases: Sequence[Case],
+    chosen: Sequence[Case],
+    slab_of: Callable[[Job], Slab],
+    act: Callable[[Job, Slab], int],
+    quiet: bool = False,
+    runs: bool = True,
+) -> int:
+    """Do `act` with each of the chosen cases, and collect what all have come to; collective. Returns the exit code.
+
+    A case that fails does not stop the others: the code is 1 in the end. One that stops early with a checkpoint stops
+    the sweep, with its code: the same command goes on with it. Unless `act` runs the case, its failure is not noted.
+    """
+    directory, code = cases[0].job.output.directory.parent.parent, DONE
+    for case in chosen:
+        slab = slab_of(case.job)
+        if slab.agree(_stopped(directory) if slab.root else False):
+            return AGAIN
+        if slab.root and not quiet:
+            print(f"{case} (of {len(cases)})", flush=True)
+        ended = _attempt(case, slab, act, runs)
+        if slab.root:
+            sweep_table.write(directory, cases)
+        if ended == AGAIN:
+            return AGAIN
+        code = max(code, ended)
+    return code
+
+
+def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool) -> int:
+    reason = ""
+    try:
+        code = act(case.job, slab)
+    except (InputError, RunError) as error:
+        code, reason = FAILED, str(error)
+    if slab.root and runs:
+        sweep_table.fail(case, reason or ("some points have failed" if code == FAILED else ""))
+    if slab.root and reason:
+        print(f"parcontact: case {case.number}: {reason}", file=sys.stderr, flush=True)
+    return code
+
+
+def _stopped(directory: Path) -> bool:
+    file = directory / STOP
+    found = file.exists()
+    file.unlink(missing_ok=True)
+    return found

@@ -1,0 +1,70 @@
+"""Highest and dynamic friction of a slide, from made-up rows."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from parcontact.job import Stage
+from parcontact.record.slide import mean_over_end, measure
+
+REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
+CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}
+SETTLE = {"pressure": 1.0, "velocity": 2.0, "distance": 3.0, "cells_per_step": 1}
+SLOW = {**CLIMB, "velocity": 0.5}
+BACK = {**CLIMB, "velocity": -2.0}
+
+
+def stages(*data: dict[str, Any]) -> list[Stage]:
+    return [Stage.model_validate(one) for one in data]
+
+
+def rows(*rows: tuple[float, float, float]) -> dict[str, list[float]]:
+    """Time, distance, friction; the area is one tenth of friction."""
+    time, distance, friction = (list(column) for column in zip(*rows, strict=True))
+    area = [value / 10 for value in friction]
+    return {"time": time, "distance": distance, "friction": friction, "contact_area": area}
+
+
+def test_mean_over_the_last_share() -> None:
+    """Of a line over uneven steps, the value in the middle of the share; what was before does not matter."""
+    x = np.array([1.0, 1.1, 1.7, 2.9, 3.0, 5.0])
+    assert mean_over_end(x, 2.0 * x) == pytest.approx(2.0 * 3.5, rel=1e-14)
+    assert mean_over_end(x, np.where(x < 2.0, 9.0, 1.0), 0.25) == pytest.approx(1.0, rel=1e-14)
+
+
+def test_all_stages_at_one_velocity_are_one_slide() -> None:
+    """From the last row before it; what friction was before, higher or not, is not of the slide."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
+    found = measure(stages(REST, CLIMB, SETTLE), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_max_distance) == (4.0, 1.0)
+    assert found.mu_dyn == pytest.approx((3.0 * 1 + 2.0 * 2) / 3, rel=1e-14)  # over the last 3 of 4 m
+    assert found.contact_area == pytest.approx(found.mu_dyn / 10, rel=1e-14)
+
+
+@pytest.mark.parametrize("before", [SLOW, BACK])
+def test_another_velocity_before_is_another_slide(before: dict[str, Any]) -> None:
+    table = rows((0, 0, 9), (0.5, 1, 8), (0.6, 1.2, 3), (1.0, 2.0, 3))
+    found = measure(stages(before, CLIMB), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_max_distance, found.mu_dyn) == (3.0, pytest.approx(0.2), pytest.approx(3.0))
+
+
+def test_what_comes_after_the_slide_is_not_of_it() -> None:
+    table = rows((0, 0, 2), (0.25, 0.5, 2), (0.5, 1, 2), (1.0, 1, 5), (1.5, 1, 5))
+    found = measure(stages(CLIMB, REST), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_dyn) == (2.0, pytest.approx(2.0))
+
+
+@pytest.mark.parametrize(
+    ("history", "table"),
+    [
+        ([REST], rows((0, 0, 1), (1, 0, 1))),
+        ([REST, CLIMB], rows((0, 0, 1), (1, 0, 1))),  # it has not come so far
+        ([CLIMB], rows((0, 0, 1))),
+    ],
+)
+def test_no_slide(history: list[dict[str, Any]], table: dict[str, list[float]]) -> None:
+    assert measure(stages(*history), table) is None

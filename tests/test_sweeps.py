@@ -1,0 +1,123 @@
+"""Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import RunParcontact
+from mpi4py import MPI
+
+from parcontact.errors import RunError
+from parcontact.job import Case, Job, load_cases
+from parcontact.parallel.slab import Slab
+from parcontact.record import sweep_table
+from parcontact.run import sweep
+
+JOB = """\
+grid: {points: 34, size: 1.0e-3}
+surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 2.4e-4, rms_slope: 0.01, seed: 1}
+material: {model: zener, modulus_inf: 0.275e+6, branches: [{modulus: 2.475e+6, relaxation_time: 1.0e-3}]}
+history:
+  - {pressure: 1.0e+5, duration: 1.0e-3, time_step: 5.0e-4}
+  - {pressure: 1.0e+5, velocity: 0.1, distance: 5.0e-4, cells_per_step: 1}
+sweep:
+  - {history.1.velocity: [0.01, 0.1]}
+  - {surface.seed: [1, 2, 3]}
+"""
+
+
+@pytest.fixture
+def cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Case, ...]:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(JOB)
+    return load_cases("job.yaml")
+
+
+def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> list[dict[str, str]]:
+    with (directory / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def go(cases: tuple[Case, ...], act: Callable[[Job, Slab], int]) -> int:
+    return sweep.run(cases, cases, lambda job: Slab(MPI.COMM_SELF, *job.grid.points), act, quiet=True)
+
+
+def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, list[int]]:
+    """The code of a sweep whose cases end with these codes (else 0), and the seeds of the cases that were begun."""
+    begun = []
+
+    def act(job: Job, slab: Slab) -> int:
+        begun.append(job.surface[0].seed)  # type: ignore[union-attr]
+        if (code := codes.get(len(begun) - 1, 0)) == 1:
+            raise RunError("the third law does not hold")
+        return code
+
+    return go(cases, act), begun
+
+
+def test_a_case_that_fails_does_not_stop_the_others(
+    cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert seeds_done(cases, {1: 1}) == (1, [1, 2, 3, 1, 2, 3])
+    assert capsys.readouterr().err == "parcontact: case 1: the third law does not hold\n"
+    assert [row["state"] for row in table()] == ["-", "failed", "-", "-", "-", "-"]
+    assert seeds_done(cases, {})[0] == 0
+    assert [row["state"] for row in table()] == ["-"] * 6
+
+
+def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> None:
+    assert seeds_done(cases, {2: 3}) == (3, [1, 2, 3])
+
+
+def test_a_stop_file_ends_the_sweep_between_cases(cases: tuple[Case, ...]) -> None:
+    Path("out/job").mkdir(parents=True)
+    Path("out/job/stop").touch()
+    assert seeds_done(cases, {}) == (3, [])
+    assert not Path("out/job/stop").exists()
+
+
+def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """Some cases one by one, as a job array has them, then the rest by running the whole; means are over seeds."""
+    (tmp_path / "job.yaml").write_text(JOB)
+    assert run_parcontact(["job.yaml", "--case", "4", "--quiet"], ranks=0).returncode == 0
+    here = tmp_path / "out" / "job"
+    assert [row["state"] for row in table(directory=here)] == ["-", "-", "-", "-", "done", "-"]
+    before = (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns
+    done = run_parcontact(["job.yaml"], ranks=2)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "case 5: history.1.velocity = 0.1, surface.seed = 3 (of 6)" in done.stdout
+    assert "out/job/cases/004: finished before" in done.stdout
+    assert (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns == before
+    rows, means = table(directory=here), table("sweep_mean.csv", here)
+    assert [row["state"] for row in rows] == ["done"] * 6
+    assert [row["history.1.velocity"] for row in rows] == ["0.01"] * 3 + ["0.1"] * 3
+    assert [row["number"] for row in means] == ["3", "3"]
+    for index, mean in enumerate(means):
+        values = [float(row["mu_dyn"]) for row in rows[3 * index : 3 * index + 3]]
+        assert float(mean["mu_dyn_mean"]) == pytest.approx(sum(values) / 3, rel=1e-12)
+        spread = sum((value - sum(values) / 3) ** 2 for value in values) / 2
+        assert float(mean["mu_dyn_std"]) == pytest.approx(spread**0.5, rel=1e-9)
+        assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
+
+
+def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:
+    for case in cases[:2]:
+        directory = case.job.output.directory
+        directory.mkdir(parents=True)
+        text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e5,0.0,0.1\n0.001,0.0,1e5,0.0,0.2\n"
+        (directory / "theory.csv").write_text(f"{text}0.051,0.0005,1e5,0.02,0.3\n")
+    sweep_table.write(Path("out/job"), cases)
+    assert [row["theory_mu_max"] for row in table()] == ["0.02", "0.02", "", "", "", ""]
+    assert [row["mu_max"] for row in table()] == [""] * 6
+
+
+@pytest.mark.parametrize("words", [["check"], ["run"]])
+def test_nothing_runs_with_a_mistake_in_any_case(
+    run_parcontact: RunParcontact, tmp_path: Path, words: list[str]
+) -> None:
+    (tmp_path / "job.yaml").write_text(JOB.replace("[1, 2, 3]", "[1, 2, -3]"))
+    done = run_parcontact([*words, "job.yaml", "--case", "0"], ranks=0)
+    assert done.returncode == 2
+    assert done.stderr == "job.yaml:9:27: surface.seed must be a whole number of zero or more, got -3\n"
+    assert not (tmp_path / "out").exists()
