@@ -145,8 +145,8 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
 def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
     """A solver for the body of a frame on another grid, for a retry; collective.
 
-    Its transforms are not measured: which plans are the fastest may turn out otherwise after a restart, and with other
-    plans other last digits.
+    Its transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give other
+    last digits.
     """
     return _solver(replace(base, slab=slab, fft=FFT(slab, dtype=base.dtype, measured=False)), tolerance)
 

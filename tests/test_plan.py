@@ -1,5 +1,7 @@
 """The plan of a job: memory to the byte, steps that stand for others, scaling; counts are checked, never times."""
 
+import re
+import time
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -9,12 +11,15 @@ import pytest
 from marching import begun, marched
 from mpi4py import MPI
 
-from parcontact import __main__
+from parcontact import __main__, scene
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.plan import elsewhere, machine, memory, trial
+from parcontact.plan import machine, memory, other_ranks, report, trial
+from parcontact.plan.planning import only_steady_states
+from parcontact.plan.report import Costs
 from parcontact.plan.sample import Sample, Stage, chosen, sample
 from parcontact.plan.scaling import Machine, Scaling
+from parcontact.steady_sliding.sliding import SteadySliding
 
 Json = dict[str, Any]
 ROUGH: Json = {
@@ -168,8 +173,8 @@ def test_a_sample_on_some_ranks_is_gone_by_there(tmp_path: Path) -> None:
     planned = job()
     stages = [(Stage(1, 1, 1.0, {"seconds": seconds, "operator": 10.0}),) for seconds in (1.0, 0.7)]
     one, two = (Sample(planned, 1 + n, 0.5, 1.0, 2.0, 1000, each) for n, each in enumerate(stages))
-    elsewhere.save(tmp_path / "sample", two)
-    again = elsewhere.load(tmp_path / "sample", planned, 2.5)
+    other_ranks.save(tmp_path / "sample", two)
+    again = other_ranks.load(tmp_path / "sample", planned, 2.5)
     assert again == two
     both = Scaling.of(planned, [one, again], MACHINE)
     assert both.step(1) == pytest.approx(1.0)
@@ -221,8 +226,8 @@ def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> No
 
 def test_what_cannot_be_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No mpirun, no sample; a place that cannot be written to, a guess."""
-    monkeypatch.setattr(elsewhere, "MPIRUN", tmp_path / "absent")
-    assert list(elsewhere.samples(job(), ["job.yaml"], [2], 1.0)) == []
+    monkeypatch.setattr(other_ranks, "MPIRUN", tmp_path / "absent")
+    assert list(other_ranks.samples(job(), ["job.yaml"], [2], 1.0)) == []
     assert machine.write_rate(Path("/proc/out")) == machine.SLOW_WRITE
     assert machine.write_rate(tmp_path / "not" / "yet") > 0.0
     assert list(tmp_path.iterdir()) == []
@@ -232,3 +237,93 @@ def test_too_large_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no memory for any grid, nothing is tried."""
     monkeypatch.setattr(trial, "_free", lambda: 1000)
     assert trial.grid_for(job(), 1, 10.0) is None
+
+
+# -- a busy machine ----------------------------------------------------------------------------------------------------
+
+
+def planned_times(shares: dict[int, float], points: int = 64) -> list[str]:
+    """The table of a job that was tried on some ranks, which had such a share of their cores."""
+    planned = job(grid={"points": points})
+    counts = {"seconds": 1.0, "operator": 10.0}
+    samples = [
+        Sample(planned, ranks, 0.0, 1.0, 0.0, 0, (Stage(1, 1, 1.0, counts),), share=share)
+        for ranks, share in shares.items()
+    ]
+    return list(report.times(Costs(Scaling.of(planned, samples, MACHINE), 1e9), (1, 2, 4)))
+
+
+def test_what_other_programs_have_disturbed_is_marked() -> None:
+    """A trial that waited for its cores: a warning, and a mark on all that follows from it."""
+    quiet, busy = planned_times({1: 1.0, 2: 0.95}), planned_times({1: 1.0, 2: 0.46})
+    assert not [line for line in quiet if "busy" in line or report.MARK in line]
+    assert "busy with other programs" in busy[0]
+    assert "46% of a core each on 2 ranks" in busy[0]
+    assert [report.MARK in line for line in busy[2:5]] == [False, True, True]  # 4 ranks follow from 2
+    assert "rank*:" in busy[5] or "ranks*:" in busy[5]
+
+
+def test_waiting_for_a_core_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The share is the time of the process over that of the clock, here one that runs at twice its speed."""
+    clock = time.perf_counter
+    monkeypatch.setattr(time, "perf_counter", lambda: 2.0 * clock())
+    seen = sample(job(), Slab(MPI.COMM_SELF, 48, 40), 0.1)
+    assert seen.share < 0.6
+    assert seen.disturbed
+
+
+@pytest.mark.parametrize(("points", "unit"), [(64, "MB"), (2**15, "GB")])
+def test_units_of_memory(points: int, unit: str) -> None:
+    """A number that a reader can take in: never one of seven digits."""
+    head, *rows, _ = report.maps(job(grid={"points": points}), [1, 64])
+    assert head.startswith(f"memory per rank [{unit}]")
+    assert all(0.0 <= float(number) < 1e6 for row in rows for number in row.split()[-2:])
+    assert all("e+" not in row for row in rows)
+
+
+# -- steady states -----------------------------------------------------------------------------------------------------
+
+CURVE: Json = {"velocities": [1e-3, 1e-2, 0.1, 1.0], "pressures": [1e4, 3e4]}
+
+
+@pytest.mark.mpi
+def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None:
+    """All of them, in another order: the states and transforms are those of the verb, as each starts from nothing."""
+    planned = job(material=TWO, history=[], steady=CURVE)
+    slab = Slab(comm, *planned.grid.points)
+    sliding = SteadySliding(scene.frame(planned, slab))
+    before = slab.tally.copy()
+    for pressure in CURVE["pressures"]:
+        for speed in CURVE["velocities"]:
+            sliding.solve((speed, 0.0), pressure)
+    spent = slab.tally.since(before)
+    seen = sample(planned, Slab(comm, *planned.grid.points), 1e6)
+    assert seen.steps == seen.tried == 8
+    for count in ("fft", "allreduce", "operator"):
+        assert seen.total(count) == spent[count]
+    assert seen.held == slab.agree(slab.tally["map bytes at most"])
+
+
+def test_steady_states_beside_a_history() -> None:
+    """They are planned on their own, under the pressures that the verb would take."""
+    planned = job(material=TWO, history=[CELLS], steady={"velocities": [0.1]})
+    steady, words = only_steady_states(planned)
+    assert steady.history == ()
+    assert steady.steady is not None
+    assert steady.steady.pressures == (1e4,)
+    assert words == ["--set", "steady.pressures=[10000.0]", "--set", "history=[]", "--set", "initial={state: virgin}"]
+
+
+def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:
+    """As a user reads it, for the steady section of a job with a history; by two processes too."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    planned = job(grid={"points": 20}, steady={"velocities": [1e-2, 0.1]})
+    (tmp_path / "job.yaml").write_text(planned.resolved())
+    assert __main__.main(["plan", "job.yaml", "--ranks", "1,2", "--seconds", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "1 steps: stage 1 1" in said
+    assert "parcontact steady: 2 steady states, 2 velocities" in said
+    assert re.search(r"tried: [12] states on 1 rank in", said)
+    assert bool(re.search(r"tried: [12] states on 2 ranks in", said)) == (machine.cores() > 1)
+    assert "state [s]" in said

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from parcontact import private
 from parcontact.job import load
 from parcontact.parallel.slab import Slab
-from parcontact.record import plans
+from parcontact.record import wisdom
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
 ROOT = Path(__file__).parents[1]
@@ -208,16 +208,16 @@ def test_code_that_somebody_prepared_is_not_loaded(common: Path) -> None:
 def test_plans_that_somebody_prepared_are_not_read(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(JOB)
     job, slab = load(tmp_path / "job.yaml"), Slab(MPI.COMM_SELF, 16, 4)
-    plans.keep(job, slab)
+    wisdom.keep(job, slab)
     (kept,) = (cache / "parcontact" / "plans").iterdir()
-    assert plans._place(job, slab) == kept
-    assert plans._read(kept) == kept.read_bytes()
+    assert wisdom._place(job, slab) == kept
+    assert wisdom._read(kept) == kept.read_bytes()
     os.chown(kept, NOBODY, NOBODY)
-    assert plans._read(kept) is None
+    assert wisdom._read(kept) is None
     os.chown(kept.parent, NOBODY, NOBODY)
-    assert plans._place(job, slab) is None
-    assert plans._read(None) is None
-    plans.keep(job, slab)
+    assert wisdom._place(job, slab) is None
+    assert wisdom._read(None) is None
+    wisdom.keep(job, slab)
     assert [path.name for path in kept.parent.iterdir()] == [kept.name]
 
 

@@ -87,18 +87,18 @@ def plan(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..plan import machine, making
+    from ..plan import machine, planning
 
     job = _load(options, world)
     counts = options.ranks or tuple(sorted({1, world.size, *({machine.cores()} if world.size == 1 else ())}))
     words = [options.job, *(word for change in options.set for word in ("--set", change))]
     words += [] if options.case is None else ["--case", str(options.case)]
-    wanted = making.Wanted(counts, words, options.seconds, options.cores, options.network)
+    wanted = planning.Wanted(counts, words, options.seconds, options.cores, options.network)
     slab = Slab(world, *job.grid.points)
     if options.sample:
-        making.leave_sample(job, slab, wanted, options.sample)
+        planning.leave_sample(job, slab, wanted, options.sample)
         return DONE
-    for line in making.plan(job, slab, Slab(MPI.COMM_SELF, 1, 1), wanted, started):
+    for line in planning.plan(job, slab, Slab(MPI.COMM_SELF, 1, 1), wanted, started):
         if world.rank == 0:
             print(line, flush=True)
     return DONE

@@ -26,12 +26,12 @@ SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
 
 
 def export_wisdom() -> bytes:
-    """Which plans FFTW found the fastest in this process; another one may choose others, whose last bits differ."""
+    """Which transforms FFTW found the fastest in this process; another may choose others, whose last bits differ."""
     return SEPARATOR.join(pyfftw.export_wisdom())
 
 
 def import_wisdom(wisdom: bytes) -> bool:
-    """From now on make the plans of the process that exported this; False if that cannot be (another FFTW)."""
+    """From now on make the transforms of the process that exported this; False if that cannot be (another FFTW)."""
     pyfftw.forget_wisdom()
     precisions = tuple(wisdom.split(SEPARATOR))
     return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))
@@ -66,11 +66,11 @@ def _block_height(rows: int, row_bytes: int, spectrum_bytes: int, several: bool)
 
 
 class FFT:
-    """Plans and buffers of one transform size, made once.
+    """Transforms of one size and their buffers, made once.
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)` (default: equal to
     it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either; `measured`: FFTW tries
-    which plan is the fastest, else it guesses, the same every time. Making and calling one are collective.
+    which way is the fastest, else it guesses, the same every time. Making and calling one are collective.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class FFT:
         self._transpose = Transpose(slab, dealt, self.spectrum) if slab.comm.size > 1 else None
         self._name = transform_name((self.mx, self.my), dtype)
         self._make_blocks()
-        self._make_plans()
+        self._make_transforms()
 
     @cached_property
     def modes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -139,13 +139,13 @@ class FFT:
         self._count()
         for rows in self._blocks:
             source, waves = field[rows], self._waves(rows)
-            plan = self._x_forward[len(waves)]
-            if not self._direct(source, plan.input_alignment):
+            transform = self._x_forward[len(waves)]
+            if not self._direct(source, transform.input_alignment):
                 source = self._row_block[: len(waves)]
                 source[:, : self.slab.nx] = field[rows]
                 source[:, self.slab.nx :] = 0.0
-            plan.update_arrays(source, waves)
-            plan.execute()
+            transform.update_arrays(source, waves)
+            transform.execute()
             if self._transpose:
                 self._transpose.post(rows, waves)
         if self._transpose:
@@ -158,15 +158,15 @@ class FFT:
             self._transpose.to_rows()
         for rows in self._blocks:
             target, waves = out[rows], self._waves(rows)
-            plan = self._x_backward[len(waves)]
+            transform = self._x_backward[len(waves)]
             if self._transpose:
                 self._transpose.collect(rows, waves)
             if scale != 1.0:
                 np.multiply(waves, scale, out=waves)
-            direct = self._direct(target, plan.output_alignment)
+            direct = self._direct(target, transform.output_alignment)
             result = target if direct else self._row_block[: len(waves)]
-            plan.update_arrays(waves, result)
-            plan.execute()
+            transform.update_arrays(waves, result)
+            transform.execute()
             if not direct:
                 target[...] = result[:, : self.slab.nx]
 
@@ -175,7 +175,7 @@ class FFT:
         return self._wave_block[: rows.stop - rows.start] if self._transpose else self.spectrum[rows]
 
     def _direct(self, rows: Array, alignment: int) -> bool:
-        """Whether a plan can take these rows of a map as they are."""
+        """Whether a transform can take these rows of a map as they are."""
         fits = rows.shape[1] == self.mx and rows.dtype == self.dtype and rows.flags.c_contiguous
         return fits and pyfftw.is_byte_aligned(rows, alignment)
 
@@ -186,7 +186,7 @@ class FFT:
         if self._transpose:
             tally["bytes sent"] += self._transpose.sent
 
-    # -- blocks and plans ---------------------------------------------------------------------------------------------
+    # -- blocks and transforms ----------------------------------------------------------------------------------------
 
     def _make_blocks(self) -> None:
         ny_loc, waves, tally = self.slab.shape[0], self.mx // 2 + 1, self.slab.tally
@@ -196,16 +196,20 @@ class FFT:
         self._row_block = allocate((height, self.mx), self.dtype, tally)
         self._wave_block = allocate((height if several else 0, waves), self.complex, tally)
 
-    def _make_plans(self) -> None:
+    def _make_transforms(self) -> None:
         heights = {rows.stop - rows.start for rows in self._blocks}
         waves = {height: self._waves(slice(0, height)) for height in heights}
-        self._x_forward = {height: self._plan(self._row_block[:height], waves[height], axis=1) for height in heights}
-        self._x_backward = {height: self._plan(waves[height], self._row_block[:height], axis=1) for height in heights}
+        self._x_forward = {
+            height: self._transform(self._row_block[:height], waves[height], axis=1) for height in heights
+        }
+        self._x_backward = {
+            height: self._transform(waves[height], self._row_block[:height], axis=1) for height in heights
+        }
         if self.spectrum.size:
-            self._y_forward = self._plan(self.spectrum, self.spectrum, axis=0)
-            self._y_backward = self._plan(self.spectrum, self.spectrum, axis=0, backward=True)
+            self._y_forward = self._transform(self.spectrum, self.spectrum, axis=0)
+            self._y_backward = self._transform(self.spectrum, self.spectrum, axis=0, backward=True)
 
-    def _plan(
+    def _transform(
         self, source: NDArray[np.inexact], target: NDArray[np.inexact], axis: int, backward: bool = False
     ) -> pyfftw.FFTW:
         backward = backward or np.isrealobj(target)

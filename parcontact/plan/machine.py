@@ -23,6 +23,11 @@ REPEATED = 20  # times, for a mean of what is done side by side
 FFT_SHARE = 0.7  # of the time of a step; the rest is passes through memory
 
 
+def load() -> float:
+    """How many programs wanted a core in the last minute, on average."""
+    return os.getloadavg()[0]
+
+
 def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0))
@@ -37,9 +42,9 @@ def per_call(alone: Slab) -> float:
     heights[...] = np.random.default_rng(0).random(slab.shape)
     best, pressure = np.inf, slab.zeros()
     for _ in range(3):
-        calls, began = slab.tally["operator"], time.perf_counter()
+        calls, began = slab.tally["operator"], time.process_time()
         solver.solve(heights, MeanPressure(0.1), pressure)
-        best = min(best, (time.perf_counter() - began) / (slab.tally["operator"] - calls))
+        best = min(best, (time.process_time() - began) / (slab.tally["operator"] - calls))
     return float(best)
 
 
@@ -53,44 +58,45 @@ def copy_rate() -> float:
 def crowding(points: tuple[int, int]) -> float:
     """How much longer a transform and a pass through memory take when every core does them at once.
 
-    Threads stand for processes: neither FFTW nor numpy holds Python's lock here.
+    Threads stand for processes: neither FFTW nor numpy holds Python's lock here. Their own time is what counts: other
+    programs that have the core meanwhile are none of it.
     """
     together = cores()
     if together == 1:
         return 1.0
     shape = min(points[1], 1024), min(points[0], 1024)
-    work = [_Work(shape) for _ in range(together)]
-    slower = [_at_once([w.transform for w in work]) / _at_once([work[0].transform])]
-    slower += [_at_once([w.pass_through for w in work]) / _at_once([work[0].pass_through])]
+    tasks = [_Task(shape) for _ in range(together)]
+    slower = [_at_once([task.transform for task in tasks]) / _at_once([tasks[0].transform])]
+    slower += [_at_once([task.pass_through for task in tasks]) / _at_once([tasks[0].pass_through])]
     return max(1.0, FFT_SHARE * slower[0] + (1.0 - FFT_SHARE) * slower[1])
 
 
-class _Work:
+class _Task:
     def __init__(self, shape: tuple[int, int]) -> None:
         self.a, self.b, self.c = (pyfftw.zeros_aligned(shape) for _ in range(3))
         self.spectrum = pyfftw.zeros_aligned((shape[0], shape[1] // 2 + 1), dtype=np.complex128)
-        self.plan = pyfftw.FFTW(self.a, self.spectrum, (0, 1), flags=("FFTW_ESTIMATE",))
+        self.compiled = pyfftw.FFTW(self.a, self.spectrum, (0, 1), flags=("FFTW_ESTIMATE",))
 
     def transform(self) -> None:
-        self.plan.execute()
+        self.compiled.execute()
 
     def pass_through(self) -> None:
         np.add(self.a, self.b, out=self.c)
 
 
-def _at_once(work: list[Callable[[], None]]) -> float:
-    """Seconds of a call when all are repeated side by side."""
-    spent = [0.0] * len(work)
-    start = threading.Barrier(len(work))
+def _at_once(calls: list[Callable[[], None]]) -> float:
+    """Seconds of a call, of the thread's own time, when all are repeated side by side."""
+    spent = [0.0] * len(calls)
+    start = threading.Barrier(len(calls))
 
     def repeat(index: int) -> None:
         start.wait()
-        began = time.perf_counter()
+        began = time.thread_time()
         for _ in range(REPEATED):
-            work[index]()
-        spent[index] = (time.perf_counter() - began) / REPEATED
+            calls[index]()
+        spent[index] = (time.thread_time() - began) / REPEATED
 
-    threads = [threading.Thread(target=repeat, args=(index,)) for index in range(len(work))]
+    threads = [threading.Thread(target=repeat, args=(index,)) for index in range(len(calls))]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -101,9 +107,9 @@ def _at_once(work: list[Callable[[], None]]) -> float:
 def _fastest(call: Callable[[], None], count: int) -> float:
     best = np.inf
     for _ in range(count):
-        began = time.perf_counter()
+        began = time.process_time()
         call()
-        best = min(best, time.perf_counter() - began)
+        best = min(best, time.process_time() - began)
     return float(best)
 
 

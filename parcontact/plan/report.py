@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from .. import scene
 from ..effects import decisions
 from ..job import Job
-from . import memory
+from . import machine, memory
 from .scaling import SUMS_PER_STEP, Scaling
 
 MEGA = 1e6
+LARGE = 1e10  # bytes from which on there are told GB
+MARK = "*"  # of figures that were taken while other programs were at work
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,20 @@ class Costs:
     def job(self) -> Job:
         return self.scaling.job
 
+    def held(self, ranks: int) -> float:
+        """Bytes that a rank holds in maps; those of steady states are estimated from what was tried."""
+        if self.job.history:
+            return memory.total(self.job, ranks)
+        return self.scaling.held(ranks)
+
     def marching(self, ranks: int) -> float:
-        """Seconds of all steps."""
+        """Seconds of all steps, or steady states."""
         return self.scaling.steps * self.scaling.step(ranks)
 
     def writing(self, ranks: int) -> float:
         """Seconds of all checkpoints and fields."""
+        if not self.job.history:
+            return 0.0
         written = self.checkpoints(ranks) * memory.saved(self.job) + self.instants * self.instant_bytes
         return written / self.write_rate
 
@@ -51,7 +61,8 @@ class Costs:
     @property
     def instants(self) -> int:
         """How often fields are saved."""
-        return -(-self.scaling.steps // self.job.output.every) if decisions.fields(self.job).on else 0
+        saved = self.job.history and decisions.fields(self.job).on
+        return -(-self.scaling.steps // self.job.output.every) if saved else 0
 
     @property
     def instant_bytes(self) -> int:
@@ -71,56 +82,99 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     """Bytes that a rank holds, for what."""
     columns = [memory.holdings(job, count) for count in ranks]
     width = max(len(holding.what) for holding in columns[0])
-    yield f"{'memory per rank [MB]':{width + 2}}" + "".join(f"{_ranks(count):>13}" for count in ranks)
-    for row in zip(*columns, strict=True):
-        yield f"  {row[0].what:{width}}" + "".join(f"{holding.bytes / MEGA:13.4g}" for holding in row)
     totals = [sum(holding.bytes for holding in column) for column in columns]
-    yield f"  {'in all':{width}}" + "".join(f"{total / MEGA:13.4g}" for total in totals)
-    yield f"a checkpoint has {memory.saved(job) / MEGA:.4g} MB"
+    unit, size = _unit(max(totals))
+    yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f"{_ranks(count):>13}" for count in ranks)
+    for row in zip(*columns, strict=True):
+        yield f"  {row[0].what:{width}}" + "".join(f"{holding.bytes / size:13.4g}" for holding in row)
+    yield f"  {'in all':{width}}" + "".join(f"{total / size:13.4g}" for total in totals)
+    yield f"a checkpoint has {_bytes(memory.saved(job))}"
 
 
 def steps(costs: Costs) -> Iterator[str]:
-    """How many steps, and what is in one."""
+    """How many steps, or steady states, and what is in one."""
     samples = costs.scaling.samples
-    names = (f"{stage.name} {seen.steps}" for stage, seen in zip(costs.job.history, samples[0].stages, strict=True))
-    most = "at most " if decisions.short_rest(costs.job).on and samples[0].tried < samples[0].steps else ""
-    yield f"{most}{costs.scaling.steps} steps: {', '.join(names)}"
+    word = "step" if costs.job.history else "state"
+    yield from _numbers(costs)
     calls, transforms, sums = (
         samples[0].total(name) / costs.scaling.steps for name in ("operator", "fft", "allreduce")
     )
     sums += SUMS_PER_STEP
-    yield f"a step has {calls:.3g} operator calls, {transforms:.3g} transforms and {sums:.3g} sums over all ranks"
+    yield f"a {word} has {calls:.3g} operator calls, {transforms:.3g} transforms and {sums:.3g} sums over all ranks"
     if costs.instants:
-        yield f"fields are saved {costs.instants} times, {costs.instant_bytes / MEGA:.4g} MB each"
+        yield f"fields are saved {costs.instants} times, {_bytes(costs.instant_bytes)} each"
     for sample in samples:
         tried = sample.job.grid.points
         grid = "" if tried == costs.job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
         where = f"on {_ranks(sample.ranks)}{grid}"
-        yield f"tried: {sample.tried} steps {where} in {sample.took:.3g} s; the others are taken to be like them"
+        yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s; the others are taken to be like them"
+
+
+def _numbers(costs: Costs) -> Iterator[str]:
+    """How many steps in all and in each stage, or how many steady states."""
+    job, sample = costs.job, costs.scaling.samples[0]
+    if not job.history and job.steady:
+        yield f"parcontact steady: {sample.steps} steady states, {len(job.steady.velocities)} velocities"
+        return
+    names = (f"{stage.name} {seen.steps}" for stage, seen in zip(job.history, sample.stages, strict=True))
+    most = "at most " if decisions.short_rest(job).on and sample.tried < sample.steps else ""
+    yield f"{most}{sample.steps} steps: {', '.join(names)}"
 
 
 def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
-    """Seconds on some numbers of ranks, and where scaling ends."""
-    scaling, machine = costs.scaling, costs.scaling.machine
-    yield "  ranks     maps [MB]  resident [MB]     step [s]   messages   at work   whole run"
+    """Seconds on some numbers of ranks, and where scaling ends; what other programs have disturbed is marked."""
+    scaling = costs.scaling
+    yield from _disturbance(scaling)
+    unit, size = _unit(max(costs.held(count) for count in ranks))
+    word = "step" if costs.job.history else "state"
+    yield f"  ranks     maps [{unit}]  resident [{unit}] {f'{word} [s]':>12}   messages   at work   whole run"
     for count in ranks:
-        step, held = scaling.step(count), memory.total(costs.job, count)
+        step, held = scaling.step(count), costs.held(count)
         resident = held + scaling.sample(count).resident + costs.instant_bytes // count
-        shares = f"{scaling.messages(count) / step:9.0%} {scaling.efficiency(count):9.0%}"
-        memory_text = f"{held / MEGA:13.4g} {resident / MEGA:14.4g}"
-        yield f"{count:7d} {memory_text} {step:12.3g} {shares} {_duration(costs.whole(count)):>11}"
-    yield f"scaling ends at {_ranks(scaling.end)}: with twice as many they would work for less than half of the time"
-    many = max(ranks)
+        mark = MARK if scaling.sample(count).disturbed else " "
+        shares = f"{scaling.messages(count) / step:8.0%} {scaling.efficiency(count):9.0%}"
+        memory_text = f"{held / size:13.4g} {resident / size:14.4g}"
+        yield f"{count:7d} {memory_text} {step:12.3g}{mark} {shares} {_duration(costs.whole(count)):>11}"
+    mark = MARK if any(sample.disturbed for sample in scaling.samples) else ""
+    end = f"{_ranks(scaling.end)}{mark}"
+    yield f"scaling ends at {end}: with twice as many they would work for less than half of the time"
+    yield from _assumptions(costs, max(ranks))
+
+
+def _disturbance(scaling: Scaling) -> Iterator[str]:
+    """What other programs have taken of the machine, if it matters."""
+    disturbed = [sample for sample in scaling.samples if sample.disturbed]
+    if disturbed:
+        shares = ", ".join(f"{sample.share:.0%} of a core each on {_ranks(sample.ranks)}" for sample in disturbed)
+        load = f"load {machine.load():.2g} on {machine.cores()} cores"
+        yield (
+            f"warning: this machine is busy with other programs ({load}), and the trial had only {shares}; "
+            f"times marked {MARK} are too long, and what follows from them is unsure"
+        )
+
+
+def _assumptions(costs: Costs, many: int) -> Iterator[str]:
+    scaling, nodes = costs.scaling, costs.scaling.machine
     yield (
         f"assumed: {scaling.sample(many).starting:.2g} s to start and {scaling.building(many):.2g} s for the scene on "
         f"{_ranks(many)}, "
-        f"{costs.write_rate / MEGA:.3g} MB/s to disk; nodes of {machine.cores} cores, {machine.crowding:.2f} times "
-        f"slower when all work; {1e6 * machine.per_call:.2g} us per operator call on any number of ranks"
+        f"{costs.write_rate / MEGA:.3g} MB/s to disk; nodes of {nodes.cores} cores, {nodes.crowding:.2f} times "
+        f"slower when all work; {1e6 * nodes.per_call:.2g} us per operator call on any number of ranks"
     )
     yield (
-        f"between ranks: messages of {1e6 * machine.near_latency:.2g} us within a node, {1e6 * machine.latency:.2g} us "
-        f"and {machine.bandwidth / 1e9:.3g} GB/s per node between nodes, copies at {machine.copy_rate / 1e9:.2g} GB/s"
+        f"between ranks: messages of {1e6 * nodes.near_latency:.2g} us within a node, {1e6 * nodes.latency:.2g} us "
+        f"and {nodes.bandwidth / 1e9:.3g} GB/s per node between nodes, copies at {nodes.copy_rate / 1e9:.2g} GB/s"
     )
+
+
+def _unit(most: float) -> tuple[str, float]:
+    """In which to tell of so many bytes and less: its name and its bytes."""
+    return ("GB", 1e9) if most >= LARGE else ("MB", 1e6)
+
+
+def _bytes(count: float) -> str:
+    unit, size = _unit(count)
+    return f"{count / size:.4g} {unit}"
 
 
 def _ranks(count: int) -> str:

@@ -7,18 +7,23 @@ history that is short enough, is made as it is.
 
 import resource
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 
 from .. import scene
 from ..effects import decisions
+from ..errors import RunError
 from ..job import Job
 from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
 from ..steady_sliding import start as steadystart
+from ..steady_sliding.curve import request
+from ..steady_sliding.sliding import SteadySliding
 
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever
 BLOCK = 8  # steps of a block, these among them
@@ -26,6 +31,7 @@ CALLS = 12  # operator calls expected of a step that starts from the one before
 LONG = 4  # steps that a long step costs, with what settling costs more
 FIRST = 2  # steps that are always made
 KILO = 1024  # bytes in what the system counts resident memory in
+UNDISTURBED = 0.9  # of the time a rank has a core, where nothing else is at work
 LATE = 2.0  # times the time given: then no more steps are made
 
 
@@ -49,7 +55,9 @@ class Stage:
 class Sample:
     """What was seen of a job on some ranks: its stages, and how long all of it took [s].
 
-    `starting` the program, `building` the scene; `resident` is the memory of root that is not in maps [bytes].
+    `starting` the program, `building` the scene; `resident` is the memory of root that is not in maps, `held` that in
+    maps at most [bytes]. `share` is how much of its time a rank had a core, at least: less than all of it where other
+    programs are at work. Where the job has no history, its steady states stand in place of steps.
     """
 
     job: Job
@@ -59,6 +67,13 @@ class Sample:
     took: float
     resident: int
     stages: tuple[Stage, ...]
+    held: int = 0
+    share: float = 1.0
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether other programs have taken so much of the machine that times say little."""
+        return self.share < UNDISTURBED
 
     @property
     def steps(self) -> int:
@@ -78,7 +93,7 @@ class Sample:
 
     def of(self, job: Job) -> "Sample":
         """What this says of the same job on another grid: its number of steps may be another one in each stage."""
-        if job.grid == self.job.grid:
+        if job.grid == self.job.grid or not job.history:
             return self
         spans = job.timeline().spans
         stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(self.stages, spans, strict=True))
@@ -90,16 +105,59 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
 
     Raises InputError for files that do not fit.
     """
+    began, worked = time.perf_counter(), time.process_time()
+    if job.history:
+        building, stages = _march(job, slab, seconds)
+    else:
+        building, stages = _slide_steadily(job, slab, seconds)
+    took = time.perf_counter() - began
+    idle = slab.reduce((), [1.0 - (time.process_time() - worked) / took])[0]
+    held = slab.tally["map bytes at most"]
+    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO - held
+    return Sample(
+        job, slab.comm.size, starting, building, took, slab.agree(resident), tuple(stages), slab.agree(held), 1.0 - idle
+    )
+
+
+def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[Stage]]:
+    """Seconds that the scene took, and the stages of the history; collective."""
     began = time.perf_counter()
     numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
     march = March(scene.build(job.model_copy(update={"numerics": numerics}), slab))
     if decisions.steady_start(job).on:
         steadystart.begin(march)
     building = time.perf_counter() - began
-    stages = tuple(_try(march, job.timeline(), seconds))
-    took = time.perf_counter() - began
-    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO - slab.tally["map bytes at most"]
-    return Sample(job, slab.comm.size, starting, building, took, slab.agree(resident), stages)
+    return building, _try(march, job.timeline(), seconds)
+
+
+def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[Stage]]:
+    """Seconds that the scene took, and the steady states, some far apart tried, as one stage; collective."""
+    began = time.perf_counter()
+    sliding = SteadySliding(scene.frame(job, slab))
+    building = time.perf_counter() - began
+    wanted = request(job)
+    states = [(speed, pressure) for pressure in wanted.pressures for speed in wanted.velocities]
+    stage = Stage(len(states))
+    for index in _spread(len(states)):
+        if stage.tried and slab.agree(time.perf_counter() - began - building > seconds):
+            break
+        speed, pressure = states[index]
+        velocity = (speed * wanted.direction[0], speed * wanted.direction[1])
+        stage.add(1.0, _cost(slab, partial(_solve_or_fail, sliding, velocity, pressure)))
+    return building, [stage]
+
+
+def _solve_or_fail(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> None:
+    """A state that cannot be solved costs what it has cost."""
+    with suppress(RunError):
+        sliding.solve(velocity, pressure)
+
+
+def _spread(count: int) -> list[int]:
+    """The numbers below a count, in an order in which the first ones are already spread over all (van der Corput)."""
+    digits = max(count - 1, 1).bit_length()
+    turned = (int(f"{index:0{digits}b}"[::-1], 2) for index in range(1 << digits))
+    return [index for index in turned if index < count]
 
 
 def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
@@ -109,44 +167,49 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
     per_call = float("inf")
     as_run = steps_to_make(march, timeline)
     for step in islice(as_run, FIRST):
-        cost = _as_run(march, step, stages)
+        cost = _make_as_run(march, step, stages)
         per_call = min(per_call, cost["seconds"] / max(cost["operator"], 1.0))
     left = max(seconds - (time.perf_counter() - began), 0.0)
     affordable = slab.agree(left / (CALLS * per_call)) / len(timeline)
     if affordable >= 1.0:
         for step in as_run:
-            if slab.agree(_late(began, seconds, stages)):
+            if slab.agree(_is_late(began, seconds, stages)):
                 break
-            _as_run(march, step, stages)
+            _make_as_run(march, step, stages)
         return stages
     for span, stage in zip(timeline.spans, stages, strict=True):
         for step, weight in chosen(timeline, range(max(span.before, march.row.step) + 1, span.last + 1), affordable):
-            if slab.agree(_late(began, seconds, stages)):
+            if slab.agree(_is_late(began, seconds, stages)):
                 return stages
-            cost = _made(march, step)
+            cost = _make(march, step)
             if weight:
                 stage.add(weight, cost)
     return stages
 
 
-def _late(began: float, seconds: float, stages: list[Stage]) -> bool:
+def _is_late(began: float, seconds: float, stages: list[Stage]) -> bool:
     """Whether to stop, but not before there is more than the first steps, which start from nothing."""
     return time.perf_counter() - began > LATE * seconds and sum(stage.tried for stage in stages) > FIRST
 
 
-def _as_run(march: March, step: Step, stages: list[Stage]) -> dict[str, float]:
+def _make_as_run(march: March, step: Step, stages: list[Stage]) -> dict[str, float]:
     """Make a step of the run, which stands for itself, and for others that the run does not make."""
-    cost = _made(march, step)
+    cost = _make(march, step)
     stages[step.stage].steps -= step.passed
     stages[step.stage].add(1.0, cost)
     return cost
 
 
-def _made(march: March, step: Step) -> dict[str, float]:
+def _make(march: March, step: Step) -> dict[str, float]:
     """Make a step; what it cost."""
-    tally, began = march.scene.slab.tally, time.perf_counter()
+    return _cost(march.scene.slab, partial(march.advance, step))
+
+
+def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:
+    """Seconds, and what is counted, of a step or a steady state."""
+    tally, began = slab.tally, time.perf_counter()
     before = tally.copy()
-    march.advance(step)
+    call()
     counts = {"operator": 0, **tally.since(before)}
     return {**counts, "seconds": time.perf_counter() - began}
 

@@ -90,6 +90,12 @@ class Scaling:
         shared = max(0.0, seen) * self._finer(sample) * self._share(ranks) / self._share(sample.ranks)
         return shared + calls + self.messages(ranks)
 
+    def held(self, ranks: int) -> float:
+        """Bytes that a rank holds in maps, in proportion to its points."""
+        sample = self.sample(ranks)
+        points, tried = (job.grid.nx * job.grid.ny for job in (self.job, sample.job))
+        return sample.held * points / tried * sample.ranks / ranks
+
     def messages(self, ranks: int) -> float:
         """Seconds of a step in which data moves between ranks."""
         return self._messages(self.job, self.sample(ranks), ranks)

@@ -31,8 +31,8 @@ class Origin:
     own: bool
 
     @property
-    def plans(self) -> NDArray[np.uint8] | None:
-        """The transform plans of the run that wrote it."""
+    def wisdom(self) -> NDArray[np.uint8] | None:
+        """Which transforms FFTW found the fastest in the run that wrote it."""
         return self.contents.numbers.get("plans/all")
 
 

@@ -15,7 +15,7 @@ from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..physics.entries import Entry
-from ..record import checkpoint, marker, plans
+from ..record import checkpoint, marker, wisdom
 from ..record.checkpoint import Facts, Table
 from ..record.directory import Directory
 from ..record.marker import Claim
@@ -52,14 +52,14 @@ def run(job: Job, slab: Slab, options: Options) -> int:
             if slab.root and not options.quiet:
                 print(f"{directory.path}: {reason}", flush=True)
             return DONE
-        plans.recall(job, slab, origin.plans if origin else None)
+        wisdom.recall(job, slab, origin.wisdom if origin else None)
         built = scene.build(job, slab, options.until or 0.0)
         marching = March(built)
         if origin:
             marching.restore(origin.contents)
         elif decisions.steady_start(job).on:
             steadystart.begin(marching)
-        plans.keep(job, slab)
+        wisdom.keep(job, slab)
         provenance = _provenance(job, slab, origin)
         claim = _claim(plain, directory, origin)
         recorder = _begin(built, directory, claim, provenance, origin, len(timeline), options.quiet)
@@ -220,7 +220,7 @@ class _Journey:
         path = self.directory.checkpoint(row.step)
         self.recorder.sync()
         facts = replace(self.facts, step=row.step, time=row.time, table=self.recorder.table)
-        entries = {**self.march.entries(), "plans/all": Entry(plans.gathered(self.slab))}
+        entries = {**self.march.entries(), "plans/all": Entry(wisdom.gather(self.slab))}
         try:
             checkpoint.write(path, self.slab, facts, entries)
         except RunError as error:

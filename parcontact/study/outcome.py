@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 
 from .. import scene
-from ..effects import decisions as calls_for
+from ..effects import decisions
 from ..job import Job
 from ..march import loop
 from ..march.step import March
@@ -51,7 +51,7 @@ def warm_up(job: Job, slab: Slab) -> None:
 def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
     """March through a job, writing nothing; None if `stopped` says so after a step; collective."""
     marching = March(scene.build(job, slab))
-    if calls_for.steady_start(job).on:
+    if decisions.steady_start(job).on:
         steadystart.begin(marching)
     rows: list[Row] = []
 

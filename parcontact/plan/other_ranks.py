@@ -15,7 +15,7 @@ from .sample import Sample, Stage
 
 MPIRUN = Path(sys.executable).with_name("mpirun")
 MARKS = ("OMPI_", "PMIX_", "PRTE_", "PMI_")  # what MPI has left in the environment would confuse another mpirun
-PATIENCE = 60.0  # seconds beyond three times those that a trial is given
+MAX_SECONDS_LATE = 60.0  # beyond three times those that a trial is given
 
 
 def samples(job: Job, words: Sequence[str], ranks: Iterable[int], seconds: float) -> Iterator[Sample]:
@@ -33,7 +33,7 @@ def _attempt(job: Job, words: Sequence[str], ranks: int, path: Path, seconds: fl
     began = time.perf_counter()
     try:
         command = [str(MPIRUN), "-n", str(ranks), *program]
-        subprocess.run(command, env=clean, capture_output=True, timeout=3 * seconds + PATIENCE, check=True)
+        subprocess.run(command, env=clean, capture_output=True, timeout=3 * seconds + MAX_SECONDS_LATE, check=True)
         whole = time.perf_counter() - began
         return load(path, job, whole)
     except (OSError, subprocess.SubprocessError, ValueError, KeyError, TypeError):
@@ -42,7 +42,7 @@ def _attempt(job: Job, words: Sequence[str], ranks: int, path: Path, seconds: fl
 
 def save(path: Path, sample: Sample) -> None:
     """Leave a sample where `load` finds it."""
-    facts = {name: getattr(sample, name) for name in ("ranks", "building", "took", "resident")}
+    facts = {name: getattr(sample, name) for name in ("ranks", "building", "took", "resident", "held", "share")}
     path.write_text(json.dumps({**facts, "stages": [asdict(stage) for stage in sample.stages]}))
 
 

@@ -1,4 +1,4 @@
-"""Transform plans, kept: FFTW chooses the fastest by trying, and another choice gives other last digits.
+"""FFTW's wisdom, kept: it finds the fastest transforms by trying, and others give other last digits.
 
 So that a run repeated on the same machine gives the same digits, the first choice for a kind of run is kept in the
 user's private cache directory; so that a run continued anywhere does, checkpoints carry it too.
@@ -24,8 +24,8 @@ from ..parallel.slab import Slab
 CPUINFO = Path("/proc/cpuinfo")
 
 
-def gathered(slab: Slab) -> NDArray[np.uint8]:
-    """The plans of all ranks, for a checkpoint; collective."""
+def gather(slab: Slab) -> NDArray[np.uint8]:
+    """The wisdom of all ranks, for a checkpoint; collective."""
     everyone = [wisdom.decode("latin-1") for wisdom in slab.from_all(export_wisdom())]
     different = list(dict.fromkeys(everyone))
     text = json.dumps({"plans": different, "of": [different.index(wisdom) for wisdom in everyone]})
@@ -33,15 +33,15 @@ def gathered(slab: Slab) -> NDArray[np.uint8]:
 
 
 def recall(job: Job, slab: Slab, saved: NDArray[np.uint8] | None) -> None:
-    """Make the plans of a checkpoint, if it is of as many ranks, else those of the first such run here; collective."""
+    """Use the wisdom of a checkpoint, if it is of as many ranks, else that of the first such run here; collective."""
     data = None if saved is None else saved.tobytes()
     if not _adopt(data, slab):
         _adopt(slab.agree(_read(_place(job, slab)) if slab.root else None), slab)
 
 
 def keep(job: Job, slab: Slab) -> None:
-    """Keep the plans of this run for later ones, unless there are some; collective."""
-    data = gathered(slab).tobytes()
+    """Keep the wisdom of this run for later ones, unless there is some; collective."""
+    data = gather(slab).tobytes()
     if slab.root:
         with suppress(OSError):  # a convenience: a run without a place for it does as well
             if place := _place(job, slab):

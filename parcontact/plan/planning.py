@@ -6,8 +6,9 @@ from pathlib import Path
 
 from ..job import Job
 from ..parallel.slab import Slab
-from ..record import plans
-from . import elsewhere, machine, report, trial
+from ..record import wisdom
+from ..steady_sliding.curve import request
+from . import machine, other_ranks, report, trial
 from .report import Costs
 from .sample import Sample, sample
 from .scaling import Machine, Scaling
@@ -29,23 +30,39 @@ class Wanted:
 
 
 def plan(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) -> Iterator[str]:
-    """Lines of the plan of a job; collective, all ranks must take every line.
+    """Lines of the plan of a job, its run and its steady states; collective, all ranks must take every line.
 
     `alone` is a slab of one rank; `started` the seconds of the program so far.
     """
     yield from report.effects(job)
     yield ""
-    yield from report.maps(job, wanted.ranks)
-    yield ""
-    if not job.history:
-        yield "there is no history, and steady states are not planned"
-        return
-    seen = attempt(job, slab, wanted.seconds, started)
+    if job.history:
+        yield from report.maps(job, wanted.ranks)
+        yield ""
+        yield from _costs(job, slab, alone, wanted, started)
+    if job.steady:
+        steady, changes = only_steady_states(job)
+        yield from [""] * bool(job.history)
+        yield from _costs(steady, slab, alone, replace(wanted, words=[*wanted.words, *changes]), started)
+
+
+def only_steady_states(job: Job) -> tuple[Job, list[str]]:
+    """The job of `parcontact steady`, and the words that make it of this one for another process."""
+    pressures = request(job).pressures
+    section = job.steady.model_copy(update={"pressures": pressures}) if job.steady else None
+    listed = ", ".join(map(repr, pressures))
+    changes = ["--set", f"steady.pressures=[{listed}]", "--set", "history=[]", "--set", "initial={state: virgin}"]
+    return job.model_copy(update={"history": (), "steady": section, "initial": type(job.initial)()}), changes
+
+
+def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) -> Iterator[str]:
+    """What the steps, or the steady states, of a job cost; collective."""
+    seen = try_job(job, slab, wanted.seconds, started)
     if seen is None:
         yield "too large to be tried here: no time can be told"
         return
     others = [count for count in wanted.ranks if 1 < count <= machine.cores()] if slab.comm.size == 1 else []
-    more = elsewhere.samples(seen.job, wanted.words, sorted(others), wanted.seconds)
+    more = other_ranks.samples(seen.job, wanted.words, sorted(others), wanted.seconds)
     scaling = Scaling.of(job, [seen, *more], describe(seen.job, alone, wanted))
     costs = Costs(scaling, machine.write_rate(job.output.directory))
     yield from report.steps(costs)
@@ -53,23 +70,23 @@ def plan(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) -> I
     yield from report.times(costs, wanted.ranks)
 
 
-def attempt(job: Job, slab: Slab, seconds: float, started: float) -> Sample | None:
+def try_job(job: Job, slab: Slab, seconds: float, started: float) -> Sample | None:
     """Try a job, or the same on a grid that is coarse enough, with the transforms its run will have; collective."""
     tried = slab.agree(trial.grid_for(job, slab.comm.size, seconds) if slab.root else None)
     if tried is None:
         return None
     own = slab.resized(*tried.grid.points)
-    plans.recall(tried, own, None)
+    wisdom.recall(tried, own, None)
     found = sample(tried, own, seconds, started)
-    plans.keep(tried, own)
+    wisdom.keep(tried, own)
     return found
 
 
 def leave_sample(job: Job, slab: Slab, wanted: Wanted, path: Path) -> None:
     """Try a job for a program that has started this one; collective."""
-    found = attempt(job, slab, wanted.seconds, 0.0)
+    found = try_job(job, slab, wanted.seconds, 0.0)
     if slab.root and found:
-        elsewhere.save(path, found)
+        other_ranks.save(path, found)
 
 
 def describe(job: Job, alone: Slab, wanted: Wanted) -> Machine:
