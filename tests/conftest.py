@@ -8,12 +8,15 @@ import sys
 import time
 from collections.abc import Generator, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import hypothesis
 import pytest
 from _pytest.config import create_terminal_writer
 from mpi4py import MPI
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WORLD = MPI.COMM_WORLD
 REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
@@ -75,6 +78,22 @@ def run_parcontact(tmp_path: Path, outside_mpi: dict[str, str]) -> RunParcontact
         return subprocess.CompletedProcess(command, process.returncode, out, err)
 
     return run
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
+    """The figures that have been saved."""
+    from matplotlib.figure import Figure
+
+    figures: list[Figure] = []
+    draw = Figure.savefig
+
+    def save(figure: Figure, *args: object, **options: object) -> None:
+        figures.append(figure)
+        draw(figure, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Figure, "savefig", save)
+    return figures
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -71,7 +71,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     _scale(axes, "x", xs, log_x)
     _scale(axes, "y", ys, log_y)
     if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        axes.set_ylim(0.0, 1.08 * max(float(np.nanmax(y, initial=0.0)) for y in ys) or 1.0)
+        axes.set_ylim(0.0, 1.08 * max(map(_highest, ys)) or 1.0)
     if chart.spikes and not (chart.peak or log_x or log_y):
         _cut_spike(axes, xs, ys, y_unit)
     if chart.peak and not log_y:
@@ -109,17 +109,22 @@ def _cut_spike(axes: Axes, xs: Sequence[Array], ys: Sequence[Array], unit: str) 
     """Leave out of the picture what stands out in the first moments only, and tell how high it is."""
     start, end = min(np.nanmin(x) for x in xs), max(np.nanmax(x) for x in xs)
     early = [x <= start + SPIKE_SHARE * (end - start) for x in xs]
-    rest = max((float(np.nanmax(y[~first], initial=0.0)) for y, first in zip(ys, early, strict=True)), default=0.0)
-    highest = max(float(np.nanmax(y, initial=0.0)) for y in ys)
+    rest = max(_highest(y[~first]) for y, first in zip(ys, early, strict=True))
+    highest = max(map(_highest, ys))
     if end > start and rest > 0.0 and highest > SPIKE_HEIGHT * rest:
         axes.set_ylim(top=1.25 * rest)
         told = f"↑ {highest:.3g} {unit}".rstrip()
         axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
 
 
+def _highest(values: Array) -> float:
+    """The highest of what is positive and known."""
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
 def _tell_peak(axes: Axes, x: Array, y: Array, unit: str) -> None:
     """The highest point of a line, if it is inside and the line has come down from it."""
-    size = np.where(np.isfinite(y), np.abs(y), 0.0)
+    size = np.where(np.isfinite(x * y), np.abs(y), 0.0)
     peak = int(np.argmax(size))
     if 0 < peak < size.size - 1 and size[peak] > 1.02 * size[-1]:
         axes.plot(x[peak], y[peak], "o", color=style.RED)

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from ...physics.prony import complex_modulus, relaxation
 from ...rubber.compound import Compound
 from ...rubber.tables import Set
+from . import style
 
-STORAGE, LOSS, BAND = "#0072b2", "#d55e00", "#999999"  # tell apart for the colour-blind (Okabe and Ito)
+STORAGE, LOSS, BAND = style.BLUE, style.RED, "#999999"
 POINTS = 400  # of a line
 
 

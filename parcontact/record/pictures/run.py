@@ -1,6 +1,6 @@
 """What a picture of a run is drawn from."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -22,12 +22,18 @@ SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady")
 STEADY_RESOLVED = "steady.resolved.yaml"
 
 
+MEASURED = (
+    *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
+    *("mean_gap", "max_pressure", "work", "stored", "dissipated"),
+)
+
+
 class Run:
     """A run's job and rows. The rows before the first load of a body at rest are left out: nothing has happened yet."""
 
     def __init__(self, directory: Path) -> None:
         self.directory, self.job = directory, _job(directory / RESOLVED)
-        self._columns = {name: np.array(values) for name, values in measures.read(directory / "measures.csv").items()}
+        self._columns = table(directory / "measures.csv", MEASURED)
         if not self._columns["step"].size:
             raise InputError(f"{directory} holds no step yet")
         self._first = 1 if self._columns["pressure"][0] == 0.0 and self._columns["step"].size > 1 else 0
@@ -107,6 +113,14 @@ class Fields:
         """The newest map of a name, if it was saved."""
         field = self.file[name][self.saved[-1]] if name in self.file and self.saved else None
         return field if field is not None and np.isfinite(field).all() else None
+
+
+def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
+    """Columns of a table by name; raises InputError where one of those that are needed is missing."""
+    columns = {name: np.array(values, dtype=float) for name, values in measures.read(path).items()}
+    if missing := [name for name in names if name not in columns]:
+        raise InputError(f"{path} has no column {', '.join(missing)}")
+    return columns
 
 
 def box(directory: Path) -> float:

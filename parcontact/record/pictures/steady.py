@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from ...parallel.slab import Array
-from .. import measures
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
-from .run import box
+from .run import box, table
 
 TABLE = "steady.csv"
 
@@ -18,7 +17,7 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
     """Panels of a table of steady states; none if it holds no state yet, or is not to be drawn over `over`."""
     if over in ("time", "distance"):
         return []
-    columns = {name: np.array(values) for name, values in measures.read(directory / TABLE).items()}
+    columns = table(directory / TABLE, ("velocity", "pressure", "friction", "contact_area"))
     if not columns["velocity"].size:
         return []
     area = box(directory)  # of a free scene

@@ -1,0 +1,238 @@
+"""`parcontact plot` as users ask for it: panels, axes, formats, comparisons, movies, and what cannot be drawn."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from drawing import (
+    AREA,
+    ELASTIC,
+    FRACTION,
+    FRICTION,
+    KINDS,
+    LOADS,
+    PEAK,
+    SLIDE,
+    SPHERE,
+    WAVE,
+    ZENER,
+    panels,
+    ran,
+    touching,
+)
+from matplotlib.figure import Figure
+from PIL import Image
+
+from parcontact.__main__ import main
+from parcontact.record import measures
+from parcontact.record.pictures import style
+
+BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
+CURVE = "velocity,pressure,friction,contact_area\n"
+POINTS = [(v, p, 0.1 * v, 0.2) for p in (1041.66666, 2.5e5) for v in (0.001, 0.1, 10.0)]
+
+
+def asked(*words: str | Path) -> int:
+    return main(["plot", *map(str, words)])
+
+
+def curve(directory: Path, points: Sequence[Sequence[float]] = POINTS) -> Path:
+    """A directory with a friction curve."""
+    directory.mkdir(exist_ok=True)
+    rows = [",".join(map(repr, point)) + "\n" for point in points]
+    (directory / "steady.csv").write_text(CURVE + "".join(rows))
+    return directory
+
+
+@pytest.mark.parametrize("kind", ["loads", "creep", "sliding"])
+def test_labels_do_not_touch(tmp_path: Path, drawn: list[Figure], kind: str) -> None:
+    assert asked(ran(tmp_path, KINDS[kind][0])) == 0
+    assert touching(drawn[0]) == []
+
+
+@pytest.mark.parametrize("stages", [3, 9])
+def test_narrow_stages_keep_their_names(tmp_path: Path, drawn: list[Figure], stages: int) -> None:
+    """A hundredth of the time each, and yet each is named, and no name touches another text."""
+    short = [
+        f"{{name: short stage {k}, pressure: {k + 1}.0e3, duration: 1.0e-5, time_step: 1.0e-5}}" for k in range(stages)
+    ]
+    text = ", ".join([*short, "{name: long, pressure: 1.0e3, duration: 1.0e-3, time_step: 2.0e-4}"])
+    assert asked(ran(tmp_path, WAVE + ELASTIC + f"history: [{text}]\n")) == 0
+    named = [text.get_text() for text in drawn[0].axes[0].texts]
+    assert named == [*(f"short stage {k}" for k in range(stages)), "long"]
+    assert touching(drawn[0]) == []
+
+
+def test_reversal_shows_both_signs(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Its magnitude would have a cusp at 0."""
+    assert asked(ran(tmp_path, WAVE + ZENER + BACK)) == 0
+    friction = drawn[0].axes[0].get_lines()[0].get_ydata()
+    assert np.min(friction) < -0.5 * np.max(friction)
+    assert drawn[0].axes[0].get_ylim()[0] < np.min(friction)
+
+
+def test_a_spike_at_the_start_does_not_flatten_the_rest(tmp_path: Path, drawn: list[Figure]) -> None:
+    """A load at once meets the modulus of the first instant: that height is told, and the rest fills the panel."""
+    stiff = "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e8, relaxation_time: 1.0e-6}]}\n"
+    load = "history: [{force: 0.1, duration: 1.0e-2, time_step: {first: 1.0e-7, growth: 1.5}}]\n"
+    assert asked(ran(tmp_path, SPHERE.replace("points: 32", "points: 64") + stiff + load)) == 0
+    axes = drawn[0].axes[2]
+    assert axes.get_ylabel() == PEAK.replace("k", "M")
+    values = np.array(axes.get_lines()[0].get_ydata())
+    assert values.max() > 3.0 * values[-1]
+    assert values[-1] < axes.get_ylim()[1] < 2.0 * values[-1]
+    assert f"{values.max():.3g} MPa" in axes.texts[0].get_text()
+
+
+def test_run_and_curve_in_one_directory(tmp_path: Path, drawn: list[Figure]) -> None:
+    out = curve(ran(tmp_path, KINDS["sliding"][0]))
+    assert asked(out) == 0
+    assert panels(drawn[0]) == [*KINDS["sliding"][1], FRICTION, FRACTION]
+
+
+def test_job_of_another_verb(tmp_path: Path, drawn: list[Figure]) -> None:
+    """What is known of the stages may be wrong: the rows are drawn all the same."""
+    out = ran(tmp_path, KINDS["creep"][0])
+    path = out / "job.resolved.yaml"
+    data = yaml.safe_load(path.read_text())
+    path.write_text(yaml.safe_dump({**data, "history": [{"pressure": 1.0e5}]}))
+    assert asked(out) == 0
+    data["steady"] = {"velocities": [1.0], "pressures": [1.0e5]}
+    path.write_text(yaml.safe_dump({key: value for key, value in data.items() if key != "history"}))
+    assert asked(out) == 0
+    assert len(drawn) == 2
+    assert panels(drawn[1])[:3] == KINDS["creep"][1][:3]
+
+
+def test_loads_of_curves_have_prefixes(tmp_path: Path, drawn: list[Figure]) -> None:
+    assert asked(curve(tmp_path)) == 0
+    legend = drawn[0].axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["1.04 kPa", "250 kPa"]
+    assert touching(drawn[0]) == []
+
+
+def test_free_curve_in_areas_and_forces(tmp_path: Path, drawn: list[Figure]) -> None:
+    """No nominal area: 0.2 of (2 mm)^2 is 0.8 mm^2, and a mean pressure of 250 kPa on it is 1 N."""
+    out = curve(ran(tmp_path, KINDS["numbers only"][0]))
+    (out / "measures.csv").unlink()
+    assert asked(out) == 0
+    assert panels(drawn[0]) == [FRICTION, AREA]
+    assert drawn[0].axes[1].get_lines()[0].get_ydata() == pytest.approx(0.8)
+    legend = drawn[0].axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["4.17 mN", "1 N"]
+
+
+@pytest.mark.parametrize("points", [POINTS[:1], POINTS[:3:2], []])
+def test_curve_of_few_points(tmp_path: Path, drawn: list[Figure], points: Sequence[Sequence[float]]) -> None:
+    """Any warning is an error here."""
+    assert asked(curve(tmp_path, points)) == 0
+    assert len(panels(drawn[0])) == (2 if points else 0)
+    assert touching(drawn[0]) == []
+
+
+@pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_formats(tmp_path: Path, kind: str, start: bytes) -> None:
+    out = curve(tmp_path)
+    assert asked(out, "--format", kind) == 0
+    assert (out / f"picture.{kind}").read_bytes().startswith(start)
+    assert asked(out, "--out", tmp_path / f"other.{kind}") == 0
+    assert (tmp_path / f"other.{kind}").read_bytes().startswith(start)
+
+
+def test_panels_axes_and_scales(tmp_path: Path, drawn: list[Figure]) -> None:
+    """In the order asked for; over velocity, what each stage has come to; logarithmic where asked for."""
+    faster = SLIDE.replace("}]", "}, {pressure: 1.0e3, velocity: 0.2, distance: 1.0e-3, cells_per_step: 1}]")
+    out = ran(tmp_path, WAVE + ZENER + faster)
+    assert asked(out, "--panels", "pressure,friction", "--over", "time", "--log", "x,y") == 0
+    assert panels(drawn[0]) == [PEAK, FRICTION]
+    assert [(axes.get_xlabel(), axes.get_xscale(), axes.get_yscale()) for axes in drawn[0].axes] == [
+        ("time [ms]", "log", "log")
+    ] * 2
+    assert asked(out, "--panels", "friction", "--over", "velocity") == 0
+    line = drawn[1].axes[0].get_lines()[0]
+    table = measures.read(out / "measures.csv")
+    last = [table["distance"].index(value) for value in sorted(table["distance"]) if value <= 1.0001e-3][-1]
+    assert np.array(line.get_xdata()).tolist() == [100.0, 200.0]
+    assert drawn[1].axes[0].get_xlabel() == "sliding velocity [mm/s]"
+    assert np.array(line.get_ydata()).tolist() == [table["friction"][last], table["friction"][-1]]
+
+
+def test_comparison(tmp_path: Path, drawn: list[Figure]) -> None:
+    """A line for each run in its own colour, named after its directory; a free scene's area is another measure."""
+    runs = []
+    for name, text in (
+        ("slow", KINDS["sliding"][0]),
+        ("other", SPHERE + ZENER + SLIDE.replace("pressure: 1.0e3", "force: 0.1")),
+    ):
+        (tmp_path / name).mkdir()
+        runs.append(ran(tmp_path / name, text).rename(tmp_path / f"{name} run"))
+    assert asked(*runs, "--compare", "--out", tmp_path / "both.png") == 0
+    first = drawn[0].axes[0].get_lines()
+    assert [line.get_label() for line in first] == ["slow run", "other run"]
+    assert [line.get_color() for line in first] == list(style.COLORS[:2])
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["slow run", "other run"]
+    assert {FRACTION, AREA} < set(panels(drawn[0]))
+    assert touching(drawn[0]) == []
+
+
+@pytest.mark.parametrize("kind", ["loads", "loads of a strip"])
+def test_movie(tmp_path: Path, kind: str) -> None:
+    """A frame for each saved instant."""
+    out = ran(tmp_path, KINDS[kind][0])
+    assert asked(out, "--movie", "pressure") == 0
+    with Image.open(out / "pressure.gif") as movie:
+        assert getattr(movie, "n_frames", 1) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--panels", "nonsense"], "there is no 'nonsense'"),
+        (["--panels", "energy"], "none of the panels energy"),
+        (["--log", "z"], "there is no axis 'z'"),
+        (["--out", "picture.docx"], "pictures are png, pdf, svg"),
+        (["--out", "nowhere/picture.png"], "cannot write nowhere/picture.png"),
+        (["--movie", "height"], "no map of height: pressure, gap"),
+        (["--movie", "gap", "--out", "gap.mp4"], "must end in .gif"),
+        (["--over", "distance"], "nothing to draw over distance"),
+        (["--over", "velocity"], "the surface slides in no stage"),
+        (["there", "--out", "one.png"], "--compare"),
+    ],
+)
+def test_what_cannot_be_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str], told: str
+) -> None:
+    out = ran(tmp_path, KINDS["loads"][0])
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.chdir(tmp_path)
+    assert asked(out, *words) == 2
+    assert told in capsys.readouterr().err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_all_maps_that_were_saved(tmp_path: Path, drawn: list[Figure]) -> None:
+    """The heights too; their mean is part of them."""
+    fields = "output: {fields: [pressure, displacement, gap, height]}\n"
+    assert asked(ran(tmp_path, WAVE + ELASTIC + LOADS + fields), "--panels", "maps") == 0
+    assert [axes.get_title().split("\n")[0] for axes in drawn[0].axes if axes.get_xlabel()] == [
+        "pressure",
+        "gap",
+        "height",
+    ]
+
+
+def test_table_without_a_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "steady.csv").write_text("velocity,pressure\n1.0,2.0\n")
+    assert asked(tmp_path) == 2
+    assert "has no column friction, contact_area" in capsys.readouterr().err
+
+
+def test_unloaded_body(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Nothing is pressed: nothing to draw but zeros, and no warning."""
+    rest = "history: [{approach: -1.0e-6, duration: 2.0, time_step: 1.0}]\n"
+    assert asked(ran(tmp_path, SPHERE + ELASTIC + rest)) == 0
+    assert panels(drawn[0])[1].startswith("approach")
