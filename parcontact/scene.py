@@ -64,7 +64,7 @@ class Frame:
 
     @property
     def dtype(self) -> type[np.floating]:
-        return np.float32 if self.job.numerics.precision == "single" else np.float64
+        return np.dtype(self.job.numerics.map_type).type
 
 
 @dataclass
@@ -112,8 +112,7 @@ def effects(job: Job) -> list[Decision]:
 
 def frame(job: Job, slab: Slab) -> Frame:
     """The surface of a job and what it is measured in; collective. Raises InputError for files that do not fit."""
-    dtype = np.float32 if job.numerics.precision == "single" else np.float64
-    fft = FFT(slab, dtype=dtype)
+    fft = FFT(slab, dtype=job.numerics.map_type)
     surface = _surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     prony = relaxation_of(job)

@@ -67,6 +67,11 @@ class Numerics(Part):
     slope: Literal["spectral", "finite-difference"] = "spectral"
     accept_unconverged: Flag = Field(default=False, description="true or false")
 
+    @property
+    def map_type(self) -> str:
+        """The type of the numbers in maps."""
+        return "float32" if self.precision == "single" else "float64"
+
 
 FieldName = Literal["pressure", "displacement", "gap", "height"]
 

@@ -87,11 +87,12 @@ class ElasticEnergy:
         self.balance.work = self.balance.stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
 
     def entries(self, units: Units) -> dict[str, Entry]:
-        """Nothing: the work follows from the contact."""
-        return {}
+        """What is stored, and the work; it follows anew from each contact, so that a run can go on without."""
+        return {"stored": Entry(self.balance.stored, self.unit, "J", optional=True)}
 
     def restore(self, saved: Saved) -> None:
-        """Nothing to restore."""
+        """What is stored, and the work."""
+        self.balance.work = self.balance.stored = float(saved.get("stored", 0.0))
 
 
 class AppliedInverse:

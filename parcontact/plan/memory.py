@@ -40,7 +40,7 @@ def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
 
 
 def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
-    points, precision = job.grid.points, _precision(job)
+    points, precision = job.grid.points, np.dtype(job.numerics.map_type)
     part = deal(job.grid.ny, ranks)[rank]
     cells = (part.stop - part.start) * job.grid.nx
     map_bytes = cells * precision.itemsize
@@ -85,17 +85,13 @@ def saved(job: Job) -> int:
     if decisions.energy_memory(job).on:
         doubles = 1 + relaxation_of(job).moduli.size
     own = [kind for effect in effects_that_follow(job).values() for kind in effect.maps(job)]
-    itemsize = maps * _precision(job).itemsize + doubles * 8 + _itemsize(own)
+    itemsize = maps * np.dtype(job.numerics.map_type).itemsize + doubles * 8 + _itemsize(own)
     return points * itemsize + (maps + doubles + len(own)) * job.grid.ny * 4
 
 
 def _itemsize(kinds: Sequence[DTypeLike]) -> int:
     """Bytes of one point of maps of these types."""
     return sum(np.dtype(kind).itemsize for kind in kinds)
-
-
-def _precision(job: Job) -> "np.dtype[np.floating]":
-    return np.dtype(np.float32 if job.numerics.precision == "single" else np.float64)
 
 
 def _moved(job: Job) -> bool:

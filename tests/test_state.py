@@ -1,0 +1,95 @@
+"""The state of a run: a checkpoint restores all of it, and a step that fails leaves it alone."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import begun, marched
+
+from parcontact.job.table import plain
+from parcontact.march.failure import StepError
+from parcontact.march.loop import run
+from parcontact.march.step import March
+from parcontact.record import checkpoint
+from parcontact.record.checkpoint import Facts
+from parcontact.record.provenance import Link, Provenance
+
+FIELDS = ("pressure", "displacement", "gap", "height")
+ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1e-4, "rms_slope": 0.02}
+ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
+RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "relaxation_time": 1e-3}]}
+STANDS = [{"pressure": 5e3}, {"pressure": 1e4}]
+SLIDES = [{"pressure": 1e4, "velocity": 0.1, "distance": 1e-4, "cells_per_step": 1}]
+OBLIQUE = [{"pressure": 1e4, "velocity": [0.1, 0.07], "distance": 1e-4, "cells_per_step": 1}]
+STEADY = {"initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4}, "output": {}}
+
+
+def job(material: dict[str, Any], history: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
+    grid = {"points": 32, "size": 1e-3}
+    data = {"grid": grid, "surface": ROUGH, "material": material, "history": history, "output": {"energy": True}}
+    return data | more
+
+
+CASES = [
+    *(job(material, history) for material in (ELASTIC, RUBBER) for history in (STANDS, SLIDES, OBLIQUE)),
+    job(RUBBER, SLIDES, numerics={"kernel": "love"}),
+    *(job(material, SLIDES, **STEADY) for material in (ELASTIC, RUBBER)),
+]
+
+
+def written(march: March, path: Path) -> Path:
+    """A checkpoint of a march."""
+    slab = march.scene.slab
+    facts = Facts(march.row.step, march.row.time, plain(march.scene.job), Provenance((Link("", 1),)))
+    checkpoint.write(path, slab, facts, march.entries())
+    return path
+
+
+@pytest.mark.parametrize("data", CASES)
+def test_all_of_it_is_there_right_after_it_is_restored(tmp_path: Path, data: dict[str, Any]) -> None:
+    """Every field, energy and entry, to the last bit; also where nothing has been made by the new run yet."""
+    old, _ = marched(data)
+    new = begun(data)
+    new.restore(checkpoint.inspect(written(old, tmp_path / "step.h5")))
+    for name in FIELDS:
+        assert np.array_equal(new.field(name), old.field(name)), name
+    for name in ("step", "time", "distance", "work", "stored", "dissipated", "branch_dissipation"):
+        np.testing.assert_equal(getattr(new.row, name), getattr(old.row, name), name)
+    entries = new.entries()
+    assert entries.keys() == old.entries().keys()
+    assert all(np.array_equal(entries[name].value, entry.value) for name, entry in old.entries().items())
+
+
+@pytest.mark.parametrize("material", [ELASTIC, RUBBER])
+def test_a_start_from_steady_sliding_is_a_state_like_any_other(material: dict[str, Any]) -> None:
+    """The gap is closed where there is pressure, and nowhere less, to the tolerance."""
+    march = begun(job(material, SLIDES, **STEADY))
+    gap, pressed = march.field("gap"), march.field("pressure") > 0.0
+    limit = march.scene.job.numerics.tolerance * march.scene.frame.height
+    assert 0.0 < np.mean(pressed) < 1.0
+    assert gap.min() > -limit
+    assert np.mean(np.abs(gap[pressed])) < 2.0 * limit
+
+
+@pytest.mark.parametrize("history", [STANDS, OBLIQUE])
+@pytest.mark.parametrize("material", [ELASTIC, RUBBER])
+def test_a_failed_step_is_none(material: dict[str, Any], history: list[dict[str, Any]]) -> None:
+    """The state, and every field of it, are those before the step; the next one is what it would have been."""
+    march, smooth = begun(job(material, history)), begun(job(material, history))
+    first, second = list(march.scene.job.timeline())[:2]
+    for each in (march, smooth):
+        each.advance(first)
+    state = march.state
+    before = {name: np.array(entry.value) for name, entry in march.entries().items()}
+    fields = [march.field(name).copy() for name in FIELDS]
+    march.scene.solver.max_iterations = 0
+    with pytest.raises(StepError):
+        march.advance(second)
+    assert march.state is state
+    assert all(np.array_equal(before[name], entry.value) for name, entry in march.entries().items())
+    assert all(np.array_equal(march.field(name), old) for name, old in zip(FIELDS, fields, strict=True))
+    march.scene.solver.max_iterations = 500
+    run(march, [], [second])
+    run(smooth, [], [second])
+    assert all(np.array_equal(march.field(name), smooth.field(name)) for name in FIELDS)
