@@ -292,7 +292,7 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
 
 
 def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:
-    zener = "{model: zener, branches: [{modulus: 1, relaxation_time: 1e-3}, {modulus: 1, relaxation_time: 1}]}"
+    zener = "{model: zener, branches: [{modulus: 1e6, relaxation_time: 1e-3}, {modulus: 1e6, relaxation_time: 1}]}"
     history = "[{pressure: 1, duration: 1, time_step: {first: 1e-5, growth: 1.25}}]"
     text = replaced(SMALL.split("history")[0], material=zener, history=history)
     (warning,) = job_of(tmp_path, text, "numerics.integrator=backward-euler").warnings

@@ -20,7 +20,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"effects"},
     {"record"},
     {"scene"},
-    {"march"},
+    {"march", "sanity"},
     {"steady_sliding"},
     {"run", "plan", "prediction"},
     {"doctor", "study"},

@@ -34,6 +34,11 @@ def rank() -> int:
     return next((int(text) for name in RANKS if (text := os.environ.get(name, "")).isdecimal()), 0)
 
 
+def launched() -> int:
+    """How many ranks a launcher has started."""
+    return max((int(os.environ.get(name) or 1) for name in LAUNCHERS), default=1)
+
+
 def started() -> MPI.Intracomm | None:
     """All ranks, if MPI has started."""
     module = sys.modules.get("mpi4py.MPI")
@@ -44,8 +49,7 @@ def start() -> MPI.Intracomm:
     """All ranks; starts MPI. Raises InputError for a rank that should not be alone, but is."""
     from ..parallel.mpi import MPI
 
-    world = MPI.COMM_WORLD
-    count = max((int(os.environ.get(name) or 1) for name in LAUNCHERS), default=1)
+    world, count = MPI.COMM_WORLD, launched()
     if world.size == 1 and count > 1:
         raise InputError(
             f"{count} ranks were started but each finds itself alone: the launcher belongs to another MPI than "

@@ -72,7 +72,8 @@ def check(options: argparse.Namespace) -> int:
         print(jobs.describe(job))
         if job.included:
             print(f"\n{job.included}")
-        for warning in dict.fromkeys(text for case in chosen for text in case.job.warnings):
+        doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
+        for warning in dict.fromkeys(doubts):
             print(f"warning: {warning}")
         if cases[0].settings:
             print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
@@ -80,11 +81,27 @@ def check(options: argparse.Namespace) -> int:
     return DONE
 
 
+def _doubts(job: Job) -> list[str]:
+    """What is wrong with heights that only a look at them tells, for a root that no other ranks wait for."""
+    from ..job import meaning
+
+    if meaning.says_all(job.surface) or ranks.launched() > 1:
+        return []
+    from .. import sanity, scene
+    from ..parallel.mpi import MPI
+    from ..parallel.slab import Slab
+
+    if not sanity.is_quickly_made(job):
+        return []
+    return sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+
+
 def plan(options: argparse.Namespace) -> int:
     from ..run import watch
 
     started = time.time() - watch.began()
     world = ranks.start()
+    from .. import sanity, scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..plan import machine, planning
@@ -98,6 +115,9 @@ def plan(options: argparse.Namespace) -> int:
     if options.sample:
         planning.leave_sample(job, slab, wanted, options.sample)
         return DONE
+    for warning in (*job.warnings, *(sanity.of_surface(scene.frame(job, slab)) if sanity.is_quickly_made(job) else ())):
+        if world.rank == 0:
+            print(f"warning: {warning}", flush=True)
     for line in planning.plan(job, slab, Slab(MPI.COMM_SELF, 1, 1), wanted, started):
         if world.rank == 0:
             print(line, flush=True)

@@ -1,17 +1,18 @@
-"""What is allowed in a job but will probably disappoint: warnings with their numbers and what to do."""
+"""What is allowed in a job but will probably disappoint: warnings with their numbers and what to do.
+
+Here are resolution and precision; `meaning.py` judges the physics of a job, `size.py` its size.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 from .history import GeometricStep, Stage
-from .sections import Grid
+from .material import Elastic, Zener
+from .sections import Grid, Numerics
 from .surface import Rough
-
-if TYPE_CHECKING:
-    from . import Job
 
 LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter of luck (paper, end of section 3)
 CELLS_PER_WAVE = 8  # fewer under-resolve the contact of the shortest waves (paper, end of section 3)
@@ -20,12 +21,15 @@ ROUNDINGS = 4.0  # of a number in a certificate
 ROUND_OFF = 1e-9
 
 
-def warnings(job: Job) -> Iterator[str]:
+def resolution(
+    grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...], numerics: Numerics
+) -> Iterator[str]:
     """Sentences, in the order of the sections."""
-    yield from _surface(job)
-    for index, stage in enumerate(job.history):
-        yield from _stage(job, index, stage)
-    yield from _precision(job)
+    yield from _surface(grid, surface)
+    short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
+    for index, stage in enumerate(history):
+        yield from _stage(index, stage, grid, material, numerics, short)
+    yield from _precision(numerics)
 
 
 def _directions(grid: Grid) -> Iterator[tuple[str, float, float]]:
@@ -36,9 +40,9 @@ def _directions(grid: Grid) -> Iterator[tuple[str, float, float]]:
         yield "y", grid.ly, grid.dy
 
 
-def _surface(job: Job) -> Iterator[str]:
-    directions = list(_directions(job.grid))
-    for index, shape in enumerate(job.surface):
+def _surface(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
+    directions = list(_directions(grid))
+    for index, shape in enumerate(surface):
         if not isinstance(shape, Rough) or not directions:
             continue
         name, length, _ = min(directions, key=lambda direction: direction[1])
@@ -68,23 +72,23 @@ def longest_step(stage: Stage, grid: Grid) -> float:
     return min(stage.seconds, step or 0.0)
 
 
-def _stage(job: Job, index: int, stage: Stage) -> Iterator[str]:
-    step = longest_step(stage, job.grid)
+def _stage(
+    index: int, stage: Stage, grid: Grid, material: Elastic | Zener, numerics: Numerics, short: float | None
+) -> Iterator[str]:
+    step = longest_step(stage, grid)
     if stage.speed and not stage.seconds:
         yield f"history.{index}: nothing slides in a stage without duration or distance; its velocity has no effect"
-    yield from _relaxation(job, index, step)
-    short = min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None)
+    yield from _relaxation(index, step, material, numerics)
     slid = step * stage.speed
     if short is not None and slid > short / STEPS_PER_WAVE * (1 + ROUND_OFF):
         yield (
             f"history.{index}: the surface slides {slid:.3g} m in one step, {slid / short:.2g} of its shortest wave; "
             f"use time steps up to {short / STEPS_PER_WAVE / stage.speed:.3g} s "
-            f"(cells_per_step up to {short / STEPS_PER_WAVE / job.grid.dx:.3g})"
+            f"(cells_per_step up to {short / STEPS_PER_WAVE / grid.dx:.3g})"
         )
 
 
-def _precision(job: Job) -> Iterator[str]:
-    numerics = job.numerics
+def _precision(numerics: Numerics) -> Iterator[str]:
     reach = ROUNDINGS * (2.0**-23 if numerics.precision == "single" else 2.0**-52)
     if numerics.tolerance < reach:
         other = "precision: mixed or " if numerics.precision == "single" else ""
@@ -95,10 +99,10 @@ def _precision(job: Job) -> Iterator[str]:
         )
 
 
-def _relaxation(job: Job, index: int, step: float) -> Iterator[str]:
-    times = [branch.relaxation_time for branch in getattr(job.material, "branches", ())]
+def _relaxation(index: int, step: float, material: Elastic | Zener, numerics: Numerics) -> Iterator[str]:
+    times = [branch.relaxation_time for branch in getattr(material, "branches", ())]
     shortest = min((time for time in times if 0 < time < float("inf")), default=None)
-    if job.numerics.integrator == "backward-euler" and shortest is not None and step > shortest * (1 + ROUND_OFF):
+    if numerics.integrator == "backward-euler" and shortest is not None and step > shortest * (1 + ROUND_OFF):
         yield (
             f"history.{index}: time steps up to {step:.3g} s are longer than the shortest relaxation time "
             f"{shortest:.3g} s, which backward-euler does not resolve; shorten the steps or use integrator: exponential"

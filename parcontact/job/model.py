@@ -14,11 +14,11 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from . import advice, extension, limits, table
+from . import advice, extension, limits, meaning, size, table
 from .fault import Fault
 from .history import Initial, Stage, Steady
 from .loading import Included
-from .material import Elastic, Material, Zener
+from .material import Dma, Elastic, Material, Zener
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
@@ -163,8 +163,14 @@ class Job(Part):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is allowed but will probably disappoint."""
-        return tuple(advice.warnings(self))
+        """What is allowed but will probably disappoint; errors with `numerics.strict`."""
+        material = self.material.fitted if isinstance(self.material, Dma) else self.material
+        scene = self.grid, self.surface, material, self.history
+        return (
+            *advice.resolution(*scene, self.numerics),
+            *meaning.warnings(*scene, self.initial, self.steady),
+            *size.warnings(self.grid, self.timeline(), self.output),
+        )
 
     def section(self, name: str) -> Any:
         """The section that an effect has added, None if this job has not given it."""

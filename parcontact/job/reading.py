@@ -14,11 +14,12 @@ from .fault import faults_of
 from .loading import read_job
 from .model import Job
 from .part import Context
-from .source import Key, Mistake, Source, shorten
+from .source import Key, Mistake, Place, Source, shorten
 from .sweep import Sweep
 
 MANY_MISTAKES = 40  # more are not shown one by one
 SHOWN_MISTAKES = 20  # of so many
+STRICT = "an error with numerics.strict"
 CASES = "cases"  # where in the output directory of a job its cases have theirs
 
 
@@ -93,6 +94,8 @@ def _read(path: Path, overrides: Sequence[str], index: int) -> tuple[Case | None
     if () not in source.broken:
         try:
             job = Job.model_validate(source.data, context=Context(path.absolute(), included))
+            if job.numerics.strict:
+                source.mistakes += [Mistake(Place(str(path)), f"{text} ({STRICT})") for text in job.warnings]
             if not source.mistakes:
                 return _case(job, index, sweep), [], sweep
         except ValidationError as error:

@@ -66,6 +66,7 @@ class Numerics(Part):
     precision: Literal["double", "single", "mixed"] = "double"
     slope: Literal["spectral", "finite-difference"] = "spectral"
     accept_unconverged: Flag = Field(default=False, description="true or false")
+    strict: Flag = Field(default=False, description="true or false")
 
     @property
     def map_type(self) -> str:

@@ -192,8 +192,13 @@ class Timeline:
             before = (stage.control, stage.load.end)
         self._lasts = [span.last for span in self.spans]
 
-    def __len__(self) -> int:
+    @property
+    def count(self) -> int:
+        """The number of steps, however many."""
         return self._lasts[-1] if self._lasts else 0
+
+    def __len__(self) -> int:
+        return self.count
 
     def __getitem__(self, number: int) -> Step:
         """The step of this number, from 1."""

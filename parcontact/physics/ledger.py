@@ -26,6 +26,7 @@ class Measures:
     `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
     the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
     spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
+    `at_edge` says that an isolated contact reaches it.
     """
 
     pressure: float = 0.0
@@ -37,6 +38,7 @@ class Measures:
     mean_gap: float = 0.0
     max_pressure: float = 0.0
     contact_area_corrected: float = 0.0
+    at_edge: bool = False
 
     @property
     def friction_x(self) -> float:
@@ -64,7 +66,8 @@ class Ledger:
         *sums, largest = loops.measure(p, u, h)
         cyclic = self.surface.periodic
         sides = loops.edges(p, rows.before_first(self.slab, p, cyclic), cyclic)
-        load, count, gaps, sides, largest = self.slab.reduce([*sums, sides], [largest])
+        edge = 0.0 if cyclic else _largest_at_edge(self.slab, p)
+        load, count, gaps, sides, largest, edge = self.slab.reduce([*sums, sides], [largest, edge])
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
@@ -82,4 +85,13 @@ class Ledger:
             mean_gap=(gaps / points - d) * units.height,
             max_pressure=largest * unit_pressure,
             contact_area_corrected=(count - SIDE * sides) / points,
+            at_edge=edge > 0.0,
         )
+
+
+def _largest_at_edge(slab: Slab, p: Array) -> float:
+    """The largest pressure of this rank's points at the edge of the box, across which there is more than one point."""
+    sides = [p[:, 0], p[:, -1]] if slab.nx > 1 else []
+    if slab.ny > 1 and len(p):
+        sides += [p[0]] * (slab.rows.start == 0) + [p[-1]] * (slab.rows.stop == slab.ny)
+    return max((float(side.max(initial=0.0)) for side in sides), default=0.0)

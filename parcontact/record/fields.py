@@ -70,6 +70,10 @@ class FieldsFile:
         """Whether the maps of the step after which it goes on are due, and were not saved then."""
         return step in self.steps and step not in self._kept
 
+    def renew(self, provenance: Provenance) -> None:
+        """Put what has changed of its origin into the file."""
+        layout.change(self.path, self.slab, provenance.renew)
+
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
         """Put the maps of one instant into their place."""
         index = self.steps[step]

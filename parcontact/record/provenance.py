@@ -22,7 +22,8 @@ REFERENCES = (
     "M. Frigo, S. G. Johnson, Proc. IEEE 93 (2005) 216 (FFTW)",
 )
 LEFT_OUT = "(too long to be kept)"
-CHAIN_BYTES = 60_000  # of the text of a chain: an attribute of fixed size can be renewed in place
+WARNING_BYTES = 4_000
+CHAIN_BYTES = 50_000  # of the text of a chain: an attribute of fixed size can be renewed in place
 
 
 def _now() -> str:
@@ -43,12 +44,13 @@ class Link:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a file is to say of its origin: the chain of runs up to the present one, the seeds of its roughness, and the
-    file that its job includes."""
+    """What a file is to say of its origin: the chain of runs up to the present one, the seeds of its roughness, the
+    file that its job includes, and the warnings about its scene."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
     included: str = ""
+    warnings: tuple[str, ...] = ()
 
     def write(self, file: h5py.File) -> None:
         """Attributes of the file: program, resolved job (YAML), chain (JSON), ranks, seeds, libraries, references."""
@@ -56,6 +58,7 @@ class Provenance:
         file.attrs["program"] = now.program
         file.attrs["job"] = now.job
         file.attrs.create("chain", _fixed(self.chain, now.job))
+        file.attrs.create("warnings", self._warnings)
         file.attrs["ranks"] = now.ranks
         small = all(seed < 2**63 for seed in self.seeds)
         file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64) if small else [str(seed) for seed in self.seeds]
@@ -69,6 +72,13 @@ class Provenance:
     def renew(self, file: h5py.File) -> None:
         """Put the longer chain into a file that has one; nothing else in it changes its place."""
         file.attrs.modify("chain", _fixed(self.chain, file.attrs["job"]))
+        if "warnings" in file.attrs:
+            file.attrs.modify("warnings", self._warnings)
+
+    @property
+    def _warnings(self) -> NDArray[np.bytes_]:
+        """One a line, of fixed size: it can be renewed in place."""
+        return np.array("\n".join(self.warnings).encode()[:WARNING_BYTES], dtype=f"S{WARNING_BYTES}")
 
 
 def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:

@@ -103,6 +103,11 @@ class Recorder:
             except RunError as error:
                 self.problem = self.problem or str(error)
 
+    def renew(self, provenance: Provenance) -> None:
+        """Put what has changed of where they come from into the files."""
+        if self._fields:
+            self._fields.renew(provenance)
+
     def sync(self) -> None:
         """Wait until all that was recorded is on the disk. What is wrong with it is left in `problem`, if results are
         lost by it, or warned of."""

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .. import scene
+from .. import sanity, scene
 from ..effects import decisions
 from ..errors import InputError, RunError
 from ..job import Job, Rough
@@ -48,23 +48,25 @@ def run(job: Job, slab: Slab, options: Options) -> int:
         origin, warnings = restart.choose(job, plain, slab, directory, options.restart)
         timeline = job.timeline(options.until or 0.0)
         _refuse_no_end(timeline, options.until)
+        sanity.refuse_impossible(job, timeline)
         if origin and (reason := _nothing_to_do(origin, timeline, options.until)):
             if slab.root and not options.quiet:
                 print(f"{directory.path}: {reason}", flush=True)
             return DONE
         wisdom.recall(job, slab, origin.wisdom if origin else None)
         built = scene.build(job, slab, options.until or 0.0)
+        doubts = (*job.warnings, *sanity.of_surface(built.frame))
         marching = March(built)
         if origin:
             marching.restore(origin.contents)
         elif decisions.steady_start(job).on:
             steadystart.begin(marching)
         wisdom.keep(job, slab)
-        provenance = _provenance(job, slab, origin)
+        provenance = _provenance(job, slab, origin, doubts)
         claim = _claim(plain, directory, origin)
         recorder = _begin(built, directory, claim, provenance, origin, len(timeline), options.quiet)
         try:
-            for text in (*job.warnings, *warnings, *recorder.warnings):
+            for text in (*doubts, *warnings, *recorder.warnings):
                 recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None
             watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
@@ -91,11 +93,11 @@ def _nothing_to_do(origin: Origin, timeline: Timeline, until: float | None) -> s
     return ""
 
 
-def _provenance(job: Job, slab: Slab, origin: Origin | None) -> Provenance:
+def _provenance(job: Job, slab: Slab, origin: Origin | None, doubts: tuple[str, ...]) -> Provenance:
     link = Link(job.resolved(), slab.comm.size, origin.contents.step if origin else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough))
     chain = extended(origin.contents.chain if origin else (), link)
-    return Provenance(chain, seeds, str(job.included) if job.included else "")
+    return Provenance(chain, seeds, str(job.included) if job.included else "", doubts)
 
 
 def _claim(plain: dict[str, Any], directory: Directory, origin: Origin | None) -> Claim:
@@ -148,6 +150,7 @@ class _Journey:
         self.console = recorder.console
         self.first, self.saved, self.failed = marching.row.step, -1, False
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
+        self.contacts = sanity.ContactWatch(self.job, timeline)
         self.stop = ""
         self.began, self.saving = time.monotonic(), 0.0
 
@@ -192,6 +195,21 @@ class _Journey:
         if marching.row.remark:
             self.console.say(marching.row.remark)
         self.recorder.write(marching.row, marching.field)
+        try:
+            doubts = self.contacts.judge(marching.row.step, marching.row.measures)
+        except RunError as error:
+            raise RunError(f"{error}{self._left()}") from error
+        if doubts:
+            self._doubt(doubts)
+
+    def _doubt(self, texts: list[str]) -> None:
+        """Warn, in the files too; all ranks have the same doubts."""
+        for text in texts:
+            self.console.warn(text)
+        provenance = self.facts.provenance
+        provenance = replace(provenance, warnings=(*provenance.warnings, *texts))
+        self.facts = replace(self.facts, provenance=provenance)
+        self.recorder.renew(provenance)
 
     def decide(self, marching: March) -> bool:
         """Save if it is time to; True ends the march."""

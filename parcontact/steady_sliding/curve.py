@@ -2,12 +2,13 @@
 
 import csv
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import scene
+from .. import sanity, scene
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Slab
@@ -62,11 +63,17 @@ def run(job: Job, slab: Slab, wanted: Request, quiet: bool) -> int:
     """Solve all points, writing each at once; collective. Returns the exit code: 1 if any of them has failed."""
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
+        sanity.refuse_impossible(job, job.timeline())
         plain = marker.plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
-        sliding = SteadySliding(scene.frame(job, slab))
+        base = scene.frame(job, slab)
+        doubts = [*job.warnings, *sanity.of_surface(base)]
+        sliding = SteadySliding(base)
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         table = _Table(directory.path, sliding, wanted, quiet) if slab.root else None
+        watch = sanity.ContactWatch(job, job.timeline())
+        if table:
+            table.warn(doubts)
         failures = 0
         for pressure in wanted.pressures:
             for speed in wanted.velocities:
@@ -81,6 +88,7 @@ def run(job: Job, slab: Slab, wanted: Request, quiet: bool) -> int:
                 shares = sliding.shares(velocity) if wanted.waves else None
                 if table:
                     table.write(point, shares)
+                    table.warn(watch.judge_point(point.measures, f"{speed:g} m/s under {pressure:g} Pa"))
         if table:
             table.close(failures)
     return 1 if failures else 0
@@ -103,6 +111,11 @@ class _Table:
     def say(self, text: str) -> None:
         if not self.quiet or text.startswith("parcontact"):
             print(text, flush=True)
+
+    def warn(self, texts: list[str]) -> None:
+        """What is shown even to those who asked for quiet."""
+        for text in texts:
+            print(f"warning: {text}", file=sys.stderr, flush=True)
 
     def write(self, point: Point, shares: Any) -> None:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)

@@ -1,0 +1,189 @@
+"""Warnings about what a job means: scenes outside of the theory, which has small slopes, small strains and no end.
+
+Each says the value, the limit and what to change. A half space is linear: surfaces are gentle, pressures well below the
+modulus, and what is isolated has room around it. All is judged by lower bounds, so that no sound scene is warned of.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from .history import Initial, Stage, Steady
+from .material import Elastic, PronyBranch, Zener
+from .sections import Grid
+from .surface import HeightFile, Rough, Sphere, Wave
+
+STEEPEST = 1.0  # rms slope, and radius of a contact over that of its sphere: beyond, slopes are not small
+SOFTEST, HARDEST = 1e3, 1e12  # Pa; shear moduli go from 1e3 (gels) to 5e11 (diamond)
+STRAIN = 1.0  # mean pressure over 2 G/(1 - nu): beyond, strains are not small
+BEYOND = 100.0  # times slower or faster than all branches: nothing relaxes
+MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6"
+
+
+def warnings(
+    grid: Grid,
+    surface: tuple[Any, ...],
+    material: Elastic | Zener,
+    history: tuple[Stage, ...],
+    initial: Initial,
+    steady: Steady | None,
+) -> Iterator[str]:
+    """Sentences, in the order of the sections."""
+    yield from _slopes(grid, surface)
+    yield from _moduli(material)
+    yield from _pressures(grid, material, history, initial, steady)
+    yield from _band(surface, material, history, initial, steady)
+    if grid.boundary == "free":
+        yield from _room(grid, surface, material, history)
+
+
+def steep(slope: float) -> str:
+    """What to say of an rms slope, if it is too large."""
+    if slope <= STEEPEST:
+        return ""
+    return (
+        f"surface: its rms slope is {slope:.3g}, and the theory is one of small slopes, well below {STEEPEST:g}: "
+        + MANY_UNITS
+    )
+
+
+def says_all(surface: tuple[Any, ...]) -> bool:
+    """Whether the slopes of a surface follow from the job, without its heights."""
+    return not any(isinstance(shape, HeightFile) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
+
+
+def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
+    """Of shapes whose rms slope follows from the job; those of files are known once they are read."""
+    if not says_all(surface):
+        return
+    square = 0.0
+    for shape in surface:
+        if isinstance(shape, Wave):
+            q = 2 * math.pi * math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
+            square += (q * shape.amplitude) ** 2 / 2
+        elif isinstance(shape, Rough):
+            square += (shape.rms_slope or 0.0) ** 2
+    if text := steep(math.sqrt(square)):
+        yield text
+
+
+def _moduli(material: Elastic | Zener) -> Iterator[str]:
+    modulus = material.instant_modulus
+    if modulus < SOFTEST:
+        yield (
+            f"material: its shear modulus at once is {modulus:.3g} Pa, softer than {SOFTEST:g} Pa, as gels are; moduli "
+            f"are in Pa: {modulus:.3g} MPa would be {modulus * 1e6:.3g}"
+        )
+    elif modulus > HARDEST:
+        yield f"material: its shear modulus at once is {modulus:.3g} Pa, above {HARDEST:g} Pa, harder than diamond"
+
+
+def contact_modulus(material: Elastic | Zener) -> float:
+    """E* = 2 G/(1 - nu) at a sudden strain [Pa], the largest there is."""
+    return 2.0 * material.instant_modulus / (1.0 - material.poisson)
+
+
+def _mean(stage: Stage, load: float, grid: Grid) -> float:
+    """The mean pressure of a stage that prescribes a load [Pa]; nothing for an approach."""
+    if stage.control == "approach":
+        return 0.0
+    return load / (grid.lx * grid.ly) if stage.control == "force" else load
+
+
+def _pressures(
+    grid: Grid, material: Elastic | Zener, history: tuple[Stage, ...], initial: Initial, steady: Steady | None
+) -> Iterator[str]:
+    modulus = contact_modulus(material)
+    loads = [
+        (
+            f"history.{index}.{stage.control}",
+            max(_mean(stage, load, grid) for load in (stage.load.start, stage.load.end)),
+        )
+        for index, stage in enumerate(history)
+    ]
+    loads.append(("initial.pressure", initial.pressure or 0.0))
+    loads.append(("steady.pressures", max((steady.pressures if steady else None) or (0.0,))))
+    key, pressure = max(loads, key=lambda load: load[1])
+    if pressure > STRAIN * modulus:
+        yield (
+            f"{key}: a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are "
+            "far beyond linear theory; pressures and moduli are both in Pa"
+        )
+
+
+# -- relaxation -------------------------------------------------------------------------------------------------------
+
+
+def _band(
+    surface: tuple[Any, ...],
+    material: Elastic | Zener,
+    history: tuple[Stage, ...],
+    initial: Initial,
+    steady: Steady | None,
+) -> Iterator[str]:
+    """Sliding excites the angular frequencies q v of the surface's waves; branches answer around 1/relaxation time."""
+    times = [branch.relaxation_time for branch in _relaxing(material)]
+    lengths = [length for shape in surface if isinstance(shape, Rough) for length in _wavelengths(shape)]
+    speeds = [stage.speed for stage in history if stage.speed and stage.seconds]
+    speeds += [math.hypot(*initial.velocity)] if any(initial.velocity) else []
+    speeds += steady.velocities if steady else ()
+    if not (times and lengths and speeds) or getattr(material, "temperature", None) is not None:
+        return  # at another temperature the branches relax at other rates
+    low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
+    slow, fast = 1.0 / max(times), 1.0 / min(times)
+    if high * BEYOND < slow or low > fast * BEYOND:
+        how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
+        yield (
+            f"material: sliding excites {low:.3g} to {high:.3g} rad/s, all more than {BEYOND:g} times {how} than the "
+            f"branches, which relax at {slow:.3g} to {fast:.3g} rad/s: the body is elastic with its {modulus} modulus; "
+            "are velocities in m/s, lengths in m and relaxation times in s?"
+        )
+
+
+def _relaxing(material: Elastic | Zener) -> Iterator[Any]:
+    for branch in getattr(material, "branches", ()):
+        if 0.0 < branch.relaxation_time < math.inf and (isinstance(branch, PronyBranch) or branch.G0 > 0.0):
+            yield branch
+
+
+def _wavelengths(shape: Rough) -> tuple[float, float]:
+    return shape.long_wavelength, shape.short_wavelength
+
+
+# -- isolated contacts ------------------------------------------------------------------------------------------------
+
+
+def _room(grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...]) -> Iterator[str]:
+    """A single sphere: the least radius its contact can have, where it goes, and whether that is inside the box."""
+    if len(surface) != 1 or not isinstance(surface[0], Sphere) or min(grid.points) == 1:
+        return
+    sphere = surface[0]
+    x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
+    modulus, told = contact_modulus(material), set()
+    for index, stage in enumerate(history):
+        x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
+        radius = _hertz(stage, sphere.radius, modulus, grid)
+        if radius / sphere.radius > STEEPEST and "steep" not in told:
+            told.add("steep")
+            yield (
+                f"history.{index}: the contact would have a radius of {radius:.3g} m or more, larger than that of the "
+                f"sphere, {sphere.radius:g} m; the theory is one of small slopes: use a smaller load"
+            )
+        room = min(x, grid.lx - x, y, grid.ly - y)
+        if radius > room and radius > 0.0 and "room" not in told:
+            told.add("room")
+            where = f"centred at ({x:.4g}, {y:.4g}) m in the end" if stage.speed and stage.seconds else "there"
+            yield (
+                f"history.{index}: the contact, {where}, has a radius of {radius:.3g} m or more and leaves the box of "
+                f"{grid.lx:g} x {grid.ly:g} m; use a larger grid.size, less load or a shorter way"
+            )
+
+
+def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
+    """The radius of contact at the end of a stage [m] by Hertz (1882), a lower bound for a body that creeps."""
+    if stage.control == "approach":
+        return math.sqrt(max(stage.load.end, 0.0) * radius)
+    force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
+    return float((0.75 * force * radius / modulus) ** (1 / 3))

@@ -1,0 +1,98 @@
+"""Warnings about what a job needs: memory, steps, disk; against those of this machine, and lower bounds all of them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from .sections import Grid, Output
+from .timeline import Timeline
+
+MAPS, MAPS_FREE = 9.0, 18.0  # of 8 bytes per point that any run holds, at least; free ones have padded transforms
+MANY_STEPS = 10**8  # at a millisecond each, more than a day; and no step takes less than a tenth of that
+MOST_INSTANTS = 10**6  # of fields in one file: each has its place in it from the start
+GIGA = 1e9
+CGROUP = Path("/sys/fs/cgroup/memory.max")
+
+
+def warnings(grid: Grid, timeline: Timeline, output: Output) -> Iterator[str]:
+    """Sentences: memory, steps, disk."""
+    if text := beyond_memory(grid):
+        yield text
+    count = timeline.count
+    if count > MANY_STEPS:
+        seconds = 1e-4 * count
+        duration = f"{seconds / 3.156e7:.2g} years" if seconds > 3.156e7 else f"{seconds / 3600:.2g} hours"
+        yield (
+            f"history: {count:.3g} steps take at least {duration}, at a tenth of a millisecond each; use longer time "
+            "steps (time_step, cells_per_step) or a shorter history"
+        )
+    if output.fields:
+        saved = -(-count // output.every)
+        needed, free = float(saved) * len(output.fields) * grid.nx * grid.ny * 8, _free(output.directory)
+        if needed > free:
+            yield (
+                f"output.fields: {saved:.4g} instants need {needed / GIGA:.3g} GB, and {output.directory} has "
+                f"{free / GIGA:.3g} GB left; use a larger output.every than {output.every}, or fewer fields"
+            )
+
+
+def beyond_memory(grid: Grid) -> str:
+    """What to say if no run of a grid can fit into the memory of the machines it runs on, or ''."""
+    needed = (MAPS_FREE if grid.boundary == "free" else MAPS) * 8.0 * grid.nx * grid.ny
+    each, count = _memory(), machines()
+    if needed <= each * count:
+        return ""
+    have = (
+        f"this machine has {each / GIGA:.3g} GB"
+        if count == 1
+        else f"{count} such machines have {each * count / GIGA:.3g} GB"
+    )
+    return (
+        f"grid.points: {grid.nx} x {grid.ny} points need at least {needed / GIGA:.3g} GB of memory on all ranks "
+        f"together, and {have}; use fewer points, or {int(needed / each) + 1} such machines"
+    )
+
+
+def beyond_file(timeline: Timeline, output: Output) -> str:
+    """What to say if one file cannot hold so many instants of fields, or ''."""
+    saved = -(-timeline.count // output.every)
+    if not output.fields or saved <= MOST_INSTANTS:
+        return ""
+    least = -(-timeline.count // MOST_INSTANTS)
+    return (
+        f"output.every: {saved:.4g} instants of fields would be saved, and a file holds {MOST_INSTANTS} at most; use "
+        f"every: {least} or more"
+    )
+
+
+def machines() -> int:
+    """On how many machines this program runs, as far as its launcher tells."""
+
+    def told(name: str) -> int:
+        text = os.environ.get(name, "")
+        return int(text) if text.isdecimal() else 0
+
+    ranks, here = told("OMPI_COMM_WORLD_SIZE"), told("OMPI_COMM_WORLD_LOCAL_SIZE")
+    return max(1, told("SLURM_JOB_NUM_NODES"), -(-ranks // here) if here else 1)
+
+
+def _memory() -> float:
+    """Bytes of this machine, or those it grants to this program."""
+    whole = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    try:
+        return min(whole, float(CGROUP.read_text()))
+    except (OSError, ValueError):  # no such limit
+        return whole
+
+
+def _free(directory: Path) -> float:
+    """Bytes left on the disk of the nearest directory that there is."""
+    for place in (directory.absolute(), *directory.absolute().parents):
+        try:
+            return float(shutil.disk_usage(place).free)
+        except OSError:
+            continue
+    return float("inf")

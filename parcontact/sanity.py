@@ -1,0 +1,204 @@
+"""Whether a scene means something, seen from its heights before a run and from its contacts during it.
+
+What a job alone tells is in `job/meaning.py`. All is judged from sums over all points: every rank says the same.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .errors import InputError, RunError
+from .job import HeightFile, Job, meaning, size
+from .job.timeline import Timeline
+from .parallel import rows
+from .parallel.slab import Array, Slab
+from .physics.ledger import Measures
+from .scene import Frame
+
+SEAM = (
+    2.0  # the jump across the edge of the box over the largest increment of neighbours inside: 1 if nothing is special
+)
+ROUGH = 0.5  # of the curvature over one cell that is gone over two: half of it, as in a wave of four cells
+FEW_CELLS = (
+    0.15  # of the area of contact that counting cells takes too large: contacts of three cells, a circle of four
+)
+FEW_POINTS = 2**22  # that are made in seconds
+STRICT = "an error with numerics.strict"
+
+
+def refuse_impossible(job: Job, timeline: Timeline) -> None:
+    """Raise InputError for a run that cannot begin here: too many points for the memory, or too many instants."""
+    for text in (size.beyond_memory(job.grid), size.beyond_file(timeline, job.output), _endless(timeline)):
+        if text:
+            raise InputError(text)
+
+
+def _endless(timeline: Timeline) -> str:
+    most = 10**18
+    return (
+        f"the history would have {timeline.count:.3g} steps; it has at most {most:.0e}" if timeline.count > most else ""
+    )
+
+
+def is_quickly_made(job: Job) -> bool:
+    """Whether the heights of a job say more than the job does, and are few enough to be made for a look at them."""
+    return not meaning.says_all(job.surface) and job.grid.nx * job.grid.ny <= FEW_POINTS
+
+
+def of_surface(frame: Frame) -> list[str]:
+    """What is wrong with the heights of a scene, collective; raises InputError with `numerics.strict`."""
+    found = list(_of_surface(frame))
+    if found and frame.job.numerics.strict:
+        raise InputError("\n".join(f"{text} ({STRICT})" for text in found))
+    return found
+
+
+def _of_surface(frame: Frame) -> Iterator[str]:
+    if frame.roughness and (text := meaning.steep(frame.roughness.rms_slope)) and text not in frame.job.warnings:
+        yield text
+    if any(isinstance(shape, HeightFile) for shape in frame.job.surface):
+        heights = frame.surface.heights((0.0, 0.0), np.empty(frame.slab.shape, frame.dtype)).astype(np.float64)
+        seams = list(_seams(frame, heights)) if frame.job.grid.boundary == "periodic" else []
+        yield from seams or _resolution(frame, heights)  # a seam has a curvature of its own
+
+
+# -- the edge of a periodic box ---------------------------------------------------------------------------------------
+
+
+def _seams(frame: Frame, heights: Array) -> Iterator[str]:
+    """Where the first and the last points of a periodic box do not fit together."""
+    unit, grid = frame.units.height, frame.job.grid
+    for name, (jump, inside, rise), length in (
+        ("x", _along_x(frame.slab, heights), grid.lx),
+        ("y", _along_y(frame.slab, heights), grid.ly),
+    ):
+        if jump <= SEAM * inside:
+            continue
+        tilt = rise / length
+        advice = "cut it where it fits, or let it fade to its mean towards the edge"
+        if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside:
+            advice = f"it is tilted by {abs(tilt) * unit:.3g}: subtract its mean plane"
+        yield (
+            f"surface: along {name} the heights jump by {jump * unit:.3g} m (rms) across the edge of the periodic box, "
+            f"{_times(jump, inside)} the most between neighbours inside, and such a wall makes friction of its own; "
+            f"{advice}"
+        )
+
+
+def _times(jump: float, inside: float) -> str:
+    return f"{jump / inside:.3g} times" if inside else "where there is nothing at"
+
+
+def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
+    """The rms jump across the edge, the largest rms increment inside, the mean rise from one side to the other."""
+    if slab.nx < 3:
+        return 0.0, 0.0, 0.0
+    steps = np.roll(heights, -1, axis=1) - heights
+    squares = slab.sum(*(steps**2).sum(axis=0).tolist(), -float(steps[:, -1].sum()))
+    *columns, rise = squares
+    rms = np.sqrt(np.array(columns) / slab.ny)
+    return float(rms[-1]), float(rms[:-1].max()), rise / slab.ny
+
+
+def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
+    """The same from row to row."""
+    before = rows.before_first(slab, heights, True)
+    if slab.ny < 3:
+        return 0.0, 0.0, 0.0
+    steps = np.diff(np.concatenate([np.atleast_2d(before), heights]), axis=0) if len(heights) else heights
+    rms = np.sqrt((steps**2).mean(axis=1))
+    first = slab.rows.start == 0 and len(heights) > 0
+    at_edge = float(rms[0]) if first else 0.0
+    inside = float(rms[1 if first else 0 :].max(initial=0.0))
+    rise, jump, most = slab.reduce([-float(steps[0].mean()) if first else 0.0], [at_edge, inside])
+    return jump, most, rise
+
+
+# -- resolution of a file ---------------------------------------------------------------------------------------------
+
+
+def _resolution(frame: Frame, heights: Array) -> Iterator[str]:
+    """Second differences over one cell and over two are alike where a surface is resolved; only the upper half counts,
+    which comes into contact."""
+    slab = frame.slab
+    lost, all_of_it = 0.0, 0.0
+    mean = slab.sum(float(heights.sum()))[0] / slab.points
+    upper = heights > mean
+    for count, shifted in ((slab.nx, _shifted_x), (slab.ny, _shifted_y)):
+        if count < 8:
+            continue
+        fine = shifted(slab, heights, 1) - 2 * heights + shifted(slab, heights, -1)
+        coarse = (shifted(slab, heights, 2) - 2 * heights + shifted(slab, heights, -2)) / 4
+        lost += float(((fine - coarse)[upper] ** 2).sum())
+        all_of_it += float((fine[upper] ** 2).sum())
+    lost, all_of_it = slab.sum(lost, all_of_it)
+    if all_of_it and math.sqrt(lost / all_of_it) > ROUGH:
+        yield (
+            f"surface: {math.sqrt(lost / all_of_it):.0%} of the curvature of its upper half is in waves of less than 4 "
+            f"cells, the limit is {ROUGH:.0%}: contacts of single points carry the load; smooth the heights, or "
+            "interpolate them to a finer grid"
+        )
+
+
+def _shifted_x(slab: Slab, heights: Array, count: int) -> Array:
+    return np.roll(heights, count, axis=1)
+
+
+def _shifted_y(slab: Slab, heights: Array, count: int) -> Array:
+    return rows.roll(slab, heights, count, np.empty_like(heights))
+
+
+# -- contacts ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class ContactWatch:
+    """Looks at what each step of a run has measured, and tells each kind of nonsense once."""
+
+    job: Job
+    timeline: Timeline
+    told: set[str] = field(default_factory=set)
+
+    def judge(self, step: int, measures: Measures) -> list[str]:
+        """Warnings about a step; raises RunError with `numerics.strict`."""
+        return self._new(f"step {step}", measures, step > 0 and self._ends_a_stage(step))
+
+    def judge_point(self, measures: Measures, where: str) -> list[str]:
+        """The same about steady sliding."""
+        return self._new(where, measures, True)
+
+    def _new(self, where: str, measures: Measures, ends: bool) -> list[str]:
+        """What has not been told yet."""
+        found = {"edge": at_edge(measures), "cells": few_cells(measures) if ends else ""}
+        new = {kind: f"{where}: {text}" for kind, text in found.items() if text and kind not in self.told}
+        self.told |= new.keys()
+        if new and self.job.numerics.strict:
+            raise RunError("; ".join(f"{text} ({STRICT})" for text in new.values()))
+        return list(new.values())
+
+    def _ends_a_stage(self, step: int) -> bool:
+        return step <= self.timeline.count and self.timeline.span(step).last == step
+
+
+def at_edge(measures: Measures) -> str:
+    """What to say of a contact that leaves its box, or ''."""
+    if not measures.at_edge:
+        return ""
+    return (
+        "the contact reaches the edge of the box, and a free body goes on beyond it where nothing presses; use a "
+        "larger grid.size, less load or a shorter way"
+    )
+
+
+def few_cells(measures: Measures) -> str:
+    """What to say of contacts that consist of their own edges, or ''."""
+    area = measures.contact_area
+    excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
+    if excess <= FEW_CELLS:
+        return ""
+    return (
+        f"contacts are a few cells wide: counted in cells their area is {excess:.0%} too large, and {FEW_CELLS:.0%} is "
+        "the limit; use more grid.points, a smaller grid.size or a larger load"
+    )
