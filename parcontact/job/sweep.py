@@ -59,8 +59,9 @@ def take(source: Source) -> Sweep | None:
         return Sweep([], place)
     mistakes = len(source.mistakes)
     sweep = Sweep(list(_axes(section, source)), place)
-    if len(sweep) > MAX_CASES:
-        source.mistakes.append(Mistake(place, f"sweep has {len(sweep)} cases, and {MAX_CASES} is the most"))
+    count = math.prod(map(len, sweep.axes)) if sweep.axes else 0  # may be more than a length can be
+    if count > MAX_CASES:
+        source.mistakes.append(Mistake(place, f"sweep has {quote(count)} cases, and {MAX_CASES} is the most"))
     return sweep if len(source.mistakes) == mistakes and not source.within_broken(SWEEP) else None
 
 

@@ -188,3 +188,9 @@ def test_an_include_is_searched_beside_the_job_only(tmp_path: Path) -> None:
     assert included.path == beside
     # printf 'abc: 1\n' | sha256sum
     assert included.sha256 == "be10690b979a6439e0a095045129e20996ed424d61bb7149016297110c1b4303"
+
+
+def test_a_sweep_of_more_cases_than_a_length_can_be(tmp_path: Path) -> None:
+    axes = ", ".join(f"{{history.0.a{i}: {list(range(100))}}}" for i in range(12))
+    (mistake,) = mistakes_of(tmp_path, f"{SMALL}sweep: [{axes}]\n")
+    assert mistake == "job.yaml:6:8: sweep has 1000000000000000000000000 cases, and 1000 is the most"
