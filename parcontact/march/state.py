@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..parallel.slab import Array
-from ..physics.entries import Entry, Saved
+from ..physics.entries import Entry, MapCount, Saved
 from ..physics.units import Units
 from ..record.checkpoint import Contents, read
 from ..record.row import Row
@@ -31,6 +31,11 @@ class State:
     alpha_old: float = 0.0
     approach: float = 0.0
     position: tuple[float, float] = (0.0, 0.0)
+
+    @staticmethod
+    def count_maps(lasts: bool) -> MapCount:
+        """Of the states before and after a step, which share the earlier pressure; there is one if stages last."""
+        return MapCount(held=2 + lasts, saved=1 + lasts)
 
     def entries(self, units: Units) -> dict[str, Entry]:
         """What a checkpoint has of it; step and time it says itself."""

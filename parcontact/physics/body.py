@@ -25,7 +25,7 @@ from numpy.typing import DTypeLike
 
 from ..parallel.slab import Array, Slab, allocate
 from . import loops
-from .entries import Entry, Saved
+from .entries import Entry, MapCount, Saved
 from .prony import Prony
 from .units import Units
 
@@ -79,6 +79,11 @@ class Elastic:
     def __init__(self, slab: Slab, modulus: float) -> None:
         self.slab, self.modulus = slab, modulus
         self._moved: Array | None = None
+
+    @staticmethod
+    def count_maps(moved: bool) -> MapCount:
+        """Of a body whose heights are `moved` by an offset, or not."""
+        return MapCount(1 if moved else 0)
 
     def begin(self, dt: float, heights: Heights) -> Trial:
         """A step under the heights themselves; local to this rank."""
@@ -141,6 +146,11 @@ class Zener:
         self._still: Advance = np.ones(len(self.kept)), np.zeros(len(self.kept))
         self._pending: Advance = self._still
         self._coefficients: _Coefficients | None = None
+
+    @staticmethod
+    def count_maps(kept: int) -> MapCount:
+        """Of a body with so many branch maps; the others are the displacement and the effective heights."""
+        return MapCount(held=kept + 2, saved=kept + 1)
 
     def elapsed(self, dt: float) -> Array:
         """`z = dt/tau` of each branch."""

@@ -19,6 +19,11 @@ class Convolution:
         self.symbol = np.multiply(symbol, scale).astype(fft.dtype if np.isrealobj(symbol) else fft.complex)
         fft.slab.tally.hold(self.symbol)
 
+    @staticmethod
+    def footprint(spectrum: int) -> int:
+        """Bytes of a real symbol beside a transform whose spectrum has so many."""
+        return spectrum // 2
+
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""
         self.fft.slab.tally["operator"] += 1

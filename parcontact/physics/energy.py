@@ -20,7 +20,7 @@ import numpy as np
 from ..parallel.slab import Array, Slab
 from . import loops
 from .body import Heights, Zener
-from .entries import Entry, Saved
+from .entries import Entry, MapCount, Saved
 from .prony import Prony
 from .units import Units
 
@@ -119,6 +119,11 @@ class ElasticPressure:
 
     def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
         self.body = Zener(slab, prony, integrator)
+
+    @staticmethod
+    def count_maps(branches: int) -> MapCount:
+        """Of a body with so many branches, each of which has a map; in double precision."""
+        return Zener.count_maps(branches)
 
     def advance(self, dt: float, p: Array, du: Array) -> Array:
         """What v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`; local to this rank."""

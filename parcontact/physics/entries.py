@@ -6,7 +6,7 @@ checkpoint has its `entries`, and `restore` goes on from them, on any number of 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,13 @@ from numpy.typing import NDArray
 from .units import Units
 
 Saved = Mapping[str, NDArray[Any]]
+
+
+class MapCount(NamedTuple):
+    """How many maps a part of a run holds, and how many of them its entries have: what a plan adds up."""
+
+    held: int
+    saved: int = 0
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,9 @@
-"""How many bytes a rank holds in maps, and how many a checkpoint has: from the job alone, to the byte."""
+"""How many bytes a rank holds in maps, and how many a checkpoint has: from the job alone, to the byte.
 
-from collections.abc import Iterator, Sequence
+Each class says what it holds; here this is added up.
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +14,15 @@ from ..effects.effect import effects_that_follow
 from ..effects.folded_branches import fold_branches_of
 from ..effects.relaxation import relaxation_of
 from ..job import Job
+from ..march.state import State
 from ..parallel.fft import footprint, transform_name
 from ..parallel.slab import deal
-from ..physics.convolution import padded_lengths
-
-SOLVER = 6  # maps: four of a contact solver, besides one of a byte per point, the last pressure and the next one
-ZENER = 2  # maps of a body with memory, besides one per branch
+from ..physics.body import Elastic, Zener
+from ..physics.convolution import Convolution
+from ..physics.energy import ElasticPressure
+from ..physics.entries import MapCount
+from ..physics.halfspace import HalfSpace
+from ..solve.contact import ContactSolver
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,19 @@ class Holding:
     sent: int = 0
 
 
+@dataclass(frozen=True)
+class Maps:
+    """Maps of one type that a rank holds for a purpose, and that a checkpoint has."""
+
+    what: str
+    count: MapCount
+    dtype: DTypeLike
+
+    @property
+    def itemsize(self) -> int:
+        return np.dtype(self.dtype).itemsize
+
+
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> list[Holding]:
     """All maps and transform buffers of a rank in a run of a job; by default of the last one, which has the most."""
     return list(_holdings(job, ranks, ranks - 1 if rank is None else rank))
@@ -39,62 +58,62 @@ def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
     return sum(holding.bytes for holding in holdings(job, ranks, rank))
 
 
+def saved(job: Job) -> int:
+    """Bytes of the maps in a checkpoint, with the four of the checksum of each row."""
+    nx, ny = job.grid.points
+    return sum(maps.count.saved * (nx * ny * maps.itemsize + 4 * ny) for maps in _maps(job))
+
+
 def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
-    points, precision = job.grid.points, np.dtype(job.numerics.map_type)
-    part = deal(job.grid.ny, ranks)[rank]
+    precision, part = np.dtype(job.numerics.map_type), deal(job.grid.ny, ranks)[rank]
     cells = (part.stop - part.start) * job.grid.nx
-    map_bytes = cells * precision.itemsize
-    spectrum, sent, blocks = footprint(points, points, precision, ranks, rank)
-    yield Holding("transforms", spectrum + sent + blocks, transform_name(points, precision), sent)
-    if decisions.isolated(job).on:
-        lengths = padded_lengths(*points)
-        wide = footprint(points, lengths, precision, ranks, rank)
-        name = transform_name(lengths, precision)
-        yield Holding("padded transforms and operator", sum(wide) + wide[0] // 2, name, wide[1])
+    spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
+    symbol = Convolution.footprint(spectrum)
+    yield _transform("transforms", job, job.grid.points, precision, ranks, rank)
+    if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
+        yield _transform("padded transforms and operator", job, lengths, precision, ranks, rank, with_symbol=True)
     else:
-        yield Holding("operator", spectrum // 2)
+        yield Holding("operator", symbol)
     if decisions.mixed_precision(job).on:
-        narrow = footprint(points, points, np.float32, ranks, rank)
-        name = transform_name(points, np.float32)
-        yield Holding("single transforms and preconditioner", sum(narrow) + narrow[0] // 2, name, narrow[1])
+        what, points = "single transforms and preconditioner", job.grid.points
+        yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True)
     else:
-        yield Holding("preconditioner", spectrum // 2)
-    yield Holding("solver", SOLVER * map_bytes + cells)
-    yield Holding("heights", map_bytes)
+        yield Holding("preconditioner", symbol)
+    yield Holding("solver", ContactSolver.footprint(cells, precision.itemsize))
     if decisions.spectrum(job).on:
         yield Holding("surface spectrum", spectrum)
-    if _moved(job):
-        yield Holding("moved heights", map_bytes)
-    if decisions.lasting(job).on:
-        yield Holding("last pressure but one", map_bytes)
+    for maps in _maps(job):
+        if maps.count.held:
+            yield Holding(maps.what, maps.count.held * maps.itemsize * cells)
+
+
+def _transform(
+    what: str,
+    job: Job,
+    lengths: tuple[int, int],
+    dtype: DTypeLike,
+    ranks: int,
+    rank: int,
+    with_symbol: bool = False,
+) -> Holding:
+    """A transform with its buffers, and the symbol of the operator that alone uses it."""
+    spectrum, sent, blocks = footprint(job.grid.points, lengths, dtype, ranks, rank)
+    symbol = Convolution.footprint(spectrum) if with_symbol else 0
+    return Holding(what, spectrum + sent + blocks + symbol, transform_name(lengths, dtype), sent)
+
+
+def _maps(job: Job) -> Iterator[Maps]:
+    """Of everything that holds whole maps, or has them in checkpoints."""
+    precision = np.dtype(job.numerics.map_type)
+    yield Maps("heights", MapCount(1), precision)
+    yield Maps("pressures", State.count_maps(decisions.lasting(job).on), precision)
     if relaxation.decide(job).on:
-        yield Holding("branches", (len(fold_branches_of(job).kept) + ZENER) * map_bytes)
+        yield Maps("branches", Zener.count_maps(len(fold_branches_of(job).kept)), precision)
+    else:
+        moved = decisions.sliding(job).on and not decisions.part_cells(job).on
+        yield Maps("moved heights", Elastic.count_maps(moved), precision)
     if decisions.energy_memory(job).on:
-        yield Holding("energy memory", (relaxation_of(job).moduli.size + ZENER) * cells * 8)
+        yield Maps("energy memory", ElasticPressure.count_maps(relaxation_of(job).moduli.size), np.float64)
     for name, effect in effects_that_follow(job).items():
-        yield Holding(name, cells * _itemsize(effect.maps(job)))
-
-
-def saved(job: Job) -> int:
-    """Bytes of the maps in a checkpoint, with the checksums of their rows."""
-    points, maps, doubles = job.grid.nx * job.grid.ny, 1, 0
-    if decisions.lasting(job).on:
-        maps += 1
-    if relaxation.decide(job).on:
-        maps += 1 + len(fold_branches_of(job).kept)
-    if decisions.energy_memory(job).on:
-        doubles = 1 + relaxation_of(job).moduli.size
-    own = [kind for effect in effects_that_follow(job).values() for kind in effect.maps(job)]
-    itemsize = maps * np.dtype(job.numerics.map_type).itemsize + doubles * 8 + _itemsize(own)
-    return points * itemsize + (maps + doubles + len(own)) * job.grid.ny * 4
-
-
-def _itemsize(kinds: Sequence[DTypeLike]) -> int:
-    """Bytes of one point of maps of these types."""
-    return sum(np.dtype(kind).itemsize for kind in kinds)
-
-
-def _moved(job: Job) -> bool:
-    """Whether an elastic body needs the heights that a body with memory moves within its own pass."""
-    by_cells = decisions.sliding(job).on and not decisions.part_cells(job).on
-    return by_cells and not relaxation.decide(job).on
+        for dtype in effect.maps(job):
+            yield Maps(name, MapCount(held=1, saved=1), dtype)

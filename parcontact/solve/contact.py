@@ -160,6 +160,11 @@ class ContactSolver:
         self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
         self._working = slab.zeros(np.bool_)
 
+    @staticmethod
+    def footprint(cells: int, itemsize: int) -> int:
+        """Bytes that it holds for so many points of this rank."""
+        return (4 * itemsize + 1) * cells
+
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution
         will be; collective.
