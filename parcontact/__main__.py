@@ -13,6 +13,7 @@ from .command import ranks
 from .command.verbs import BAD_INPUT, DONE, FAILED
 from .command.words import understand
 from .errors import InputError, JobError, RunError
+from .streams import patient
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
 WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the others to do so too
@@ -20,8 +21,13 @@ WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the oth
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv`; returns the exit code."""
+    with patient():
+        return _run(list(sys.argv[1:] if argv is None else argv))
+
+
+def _run(words: list[str]) -> int:
     try:
-        options = understand(list(sys.argv[1:] if argv is None else argv))
+        options = understand(words)
         return _leave_code(int(options.act(options)))
     except (InputError, RunError) as error:
         code = FAILED if isinstance(error, RunError) else BAD_INPUT
@@ -62,7 +68,7 @@ def _end_all(error: BaseException) -> NoReturn:
         time.sleep(STAGGER_SECONDS)
     several = world is not None and world.size > 1
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
-    if not isinstance(error, KeyboardInterrupt | BrokenPipeError):
+    if not isinstance(error, KeyboardInterrupt):
         traceback.print_exception(error)
     print(f"parcontact: ended by {type(error).__name__}{where}: {error}", file=sys.stderr, flush=True)
     if world is not None and several:

@@ -2,7 +2,9 @@
 
 import csv
 import os
+import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -199,16 +201,27 @@ def test_wall_times(text: str, seconds: float) -> None:
 
 
 def test_end_of_a_batch_job() -> None:
-    """The earliest limit holds; times are those of the batch system or of this process's start."""
+    """The earliest limit holds; times are those of the batch system or of this process's start, kept by a clock that
+    nobody sets."""
     assert watch.limit(None, {}) is None
     born = watch.limit(0.0, {})
     assert born is not None
-    soon, late = repr(born + 100.0), repr(born + 200.0)
-    assert watch.limit(300.0, {"SLURM_JOB_END_TIME": late}) == float(late)
-    assert watch.limit(None, {"PARCONTACT_END_TIME": soon, "SLURM_JOB_END_TIME": late}) == float(soon)
-    assert watch.limit(None, {"SLURM_JOB_END_TIME": repr(born - 1.0)}) is None  # of an earlier job
-    assert watch.limit(None, {"PBS_WALLTIME": "60"}) == pytest.approx(born + 60.0, abs=0.1)
-    assert watch.limit(50.0, {"PBS_WALLTIME": "60"}) == pytest.approx(born + 50.0, abs=0.1)
+    assert 0.0 < time.monotonic() - born < 3600.0
+    epoch = born + time.time() - time.monotonic()
+    soon, late = repr(epoch + 100.0), repr(epoch + 200.0)
+    near = partial(pytest.approx, abs=0.1)
+    assert watch.limit(300.0, {"SLURM_JOB_END_TIME": late}) == near(born + 200.0)
+    assert watch.limit(None, {"PARCONTACT_END_TIME": soon, "SLURM_JOB_END_TIME": late}) == near(born + 100.0)
+    assert watch.limit(None, {"SLURM_JOB_END_TIME": repr(epoch - 1.0)}) is None  # of an earlier job
+    assert watch.limit(None, {"PBS_WALLTIME": "60"}) == near(born + 60.0)
+    assert watch.limit(50.0, {"PBS_WALLTIME": "60"}) == near(born + 50.0)
+
+
+def test_limit_of_a_clock_that_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The wall time goes on as it did when somebody sets the clock of the day a year ahead."""
+    before = watch.limit(60.0, {})
+    monkeypatch.setattr(time, "time", lambda: 1e10)
+    assert watch.limit(60.0, {}) == pytest.approx(before, abs=0.1)
 
 
 def test_info_and_check(main: Main, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 from . import ranks
@@ -99,7 +98,7 @@ def _doubts(job: Job) -> list[str]:
 def plan(options: argparse.Namespace) -> int:
     from ..run import watch
 
-    started = time.time() - watch.began()
+    started = watch.age()
     world = ranks.start()
     from .. import sanity, scene
     from ..parallel.mpi import MPI

@@ -109,7 +109,7 @@ class Checkpoint(Part):
 
     every: Count | None = Field(default=None, description="a positive whole number of steps")
     minutes: Positive | None = Field(default=None, description="a positive wall time in minutes [min]")
-    keep: Count = Field(default=2, description="a positive whole number of checkpoints")
+    keep: int = Field(default=2, ge=0, strict=True, description="a whole number of checkpoints, zero or more")
 
     at_most_one = (("every", "minutes"),)
 

@@ -1,5 +1,6 @@
 """What a run says: one line per step on root, a progress bar on a terminal, the same lines in run.log."""
 
+import os
 import sys
 import time
 from contextlib import suppress
@@ -8,10 +9,13 @@ from typing import TextIO
 
 from tqdm import tqdm
 
+from ..streams import printable
+from . import files
 from .row import Row
 
 HEAD = "    step        time [s]    load [Pa]      area  friction   iter  residual"
 EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
+LEFT_SECONDS = 30.0  # between two lines with the time left, where there is no terminal for a bar
 
 
 def line(row: Row) -> str:
@@ -26,8 +30,9 @@ class Console:
     """Root's voice; the other ranks have `Silence` instead, so that no caller asks who it is."""
 
     def __init__(self, log: Path | None, quiet: bool, total: int) -> None:
-        self._file = log.open("a") if log is not None else None
+        self._log = files.opened(log, os.O_WRONLY | os.O_APPEND) if log is not None else None
         self._quiet, self._total = quiet, total
+        self._first, self._began, self._told = 0, 0.0, 0.0
         self._bar: tqdm[None] | None = None
         self._headed = False
 
@@ -39,17 +44,16 @@ class Console:
 
     def log(self, text: str) -> None:
         """For run.log only, which no run ends for."""
-        if self._file is not None:
+        if self._log is not None:
             now = time.time()
             stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now))
             with suppress(OSError):
-                self._file.write(f"{stamp},{int(now % 1.0 * 1000):03d} {text}\n")
-                self._file.flush()
+                os.write(self._log, f"{stamp},{int(now % 1.0 * 1000):03d} {printable(text)}\n".encode())
 
     def warn(self, text: str) -> None:
         """A message that is shown even to those who asked for quiet."""
         self.log(f"warning: {text}")
-        self._write(f"warning: {text}", sys.stderr)
+        self._write(f"warning: {printable(text)}", sys.stderr)
 
     def step(self, row: Row) -> None:
         """One line per step."""
@@ -60,6 +64,8 @@ class Console:
         if not self._headed:
             self._headed = True
             print(HEAD)
+            self._first, self._began = row.step, time.monotonic()
+            self._told = self._began
             if sys.stderr.isatty() and self._total > 1:
                 self._bar = tqdm(
                     total=self._total, initial=row.step, unit="step", leave=False, mininterval=EVERY_SECONDS
@@ -67,13 +73,24 @@ class Console:
         self._write(text)
         if self._bar is not None:
             self._bar.update(row.step - self._bar.n)
+        else:
+            self._tell_time_left(row.step)
+
+    def _tell_time_left(self, step: int) -> None:
+        """Now and then, if steps go on to take as long as they did."""
+        now = time.monotonic()
+        if now - self._told >= LEFT_SECONDS and self._first < step < self._total:
+            self._told = now
+            left = (now - self._began) / (step - self._first) * (self._total - step)
+            clock = f"{int(left // 3600)}:{int(left // 60) % 60:02d}:{int(left) % 60:02d}"
+            self._write(f"# step {step} of {self._total}, about {clock} left")
 
     def close(self) -> None:
         if self._bar is not None:
             self._bar.close()
-        if self._file is not None:
+        if self._log is not None:
             with suppress(OSError):
-                self._file.close()
+                os.close(self._log)
 
     def _write(self, text: str, file: TextIO | None = None) -> None:
         if self._bar is not None:

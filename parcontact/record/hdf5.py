@@ -151,7 +151,7 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> str:
 
 
 def _alone(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> None:
-    with h5py.File(path, "r") as file:
+    with h5py.File(path, "r", locking=mode == "r") as file:  # what is written to is in a directory of ours
         moves = [_Move(file, part, slab) for part in parts]
         if mode == "r":
             for move in moves:

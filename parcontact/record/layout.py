@@ -41,7 +41,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
     """Root changes a file, but neither its maps nor its length, with `act(file)`; collective."""
 
     def apply() -> None:
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r", locking=False) as file:
             found = regions(file)
         with _memory() as memory, path.open("r+b") as target:
             size = os.fstat(target.fileno()).st_size
@@ -59,7 +59,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
 
 def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
     """Write whole datasets that are no maps; root only."""
-    with h5py.File(path, "r") as file:
+    with h5py.File(path, "r", locking=False) as file:
         places = {name: file[name].id.get_offset() for name in values}
         types = {name: file[name].dtype for name in values}
     with path.open("r+b") as target:

@@ -190,6 +190,8 @@ def read(path: Path) -> dict[str, list[float]]:
     """
     rows = _rows(path)
     names = next(rows, [])
+    if not names:
+        raise InputError(f"{path} is empty: it does not even name its columns")
     series: list[list[float]] = [[] for _ in names]
     for number, cells in enumerate(rows, 2):
         for name, text, values in zip(names, cells, series, strict=True):

@@ -66,6 +66,23 @@ def choose(
     return None, []
 
 
+def finished_before(
+    job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, steps: int
+) -> str:
+    """What to say of a run of this job that has finished and was to keep no checkpoint, or ''; collective."""
+
+    def look() -> str:
+        claim = directory.claim
+        if restart != "auto" or job.checkpoint.keep or claim is None or claim.finished is None or directory.saved():
+            return ""
+        same = not any(marker.differences(claim.job, plain, (*SAME, *SAME_NUMERICS)))
+        if not same or claim.finished[0] != steps or not (directory.path / "measures.csv").exists():
+            return ""
+        return f"finished before, at t = {claim.finished[1]:g} s, without a checkpoint (--restart never runs it afresh)"
+
+    return slab.agree(look() if slab.root else "")
+
+
 def _refuse(slab: Slab, problem: str) -> None:
     """Raise what root says stands in the way; collective."""
     if problem := slab.agree(problem):

@@ -13,9 +13,10 @@ from ..march import loop
 from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
+from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..physics.entries import Entry
-from ..record import checkpoint, marker, wisdom
+from ..record import checkpoint, header, marker, wisdom
 from ..record.checkpoint import Facts, Table
 from ..record.directory import Directory
 from ..record.marker import Claim
@@ -25,7 +26,7 @@ from ..scene import Scene
 from ..steady_sliding import start as steadystart
 from . import restart, watch
 from .restart import Origin
-from .watch import Signals, Watch
+from .watch import Watch
 
 DONE, AGAIN = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again
 
@@ -43,13 +44,15 @@ class Options:
 def run(job: Job, slab: Slab, options: Options) -> int:
     """Run a job; collective. Returns the exit code. Nothing is written before the whole job has proved sound."""
     directory = Directory(job.output.directory, slab)
-    with Signals().noted() as signals, directory.claimed():
+    with directory.claimed():
         plain = marker.plain_job(job) if slab.root else {}
-        origin, warnings = restart.choose(job, plain, slab, directory, options.restart)
         timeline = job.timeline(options.until or 0.0)
+        finished = restart.finished_before(job, plain, slab, directory, options.restart, len(timeline))
+        origin, warnings = (None, []) if finished else restart.choose(job, plain, slab, directory, options.restart)
         _refuse_no_end(timeline, options.until)
         sanity.refuse_impossible(job, timeline)
-        if origin and (reason := _nothing_to_do(origin, timeline, options.until)):
+        reason = _nothing_to_do(origin, timeline, options.until) if origin else finished
+        if reason:
             if slab.root and not options.quiet:
                 print(f"{directory.path}: {reason}", flush=True)
             return DONE
@@ -66,12 +69,15 @@ def run(job: Job, slab: Slab, options: Options) -> int:
         claim = _claim(plain, directory, origin)
         recorder = _begin(built, directory, claim, provenance, origin, len(timeline), options.quiet)
         try:
+            for text in header.lines(slab.comm) if slab.root else ():
+                recorder.console.log(text)
             for text in (*doubts, *warnings, *recorder.warnings):
                 recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None
-            watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
             facts = Facts(0, 0.0, plain, provenance, claim.id)
-            return _Journey(marching, timeline, directory, recorder, watching, facts, options.until).go(origin)
+            with Signals().noted() as signals:
+                watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
+                return _Journey(marching, timeline, directory, recorder, watching, facts, options.until).go(origin)
         finally:
             recorder.close()
 
@@ -168,9 +174,19 @@ class _Journey:
         ended = loop.run_tasks(self.march, [self.decide] if origin else [self.record, self.decide])
         if not ended:
             self._march()
-        if self.saved != self.march.row.step:
+        if self.job.checkpoint.keep == 0 and self.march.row.step >= len(self.timeline):
+            self._finish_without_checkpoint()
+        elif self.saved != self.march.row.step:
             self.save(last=True)
         return self._farewell()
+
+    def _finish_without_checkpoint(self) -> None:
+        """Remove what a run that has finished does not need, if its results are safe."""
+        self.recorder.sync()
+        if problem := self.slab.agree(self.recorder.problem):
+            raise RunError(problem + self._left())
+        if self.slab.root:
+            self.directory.prune(0)
 
     def _march(self) -> None:
         steps = steps_to_make(self.march, self.timeline, self.until)
@@ -250,7 +266,7 @@ class _Journey:
         self.saved, self.failed = row.step, False
         if self.slab.root:
             self.directory.note(saved=True)
-            self.directory.prune(self.job.checkpoint.keep)
+            self.directory.prune(max(self.job.checkpoint.keep, 1))
         seconds = time.monotonic() - began
         self.saving += seconds
         self.watch.saved(seconds)
@@ -273,6 +289,8 @@ class _Journey:
             console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")
             return AGAIN
         finished = row.step >= len(self.timeline)
+        if self.slab.root and finished:
+            self.directory.note(saved=True, finished=(row.step, row.time))
         how = "done" if finished else f"stopped at t = {row.time:g} s as asked for, run again to go on"
         console.say(f"{how}: results in {self.directory.path}")
         return DONE

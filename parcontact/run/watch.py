@@ -4,19 +4,17 @@ Every rank may be sent a signal; all else is known to root. One small message pe
 """
 
 import os
-import signal
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import FrameType
 
 from ..job import Checkpoint
+from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 
-SIGNALS = (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
 LOOK_SECONDS = 0.2  # between two looks for the stop file
 RESERVE_SECONDS = 5.0  # of wall time for what is not measured: ending MPI, closing files
 FIRST_WRITE = 50e6  # bytes per second: how fast the first checkpoint is expected to be written
@@ -35,30 +33,9 @@ class Verdict:
     problem: str = ""
 
 
-class Signals:
-    """Notes that a signal has come; a second Ctrl-C ends the process at once."""
-
-    def __init__(self) -> None:
-        self.come = False
-
-    def note(self, number: int, frame: FrameType | None) -> None:
-        if self.come and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        self.come = True
-
-    @contextmanager
-    def noted(self) -> Iterator["Signals"]:
-        before = {number: signal.signal(number, self.note) for number in SIGNALS}
-        try:
-            yield self
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-
 @dataclass
 class Watch:
-    """Asked after every step. `limit` is the time (of `time.time`) at which the run must have ended, if any."""
+    """Asked after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any."""
 
     slab: Slab
     rules: Checkpoint
@@ -79,16 +56,28 @@ class Watch:
         if began:
             self._steps.append(now - self._last)
         self._last = now
-        codes = [SIGNAL * self.signals.come, 0, 0]
+        codes = [SIGNAL * self.signals.stop, self.signals.save, 0]
+        self.signals.save = False
         if self.slab.root:
-            codes = [max(codes[0], self._stop(now, began)), self._due(step, now, began), bool(problem)]
+            codes = [max(codes[0], self._stop(now, began)), codes[1] or self._due(step, now, began), bool(problem)]
         self._made = step
         stop, save, failed = self.slab.reduce((), codes)
         if failed:
             return Verdict(problem=self.slab.agree(problem))
-        if stop == FILE and self.slab.root:
-            self.stop_file.unlink(missing_ok=True)
+        if stop == FILE and (problem := self.slab.agree(self._remove_stop_file() if self.slab.root else "")):
+            return Verdict(problem=problem)
         return Verdict(REASONS.get(int(stop), ""), bool(save))
+
+    def _remove_stop_file(self) -> str:
+        """Returns why the next run would find it again, or ''."""
+        try:
+            if self.stop_file.is_dir() and not self.stop_file.is_symlink():
+                self.stop_file.rmdir()
+            else:
+                self.stop_file.unlink(missing_ok=True)
+        except OSError as error:
+            return f"asked to stop by {self.stop_file}, which cannot be removed: {error.strerror}; remove it"
+        return ""
 
     def saved(self, seconds: float) -> None:
         """Tell that a checkpoint was written, and how long that took."""
@@ -96,11 +85,11 @@ class Watch:
         self._saved = self._last = time.monotonic()
 
     def _stop(self, now: float, began: bool) -> int:
-        if began and self.limit is not None and time.time() + self.reserve > self.limit:
+        if began and self.limit is not None and now + self.reserve > self.limit:
             return WALL
         if now - self._looked > LOOK_SECONDS:
             self._looked = now
-            return FILE if self.stop_file.exists() else GO
+            return FILE if os.path.lexists(self.stop_file) else GO
         return GO
 
     def _due(self, step: int, now: float, began: bool) -> bool:
@@ -118,26 +107,26 @@ class Watch:
 
 
 def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
-    """When a run must have ended, in the time of `time.time`: after `wall` seconds, or with its batch job.
+    """When a run must have ended, in the time of `time.monotonic`: after `wall` seconds, or with its batch job.
 
     The end of a job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME, in seconds since 1970; PBS (Torque) says how long it
     may last, PBS_WALLTIME, which is counted from the start of this program: a little too late. An end before that start
-    is that of another job, whose environment was handed on.
+    is that of another job, whose environment was handed on. The clock of the day is read once: it may be set later.
     """
-    born = began()
+    now = time.monotonic()
+    born, epoch = now - age(), now - time.time()
     limits = [] if wall is None else [born + wall]
-    for name, start in (("PARCONTACT_END_TIME", 0.0), ("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", born)):
+    for name, start in (("PARCONTACT_END_TIME", epoch), ("SLURM_JOB_END_TIME", epoch), ("PBS_WALLTIME", born)):
         with suppress(KeyError, ValueError):
             end = start + float(environment[name])
             limits += [end] if end > born else []
     return min(limits, default=None)
 
 
-def began() -> float:
-    """When this process began, in the time of `time.time`."""
+def age() -> float:
+    """For how many seconds this process has been there."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
-        age = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
-        return time.time() - max(age, 0.0)
+        return max(time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK"), 0.0)
     except (OSError, ValueError, IndexError):
-        return time.time()
+        return 0.0

@@ -1,0 +1,73 @@
+"""What the program says must not end it: streams that take every text, whoever reads them, if anybody does."""
+
+import io
+import os
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO
+
+CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """A text in which characters that would command a terminal, or turn its lines around, are spelt out."""
+    return CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}" if ord(found[0]) > 255 else repr(found[0])[1:-1], text)
+
+
+class Patient(io.TextIOBase):
+    """A stream in front of another, which may be closed, full, or know fewer letters: then less is shown.
+
+    `plain`: control characters are spelt out, but for tabs and ends of lines; a progress bar needs them.
+    """
+
+    def __init__(self, stream: TextIO | None, plain: bool) -> None:
+        self._stream, self._plain, self.gone = stream, plain, False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        shown = printable(text) if self._plain else text
+        if self._stream is not None and not self.gone:
+            try:
+                self._stream.write(shown)
+            except UnicodeEncodeError:
+                self._stream.write(shown.encode("ascii", "backslashreplace").decode())
+            except (OSError, ValueError):
+                self.gone = True
+        return len(text)
+
+    def flush(self) -> None:
+        if self._stream is not None and not self.gone:
+            try:
+                self._stream.flush()
+            except (OSError, ValueError):
+                self.gone = True
+
+    def isatty(self) -> bool:
+        return self._stream is not None and not self.gone and self._stream.isatty()
+
+    def let_go(self) -> None:
+        """What the stream still holds, and cannot write, must not fail when Python ends."""
+        self.flush()
+        if self.gone and self._stream is not None:
+            with suppress(OSError, ValueError):
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, self._stream.fileno())
+                os.close(nowhere)
+
+
+@contextmanager
+def patient() -> Iterator[None]:
+    """Standard output and standard error are patient meanwhile."""
+    before = sys.stdout, sys.stderr
+    out, err = Patient(before[0], True), Patient(before[1], False)
+    sys.stdout, sys.stderr = out, err
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
+        out.let_go()
+        err.let_go()
