@@ -525,7 +525,7 @@ def test_xdmf_that_cannot_be_written(
 
 
 def test_directory_named_stop(main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path) -> None:
-    """18.8: `mkdir out/stop` is a wish to stop like any other; one that cannot be removed ends with 1, saved too."""
+    """`mkdir out/stop` is a wish to stop like any other; one that cannot be removed ends with 1, saved too."""
     out = tmp_path / "out"
 
     def ask(stop: Path) -> None:
