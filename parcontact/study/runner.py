@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 
 from ..errors import RunError
 from ..job import Job
+from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..record import files, marker, study_plots
 from ..record.directory import Directory
-from ..run.watch import Signals
 from . import outcome, table, verdict
 from .cases import Case, Ladders, ladders, overrides
 from .outcome import Outcome
@@ -32,7 +32,7 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         study = _Study(refined, jobs, directory, slab, quiet)
         stop = directory.stop_file
-        ended = study.run(lambda: signals.come or (slab.root and stop.exists()))
+        ended = study.run(lambda: signals.stop or (slab.root and stop.exists()))
         if not ended:
             if slab.root:
                 stop.unlink(missing_ok=True)
