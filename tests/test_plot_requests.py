@@ -46,6 +46,16 @@ def curve(directory: Path, points: Sequence[Sequence[float]] = POINTS) -> Path:
     return directory
 
 
+def test_wide_names_of_stages_do_not_touch(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Letters differ in width; and a dollar is no beginning of a formula."""
+    stages = ", ".join(
+        f"{{name: MAXIMUM $^W{k}, pressure: {k + 1}.0e3, duration: 1.0, time_step: 1.0}}" for k in range(4)
+    )
+    assert asked(ran(tmp_path, f"title: a $^ b$\n{WAVE}{ELASTIC}history: [{stages}]\n")) == 0
+    assert len(drawn[0].axes[0].texts) == 4
+    assert touching(drawn[0]) == []
+
+
 @pytest.mark.parametrize("kind", ["loads", "creep", "sliding"])
 def test_labels_do_not_touch(tmp_path: Path, drawn: list[Figure], kind: str) -> None:
     assert asked(ran(tmp_path, KINDS[kind][0])) == 0

@@ -158,7 +158,7 @@ def _figure(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False)
     height = 0.25 + 0.2 * (title.count("\n") + 1) + style.HEIGHT * len(rows)
     figure = Figure(figsize=(style.WIDTH, height), layout="constrained")
     if title:
-        figure.suptitle(title, fontsize=11)
+        figure.suptitle(style.plain(title), fontsize=11)
     drawn = []
     for part, panels in zip(figure.subfigures(len(rows) or 1, 1, squeeze=False)[:, 0], rows, strict=False):
         for panel, axes in zip(panels, part.subplots(1, len(panels), squeeze=False)[0], strict=True):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ...parallel.slab import Array
@@ -15,7 +16,6 @@ SPIKE_SHARE = 0.02  # of the abscissa, at its beginning: what stands out there o
 SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
 AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
-CHARACTER = 0.55  # width of a letter over its height, on average
 FRACTION = "contact area /\nnominal area"
 LEVELS = 3  # of names above each other, before they are turned
 
@@ -147,7 +147,7 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
         return
     width = 72.0 * style.WIDTH / style.COLUMNS * AXES_SHARE
     middles = [width * share for share in _shares(axes, stages)]
-    levels = _levels([(x, NAMES * CHARACTER * len(name) + 6) for (name, *_), x in zip(stages, middles, strict=True)])
+    levels = _levels([(x, _width(name)) for (name, *_), x in zip(stages, middles, strict=True)])
     turned = max(levels) >= LEVELS
     if turned:
         names = sorted(sorted(range(len(stages)), key=lambda k: stages[k][1] - stages[k][2])[: int(width / LINE)])
@@ -160,7 +160,12 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
             "textcoords": "offset points",
             "rotation": 90 if turned else 0,
         }
-        axes.annotate(name, (x / width, 1.0), (0, 2 + LINE * level), **place, **look)
+        axes.annotate(style.plain(name), (x / width, 1.0), (0, 2 + LINE * level), **place, **look)
+
+
+def _width(name: str) -> float:
+    """Of the name of a stage, with a blank [points]."""
+    return float(TextPath((0, 0), style.plain(name), size=NAMES).get_extents().width) + NAMES / 2
 
 
 def _shares(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> list[float]:
@@ -200,7 +205,11 @@ def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
     for number, (name, charts) in enumerate(runs):
         for chart in charts:
             lines = [
-                replace(one, name=", ".join(filter(None, (name, one.name))), look={**one.look, **_look(number, k)})
+                replace(
+                    one,
+                    name=", ".join(filter(None, (style.plain(name), one.name))),
+                    look={**one.look, **_look(number, k)},
+                )
                 for k, one in enumerate(chart.series)
             ]
             key = chart.key, chart.x, chart.y

@@ -28,6 +28,11 @@ RC: dict[Any, Any] = {
 }
 
 
+def plain(text: str) -> str:
+    """A text as it is: between dollars, there would be a formula."""
+    return text.replace("$", r"\$")
+
+
 def line(number: int) -> dict[str, Any]:
     """Colour and dashes of the line of this number, from 0."""
     return {"color": COLORS[number % len(COLORS)], "linestyle": DASHES[number % len(DASHES)]}
