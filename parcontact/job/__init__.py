@@ -8,6 +8,7 @@ from .reading import Case, choose, load, load_cases
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
 from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
+from .topography import Topography
 from .values import log_range
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Sphere",
     "Stage",
     "Steady",
+    "Topography",
     "Study",
     "Wave",
     "Zener",

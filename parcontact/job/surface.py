@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from .fault import Fault, refuse
 from .part import Context, Part, Rule, chosen
+from .topography import Topography
 from .values import Positive, Real, Seed, Whole, from_home
 
 Profile = Literal["paraboloid", "exact"]
@@ -121,6 +122,16 @@ class Flat(Part):
     shape: Literal["flat"] = "flat"
 
 
-Spectral = Rough | Wave | HeightFile  # periodic, and given by their waves; the others are closed forms at every point
-KINDS = {"rough": Rough, "sphere": Sphere, "cylinder": Cylinder, "wave": Wave, "file": HeightFile, "flat": Flat}
-Shape = Annotated[Rough | Sphere | Cylinder | Wave | HeightFile | Flat, PlainValidator(chosen("shape", KINDS))]
+Spectral = Rough | Wave | HeightFile | Topography  # periodic, and given by their waves; the others are closed forms at every point
+KINDS: dict[str, type[Part]] = {
+    "rough": Rough,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "wave": Wave,
+    "file": HeightFile,
+    "topography": Topography,
+    "flat": Flat,
+}
+Shape = Annotated[
+    Rough | Sphere | Cylinder | Wave | HeightFile | Topography | Flat, PlainValidator(chosen("shape", KINDS))
+]

@@ -83,6 +83,14 @@ class Slab:
         """Collective. Root's value, on every rank."""
         return self.comm.bcast(value) if self.comm.size > 1 else value
 
+    def from_root(self, field: Array | None) -> Array:
+        """Collective. This rank's rows of a map in double precision that root has, of shape (ny, nx)."""
+        rows = np.empty(self.shape)
+        counts, starts = zip(*((self.nx * (part.stop - part.start), self.nx * part.start) for part in self.dealt))
+        whole = None if field is None else [np.ascontiguousarray(field, dtype=np.float64), (counts, starts), MPI.DOUBLE]
+        self.comm.Scatterv(whole, rows)
+        return rows
+
     def from_all(self, value: T) -> list[T]:
         """Collective. The value of every rank, in order, on every rank."""
         return self.comm.allgather(value)

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..job import Dma, HeightFile, Job
+from ..job import Dma, HeightFile, Job, Topography
 from ..job.table import plain
 from . import files
 
@@ -39,7 +39,7 @@ def plain_job(job: Job) -> dict[str, Any]:
     data: dict[str, Any] = plain(job)
     pairs = zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True)
     for part, given in pairs:
-        if isinstance(given, HeightFile | Dma):
+        if isinstance(given, HeightFile | Dma | Topography):
             del part["path"]
             part["content"] = f"{zlib.crc32(given.path.read_bytes()):08x}"
     return data

@@ -1,0 +1,41 @@
+"""A measured road as a shape of the surface, and random roughness with a measured spectrum."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, ValidationInfo
+
+from .fault import Fault, refuse
+from .part import Part
+from .values import Flag, Positive, from_home
+
+
+def _map_file(path: Path, info: ValidationInfo) -> Path:
+    """The absolute path of a measured map; relative ones start at the job file."""
+    found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
+    if found.exists() and not (found.is_file() or found.is_dir()):
+        refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
+    if not found.is_file():
+        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
+    return found
+
+
+class Topography(Part):
+    """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .txt and .xyz.
+
+    The middle of the map that is as large as the box is levelled, filled, made periodic and resampled to the grid.
+    """
+
+    label: ClassVar[str] = "shape topography"
+    shape: Literal["topography"] = "topography"
+    path: Annotated[Path, AfterValidator(_map_file), Field(description="the path of a measured map")]
+    unit: Literal["m", "mm", "um", "nm"] | None = None  # of heights; only for formats that have none
+    size: Annotated[
+        tuple[Positive, Positive] | None, Field(description="two positive lengths [m], only for formats that have none")
+    ] = None
+    channel: str | None = Field(default=None, description="the name of a channel of the file (text)")
+    detrend: Literal["none", "mean", "tilt", "curvature"] = "tilt"
+    fill: Flag = Field(default=True, description="true or false: whether missing points are filled")
+    periodic: Literal["smooth", "window", "mirror", "none"] | None = None  # smooth; none in a free scene

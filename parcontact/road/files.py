@@ -1,0 +1,133 @@
+"""Measured maps from files: .npy, .txt and .xyz by ourselves, all other formats by SurfaceTopography where it is installed.
+
+Heights point up, out of the road: what sticks out touches first.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
+PLAIN = (".npy", ".txt", ".xyz")  # formats without units
+LARGEST_FILE = 4_000_000_000  # bytes
+IRREGULAR = 1e-3  # of a step: positions of a .xyz file further from a grid than this are on none
+FEWEST = 4  # points along a direction
+
+
+@dataclass(frozen=True)
+class Map:
+    """Heights [m] of shape (ny, nx), NaN where nothing was measured, on a box of `size` = (lx, ly) [m]."""
+
+    heights: Array
+    size: tuple[float, float]
+
+
+def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel: str | None) -> Map:
+    """Read a map. `unit` of the heights (of a .xyz file: of all lengths) and the `size` [m] must be given for formats
+    that have none, and only for those. Raises InputError, in one sentence."""
+    try:
+        if not path.is_file():
+            raise InputError(f"{path} is not a file; a map of heights was expected")
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path} has more than {LARGEST_FILE / 1e9:g} GB; crop the map first")
+        headed = path.suffix == ".txt" and unit is None and size is None  # its header may say both
+        plain = path.suffix in PLAIN and not headed
+        found = _plain(path, unit, size) if plain else _of_instrument(path, unit, size, channel)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {str(error).partition(chr(10))[0]}") from error
+    if min(found.heights.shape) < FEWEST:
+        raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} along x and y were expected")
+    if np.isfinite(found.heights).sum() < found.heights.size / 2:
+        raise InputError(f"{path}: more than half of its points are missing")
+    return found
+
+
+def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Map:
+    if unit is None:
+        raise InputError(f"{path} says no unit of its heights: give unit: {' | '.join(UNITS)}")
+    if path.suffix == ".xyz":
+        if size is not None:
+            raise InputError(f"{path} has positions of its own: give no size")
+        return _positions(path, np.loadtxt(path, ndmin=2, dtype=np.float64), UNITS[unit])
+    if size is None:
+        raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
+    values = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
+    masked = np.ma.masked_invalid(np.asarray(values, dtype=np.float64))
+    if masked.ndim != 2:
+        raise InputError(f"{path} has {masked.ndim} dimensions; a map of two was expected")
+    return Map(masked.filled(np.nan) * UNITS[unit], size)
+
+
+def _positions(path: Path, table: Array, unit: float) -> Map:
+    """A map from rows of x, y and z in any order; points that are not there are missing."""
+    if table.shape[1] != 3:
+        raise InputError(f"{path} has {table.shape[1]} columns; x, y and z were expected")
+    (x, nx, dx), (y, ny, dy) = (_steps(path, name, values) for name, values in zip("xy", table.T[:2], strict=True))
+    heights = np.full((ny, nx), np.nan)
+    heights[y, x] = table[:, 2]
+    return Map(heights * unit, (nx * dx * unit, ny * dy * unit))
+
+
+def _steps(path: Path, name: str, values: Array) -> tuple[NDArray[np.intp], int, float]:
+    """Indices, their number, and the step of positions on a regular grid."""
+    distinct = np.unique(values)
+    if distinct.size < FEWEST:
+        raise InputError(f"{path} has {distinct.size} positions along {name}; at least {FEWEST} were expected")
+    step = float(np.median(np.diff(distinct)))
+    index = (values - distinct[0]) / step
+    if np.abs(index - np.round(index)).max() > IRREGULAR:
+        raise InputError(f"{path}: its positions along {name} are not equally spaced")
+    whole = np.round(index).astype(np.intp)
+    return whole, int(whole.max()) + 1, step
+
+
+def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | None, channel: str | None) -> Map:
+    try:
+        import SurfaceTopography
+        from SurfaceTopography.Exceptions import UnknownFileFormat
+    except ImportError as error:
+        raise InputError(
+            f"{path}: files of instruments are read by SurfaceTopography, which is not installed: "
+            "pip install 'parcontact[topography]', or save the map as .npy"
+        ) from error
+    try:
+        reader = SurfaceTopography.open_topography(str(path))
+    except UnknownFileFormat as error:
+        raise InputError(f"{path} is of no format that SurfaceTopography knows") from error
+    names = [found.name for found in reader.channels]
+    if channel is not None and channel not in names:
+        raise InputError(f"{path} has no channel {channel!r}; it has {', '.join(map(str, names))}")
+    chosen = reader.channels[names.index(channel)] if channel is not None else reader.default_channel
+    own_unit, own_size = chosen.unit, chosen.physical_sizes
+    _refuse_twice(path, unit is not None and own_unit is not None, "a unit", "unit")
+    _refuse_twice(path, size is not None and own_size is not None, "a size", "size")
+    if own_unit is None and unit is None:
+        raise InputError(f"{path} says no unit of its heights: give unit: {' | '.join(UNITS)}")
+    topography = chosen.topography(**({"physical_sizes": size} if own_size is None and size is not None else {}))
+    if len(topography.nb_grid_pts) != 2:
+        raise InputError(f"{path} is a line scan; a map was expected")
+    scale = UNITS[unit] if unit is not None else _scale(path, own_unit)
+    if topography.physical_sizes is None:
+        raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
+    lengths = size if own_size is None and size is not None else tuple(s * scale for s in topography.physical_sizes)
+    heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan)
+    return Map(np.ascontiguousarray(np.asarray(heights, dtype=np.float64).T) * scale, (lengths[0], lengths[1]))
+
+
+def _refuse_twice(path: Path, both: bool, what: str, key: str) -> None:
+    if both:
+        raise InputError(f"{path} has {what} of its own: give no {key}")
+
+
+def _scale(path: Path, unit: object) -> float:
+    from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
+
+    factor = get_unit_conversion_factor(str(unit), "m")
+    if factor is None:
+        raise InputError(f"{path}: its unit {unit} is no length")
+    return float(factor)

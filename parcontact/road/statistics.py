@@ -1,0 +1,86 @@
+"""What a map is like: spectra, rms values, Nayak's parameter, the Hurst exponent of a self-affine range.
+
+    C2(q) = <|h^(q)|^2>/(Lx Ly)/(4 pi^2)   over directions, with h^ = int h exp(-i q x) d2x,   <h^2> = int C2 d2q,
+    C1(q) along one direction, one-sided: <h^2> = int_0^inf C1 dq.
+
+(B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1; P. R. Nayak, J. Lubr. Technol. 93 (1971) 398; conventions
+of T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, C2 here over 4 pi^2.)
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+Array = NDArray[np.float64]
+BINS = 12  # per decade of wavenumbers
+FEWEST = 5  # bins that a Hurst exponent is fitted to
+STEADY = 0.35  # rms of the logarithm around a power law above which there is no self-affine range
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Of a periodic map of (ny, nx) points on (lx, ly) [m]: rms height [m], slope [-], curvature [1/m] of the gradient
+    and the Laplacian's half; Nayak's parameter; `q`, shape (n,) [1/m], with `psd_2d` [m^4] and the spectra along x and y,
+    `psd_x`, `psd_y` [m^3] at `qx`, `qy`; `hurst` is NaN where no power law holds."""
+
+    rms_height: float
+    rms_slope: float
+    rms_curvature: float
+    nayak: float
+    q: Array
+    psd_2d: Array
+    qx: Array
+    psd_x: Array
+    qy: Array
+    psd_y: Array
+    hurst: float
+
+
+def describe(heights: Array, size: tuple[float, float]) -> Statistics:
+    """All of it, from the Fourier series of the map."""
+    ny, nx = heights.shape
+    power = np.abs(fft.fft2(heights - heights.mean()) / (nx * ny)) ** 2
+    qx, qy = (2 * np.pi * fft.fftfreq(n, length / n) for n, length in zip((nx, ny), size, strict=True))
+    square = qx**2 + qy[:, None] ** 2
+    m0, m2, m4 = (float(np.sum(power * square**k)) for k in range(3))
+    q, psd = _over_directions(np.sqrt(square), power, size)
+    along_x, along_y = (_along(power.sum(axis=axis), length) for axis, length in ((0, size[0]), (1, size[1])))
+    nayak = 1.5 * m0 * m4 / m2**2 if m2 > 0.0 else math.nan  # isotropic: m0 m4/m2^2 of profiles
+    return Statistics(
+        math.sqrt(m0), math.sqrt(m2), 0.5 * math.sqrt(m4), nayak, q, psd, *along_x, *along_y, _hurst(q, psd)
+    )
+
+
+def _over_directions(q: Array, power: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+    """Means over rings of wavenumbers; each wave stands for an area 4 pi^2/(Lx Ly)."""
+    cell = 4 * np.pi**2 / (size[0] * size[1])
+    known = q > 0.0
+    low, high = float(q[known].min()), float(q.max())
+    count = max(2, math.ceil(BINS * math.log10(high / low))) if high > low else 1
+    edges = np.geomspace(low * (1 - 1e-9), high * (1 + 1e-9), count + 1)
+    place = np.digitize(q[known], edges) - 1
+    number = np.bincount(place, minlength=count)
+    full = number > 0
+    sums = [np.bincount(place, weights=values, minlength=count)[full] for values in (np.log(q[known]), power[known])]
+    return np.exp(sums[0] / number[full]), sums[1] / number[full] / cell
+
+
+def _along(power: Array, length: float) -> tuple[Array, Array]:
+    """Wavenumbers above 0 and the one-sided spectrum along one direction."""
+    highest = (power.size - 1) // 2
+    both = power[1 : highest + 1] + power[-1 : -highest - 1 : -1]
+    return 2 * np.pi / length * np.arange(1, highest + 1), both * length / (2 * np.pi)
+
+
+def _hurst(q: Array, psd: Array) -> float:
+    """From the slope of log C2 over log q, -2 (1 + H), over the upper two thirds of its range."""
+    used = (psd > 0.0) & (q > q[0] * (q[-1] / q[0]) ** (1 / 3))
+    if used.sum() < FEWEST:
+        return math.nan
+    x, y = np.log(q[used]), np.log(psd[used])
+    slope, offset = np.polyfit(x, y, 1)
+    steady = float(np.sqrt(np.mean((y - slope * x - offset) ** 2))) < STEADY
+    return float(-slope / 2.0 - 1.0) if steady else math.nan

@@ -1,0 +1,84 @@
+"""A measured map as the heights of a box on a grid: read, cut to the box, treated, resampled; and what was done."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..job import Grid, Topography
+from ..parallel.slab import Slab
+from . import files, treatment
+from .treatment import Treated
+
+Array = NDArray[np.float64]
+SLACK = 1e-6  # of a length: a box this much longer than the map is as long
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Heights [m] on the grid, shape (ny, nx), without mean; the map that they come from, as cut and as treated, with
+    its size [m]."""
+
+    heights: Array
+    cut: Array
+    treated: Treated
+    size: tuple[float, float]
+
+    @property
+    def told(self) -> list[str]:
+        """What was done, in sentences."""
+        (ny, nx), done = self.cut.shape, self.treated
+        lines = [f"road: {nx} x {ny} points of the map, {self.size[0]:.4g} x {self.size[1]:.4g} m, are used"]
+        if done.missing:
+            lines.append(f"road: {done.missing} missing points ({done.missing / self.cut.size:.2%}) were filled")
+        if done.outliers:
+            lines.append(f"road: {done.outliers} points stick out of their neighbours by far; they are as measured")
+        if len(done.trend) > 1:
+            tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], self.size, strict=True)]
+            lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")
+        return lines
+
+
+def prepare(part: Topography, grid: Grid) -> Prepared:
+    """Root's work. Raises InputError for a map that cannot be read or is smaller than the box."""
+    found = files.read(part.path, part.unit, part.size, part.channel)
+    periodic = part.periodic or ("smooth" if grid.boundary == "periodic" else "none")
+    copies = 2 if periodic == "mirror" else 1
+    rows, columns = (
+        _range(part, name, length / copies, available, count)
+        for name, length, available, count in zip("yx", grid.size[::-1], found.size[::-1], found.heights.shape, strict=True)
+    )
+    cut = found.heights[rows, columns]
+    if np.isnan(cut).any() and not part.fill:
+        raise InputError(f"{part.path}: {int(np.isnan(cut).sum())} of its points are missing; give fill: true")
+    done = treatment.treat(cut, part.detrend, periodic)
+    shape = (grid.ny, grid.nx)
+    heights = treatment.resample(done.heights, shape) if periodic != "none" else treatment.resample_open(done.heights, shape)
+    return Prepared(heights - heights.mean(), cut, done, (grid.lx / copies, grid.ly / copies))
+
+
+def _range(part: Topography, name: str, length: float, available: float, count: int) -> slice:
+    """The points in the middle of the map that are as long as the box."""
+    if length > available * (1.0 + SLACK):
+        raise InputError(
+            f"{part.path}: the box is {length:.6g} m along {name}, the map only {available:.6g} m; make the box smaller, "
+            "or give periodic: mirror, which needs half of it"
+        )
+    wanted = min(count, max(1, round(count * length / available)))
+    first = (count - wanted) // 2
+    return slice(first, first + wanted)
+
+
+def rows_of(part: Topography, grid: Grid, slab: Slab) -> tuple[Array, list[str]]:
+    """This rank's rows of the heights [m], and on root what was done; collective. Raises InputError on every rank."""
+    prepared, problem = None, ""
+    if slab.root:
+        try:
+            prepared = prepare(part, grid)
+        except InputError as error:
+            problem = str(error)
+    if problem := slab.agree(problem):
+        raise InputError(problem)
+    rows = slab.from_root(prepared.heights if prepared else None)
+    return rows, prepared.told if prepared else []
