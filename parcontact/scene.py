@@ -7,15 +7,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import job as jobs
 from .effects import decisions, relaxation
 from .effects.effect import Decision, Effect, effects_that_follow
 from .effects.folded_branches import describe_folded_branches, fold_branches_of
 from .effects.relaxation import relaxation_of
 from .job import Job, extension
-from .parallel.fft import FFT, Spectrum
-from .parallel.slab import Array, Slab
-from .physics import heightfile
+from .parallel.fft import FFT
+from .parallel.slab import Slab
 from .physics.body import Elastic, Zener
 from .physics.convolution import Convolution
 from .physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
@@ -25,13 +23,11 @@ from .physics.halfspace import HalfSpace
 from .physics.ledger import Ledger
 from .physics.motion import AnyFraction, Path, WholeCells
 from .physics.prony import Prony
-from .physics.roughness import Moments, Roughness, moments
-from .physics.shapes import Round, Shape
-from .physics.surface import Surface, single_wave
+from .physics.roughness import Moments, moments
+from .physics.surface import Surface
 from .physics.units import Units
+from .rigid_surface import height_of, make_surface
 from .solve.contact import ContactSolver
-
-FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
 
 @dataclass
@@ -39,7 +35,8 @@ class Frame:
     """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
 
     `height` [m] is that of the surface from its lowest to its highest point (the shorter side of a cell if it is flat);
-    `size` and `prony` are the box and the relaxation function in the run's units (and seconds).
+    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `told` says, on root,
+    what was done to measured maps.
     """
 
     job: Job
@@ -50,6 +47,7 @@ class Frame:
     height: float
     units: Units
     prony: Prony
+    told: list[str]
 
     @property
     def size(self) -> tuple[float, float]:
@@ -113,14 +111,14 @@ def effects(job: Job) -> list[Decision]:
 def frame(job: Job, slab: Slab) -> Frame:
     """The surface of a job and what it is measured in; collective. Raises InputError for files that do not fit."""
     fft = FFT(slab, dtype=job.numerics.map_type)
-    surface = _surface(job, fft)
+    surface, told = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     prony = relaxation_of(job)
-    height = _height(surface)
+    height = height_of(surface)
     units = Units.near(height, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
     surface.rescale(units.height)
     scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    return Frame(job, slab, fft, surface, roughness, height or min(job.grid.dx, job.grid.dy), units, scaled)
+    return Frame(job, slab, fft, surface, roughness, height or min(job.grid.dx, job.grid.dy), units, scaled, told)
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
@@ -153,7 +151,7 @@ def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
 def facts(built: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
     found = built.frame.roughness
-    told = describe_folded_branches(built.folded, relaxation_of(built.job))
+    told = [*built.frame.told, *describe_folded_branches(built.folded, relaxation_of(built.job))]
     if found is None:
         return told
     return [
@@ -164,64 +162,6 @@ def facts(built: Scene) -> list[str]:
 
 
 # -- parts ------------------------------------------------------------------------------------------------------------
-
-
-def _surface(job: Job, fft: FFT) -> Surface:
-    grid, slab, differences = job.grid, fft.slab, job.numerics.slope == "finite-difference"
-    waves: Spectrum | None = None
-    shapes: list[Shape] = []
-    for part in job.surface:
-        if isinstance(part, jobs.Sphere | jobs.Cylinder):
-            centre = part.center or (grid.lx / 2, grid.ly / 2)
-            along = (1.0, 1.0)
-            if isinstance(part, jobs.Cylinder):
-                along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
-            shapes.append(Round(part.radius, centre, along, part.profile == "exact"))
-        elif isinstance(part, jobs.Spectral):
-            added = _waves(part, fft, grid.size)
-            waves = added if waves is None else waves + added
-    surface = Surface(slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
-    surface.level()
-    if surface.waves is not None:
-        surface.waves = surface.waves.astype(fft.complex, copy=False)
-        slab.tally.hold(surface.waves)
-    return surface
-
-
-def _waves(part: jobs.Spectral, fft: FFT, size: tuple[float, float]) -> Spectrum:
-    if isinstance(part, jobs.Wave):
-        return single_wave(fft, part.amplitude, part.waves, part.phase)
-    if isinstance(part, jobs.HeightFile):
-        rows = heightfile.read(part.path, part.dataset, fft.slab)
-        return _transform(part.scale * rows, fft)
-    return Roughness(
-        part.hurst,
-        part.long_wavelength,
-        part.rolloff_wavelength,
-        part.short_wavelength,
-        part.seed,
-        part.amplitudes == "random",
-        part.rms_slope,
-        part.rms_height,
-        part.psd_constant,
-    ).spectrum(fft, size)
-
-
-def _transform(heights: Array, fft: FFT) -> Spectrum:
-    """Of heights in double precision, their mean apart: single precision may have no digits for both; collective."""
-    mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
-    spectrum = fft.forward((heights - mean).astype(fft.dtype)).astype(np.complex128)
-    if fft.columns.start == 0 < fft.columns.stop:
-        spectrum[0, 0] += mean * fft.slab.points
-    return spectrum
-
-
-def _height(surface: Surface) -> float:
-    """From the lowest to the highest point [m], Sz of the standards on roughness; 0 if that is rounding."""
-    heights = surface.heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
-    extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
-    top, bottom = surface.slab.reduce((), extremes)
-    return top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
 
 
 def _material(base: Frame, branches: FoldedBranches) -> Elastic | Zener:

@@ -122,7 +122,7 @@ class Flat(Part):
     shape: Literal["flat"] = "flat"
 
 
-Spectral = Rough | Wave | HeightFile | Topography  # periodic, and given by their waves; the others are closed forms at every point
+Spectral = Rough | Wave | HeightFile | Topography  # given by their waves; the others are closed forms at every point
 KINDS: dict[str, type[Part]] = {
     "rough": Rough,
     "sphere": Sphere,

@@ -86,7 +86,8 @@ class Slab:
     def from_root(self, field: Array | None) -> Array:
         """Collective. This rank's rows of a map in double precision that root has, of shape (ny, nx)."""
         rows = np.empty(self.shape)
-        counts, starts = zip(*((self.nx * (part.stop - part.start), self.nx * part.start) for part in self.dealt))
+        counts = [self.nx * (part.stop - part.start) for part in self.dealt]
+        starts = [self.nx * part.start for part in self.dealt]
         whole = None if field is None else [np.ascontiguousarray(field, dtype=np.float64), (counts, starts), MPI.DOUBLE]
         self.comm.Scatterv(whole, rows)
         return rows

@@ -1,4 +1,4 @@
-"""Measured maps from files: .npy, .txt and .xyz by ourselves, all other formats by SurfaceTopography where it is installed.
+"""Measured maps from files: .npy, .txt and .xyz, and all other formats by SurfaceTopography where that is installed.
 
 Heights point up, out of the road: what sticks out touches first.
 """
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..parallel.slab import Array
 
-Array = NDArray[np.float64]
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 PLAIN = (".npy", ".txt", ".xyz")  # formats without units
 LARGEST_FILE = 4_000_000_000  # bytes
@@ -41,7 +41,7 @@ def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {str(error).partition(chr(10))[0]}") from error
     if min(found.heights.shape) < FEWEST:
-        raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} along x and y were expected")
+        raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} each way were expected")
     if np.isfinite(found.heights).sum() < found.heights.size / 2:
         raise InputError(f"{path}: more than half of its points are missing")
     return found
@@ -89,7 +89,7 @@ def _steps(path: Path, name: str, values: Array) -> tuple[NDArray[np.intp], int,
 def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | None, channel: str | None) -> Map:
     try:
         import SurfaceTopography
-        from SurfaceTopography.Exceptions import UnknownFileFormat
+        from SurfaceTopography.Exceptions import CannotDetectFileFormat, CorruptFile, UnknownFileFormat
     except ImportError as error:
         raise InputError(
             f"{path}: files of instruments are read by SurfaceTopography, which is not installed: "
@@ -97,8 +97,8 @@ def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | Non
         ) from error
     try:
         reader = SurfaceTopography.open_topography(str(path))
-    except UnknownFileFormat as error:
-        raise InputError(f"{path} is of no format that SurfaceTopography knows") from error
+    except (CannotDetectFileFormat, CorruptFile, UnknownFileFormat) as error:
+        raise InputError(f"{path} is damaged or of no format that SurfaceTopography knows") from error
     names = [found.name for found in reader.channels]
     if channel is not None and channel not in names:
         raise InputError(f"{path} has no channel {channel!r}; it has {', '.join(map(str, names))}")

@@ -3,18 +3,18 @@
     C2(q) = <|h^(q)|^2>/(Lx Ly)/(4 pi^2)   over directions, with h^ = int h exp(-i q x) d2x,   <h^2> = int C2 d2q,
     C1(q) along one direction, one-sided: <h^2> = int_0^inf C1 dq.
 
-(B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1; P. R. Nayak, J. Lubr. Technol. 93 (1971) 398; conventions
-of T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, C2 here over 4 pi^2.)
+(B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1; P. R. Nayak, J. Lubr. Technol. 93 (1971) 398;
+T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, whose C2 is 4 pi^2 times ours.)
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
-Array = NDArray[np.float64]
+from ..parallel.slab import Array
+
 BINS = 12  # per decade of wavenumbers
 FEWEST = 5  # bins that a Hurst exponent is fitted to
 STEADY = 0.35  # rms of the logarithm around a power law above which there is no self-affine range
@@ -22,9 +22,9 @@ STEADY = 0.35  # rms of the logarithm around a power law above which there is no
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of a periodic map of (ny, nx) points on (lx, ly) [m]: rms height [m], slope [-], curvature [1/m] of the gradient
-    and the Laplacian's half; Nayak's parameter; `q`, shape (n,) [1/m], with `psd_2d` [m^4] and the spectra along x and y,
-    `psd_x`, `psd_y` [m^3] at `qx`, `qy`; `hurst` is NaN where no power law holds."""
+    """Of a periodic map of (ny, nx) points on (lx, ly) [m]: rms height [m], slope [-] of the gradient, and curvature
+    [1/m], half of the Laplacian; Nayak's parameter; `q`, shape (n,) [1/m], with `psd_2d` [m^4] and the spectra along x
+    and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`; `hurst` is NaN where no power law holds."""
 
     rms_height: float
     rms_slope: float

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..job import Grid, Topography
-from ..parallel.slab import Slab
+from ..parallel.slab import Array, Slab
 from . import files, treatment
 from .treatment import Treated
 
-Array = NDArray[np.float64]
 SLACK = 1e-6  # of a length: a box this much longer than the map is as long
 
 
@@ -47,14 +45,16 @@ def prepare(part: Topography, grid: Grid) -> Prepared:
     copies = 2 if periodic == "mirror" else 1
     rows, columns = (
         _range(part, name, length / copies, available, count)
-        for name, length, available, count in zip("yx", grid.size[::-1], found.size[::-1], found.heights.shape, strict=True)
+        for name, length, available, count in zip(
+            "yx", grid.size[::-1], found.size[::-1], found.heights.shape, strict=True
+        )
     )
     cut = found.heights[rows, columns]
     if np.isnan(cut).any() and not part.fill:
         raise InputError(f"{part.path}: {int(np.isnan(cut).sum())} of its points are missing; give fill: true")
     done = treatment.treat(cut, part.detrend, periodic)
     shape = (grid.ny, grid.nx)
-    heights = treatment.resample(done.heights, shape) if periodic != "none" else treatment.resample_open(done.heights, shape)
+    heights = (treatment.resample_open if periodic == "none" else treatment.resample)(done.heights, shape)
     return Prepared(heights - heights.mean(), cut, done, (grid.lx / copies, grid.ly / copies))
 
 
@@ -62,8 +62,8 @@ def _range(part: Topography, name: str, length: float, available: float, count: 
     """The points in the middle of the map that are as long as the box."""
     if length > available * (1.0 + SLACK):
         raise InputError(
-            f"{part.path}: the box is {length:.6g} m along {name}, the map only {available:.6g} m; make the box smaller, "
-            "or give periodic: mirror, which needs half of it"
+            f"{part.path}: the box is {length:.6g} m along {name}, the map only {available:.6g} m; make the box "
+            "smaller, or give periodic: mirror, which needs half of it"
         )
     wanted = min(count, max(1, round(count * length / available)))
     first = (count - wanted) // 2

@@ -3,6 +3,7 @@
 Maps are arrays of shape (ny, nx), x last; missing points are NaN.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
-Array = NDArray[np.float64]
+from ..parallel.slab import Array
+
 Detrend = Literal["none", "mean", "tilt", "curvature"]
 Periodic = Literal["none", "smooth", "window", "mirror"]
-OUTLIER = 8.0  # times the median deviation of heights from their neighbours: further off is told
+OUTLIER = 16.0  # times the median deviation of heights from their neighbours: further off is told
 TAPER = 0.1  # share of each side over which a window falls to 0
 SWEEPS = 200  # of relaxation that fill holes smoothly, on each of the coarser maps
 
@@ -36,11 +38,12 @@ def treat(heights: Array, detrend: Detrend, periodic: Periodic) -> Treated:
     level = heights - surface_of(trend, heights.shape)
     filled = fill(level, known)
     odd = count_outliers(filled)
-    made = {"none": np.asarray, "smooth": make_periodic, "window": taper, "mirror": mirror}[periodic](filled)
-    return Treated(np.ascontiguousarray(made), int((~known).sum()), odd, tuple(map(float, trend)))
+    make = {"smooth": make_periodic, "window": taper, "mirror": mirror}.get(periodic)
+    made = np.ascontiguousarray(make(filled) if make else filled)
+    return Treated(made, int((~known).sum()), odd, tuple(map(float, trend)))
 
 
-def _terms(shape: tuple[int, ...], detrend: Detrend) -> list[Array]:
+def _terms(shape: tuple[int, ...], detrend: Detrend) -> Sequence[Array]:
     y, x = (np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(n) for n in shape)
     one, x, y = np.ones(shape), np.broadcast_to(x, shape), np.broadcast_to(y[:, None], shape)
     terms = [one, x, y, x * x, x * y, y * y]
@@ -80,17 +83,17 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def count_outliers(heights: Array) -> int:
-    """Points that stick out of the median of their neighbours by more than eight times the median deviation."""
+    """Points that stick out of the median of their neighbours by far more than the median deviation."""
     apart = np.abs(heights - ndimage.median_filter(heights, 3, mode="nearest"))
     typical = float(np.median(apart[apart > 0.0])) if np.any(apart > 0.0) else 0.0
     return int(np.count_nonzero(apart > OUTLIER * max(typical, np.finfo(float).tiny)))
 
 
 def make_periodic(heights: Array) -> Array:
-    """The periodic part of a map: what is left when the smoothest map with the same jumps across its edges is taken off.
+    """The periodic part of a map: what is left without the smoothest map that has the same jumps across its edges.
 
-    It differs from the map by a harmonic function of the jumps, which is strong at the edges only; slopes and curvatures
-    inside stay as they are. (L. Moisan, J. Math. Imaging Vis. 39 (2011) 161.)
+    It differs from the map by a harmonic function of the jumps, which is strong at the edges only: inside, slopes and
+    curvatures stay as they are. (L. Moisan, J. Math. Imaging Vis. 39 (2011) 161.)
     """
     ny, nx = heights.shape
     jumps = np.zeros_like(heights)
@@ -129,7 +132,7 @@ def mirror(heights: Array) -> Array:
 
 
 def resample(heights: Array, shape: tuple[int, int]) -> Array:
-    """A periodic map on a grid of (ny, nx) points, by its Fourier series: waves that the grid does not have are left out.
+    """A periodic map on a grid of (ny, nx) points, by its Fourier series; waves that the grid has not are left out.
 
     Nothing is left at the Nyquist wavenumber of an even grid, where a wave has no direction.
     """

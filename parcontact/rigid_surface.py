@@ -1,0 +1,81 @@
+"""The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
+
+import numpy as np
+
+from . import job as jobs
+from .job import Grid, Job
+from .parallel.fft import FFT, Spectrum
+from .parallel.slab import Array
+from .physics import heightfile
+from .physics.roughness import Roughness
+from .physics.shapes import Round, Shape
+from .physics.surface import Surface, single_wave
+from .road import surface as road
+
+FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
+
+
+def make_surface(job: Job, fft: FFT) -> tuple[Surface, list[str]]:
+    """The rigid surface of a job, and on root what was done to measured maps; collective. Raises InputError."""
+    grid, slab, differences = job.grid, fft.slab, job.numerics.slope == "finite-difference"
+    waves: Spectrum | None = None
+    shapes: list[Shape] = []
+    told: list[str] = []
+    for part in job.surface:
+        if isinstance(part, jobs.Sphere | jobs.Cylinder):
+            centre = part.center or (grid.lx / 2, grid.ly / 2)
+            along = (1.0, 1.0)
+            if isinstance(part, jobs.Cylinder):
+                along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
+            shapes.append(Round(part.radius, centre, along, part.profile == "exact"))
+        elif isinstance(part, jobs.Spectral):
+            added = _waves(part, grid, fft, told)
+            waves = added if waves is None else waves + added
+    surface = Surface(slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
+    surface.level()
+    if surface.waves is not None:
+        surface.waves = surface.waves.astype(fft.complex, copy=False)
+        slab.tally.hold(surface.waves)
+    return surface, told
+
+
+def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectrum:
+    if isinstance(part, jobs.Wave):
+        return single_wave(fft, part.amplitude, part.waves, part.phase)
+    if isinstance(part, jobs.Topography):
+        rows, done = road.rows_of(part, grid, fft.slab)
+        told += done
+        return _transform(rows, fft)
+    if isinstance(part, jobs.HeightFile):
+        rows = heightfile.read(part.path, part.dataset, fft.slab)
+        return _transform(part.scale * rows, fft)
+    return Roughness(
+        part.hurst,
+        part.long_wavelength,
+        part.rolloff_wavelength,
+        part.short_wavelength,
+        part.seed,
+        part.amplitudes == "random",
+        part.rms_slope,
+        part.rms_height,
+        part.psd_constant,
+    ).spectrum(fft, grid.size)
+
+
+def _transform(heights: Array, fft: FFT) -> Spectrum:
+    """Of heights in double precision, their mean apart: single precision may have no digits for both; collective."""
+    mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
+    spectrum = fft.forward((heights - mean).astype(fft.dtype)).astype(np.complex128)
+    if fft.columns.start == 0 < fft.columns.stop:
+        spectrum[0, 0] += mean * fft.slab.points
+    return spectrum
+
+
+def height_of(surface: Surface) -> float:
+    """From the lowest to the highest point [m], Sz of the standards on roughness; 0 if that is rounding."""
+    heights = surface.heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
+    extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
+    top, bottom = surface.slab.reduce((), extremes)
+    return top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
+
+

@@ -1,0 +1,111 @@
+"""Maps from files: all formats give the same map, and what will not do is one sentence."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import SurfaceTopography
+from numpy.testing import assert_allclose
+
+from parcontact.errors import InputError
+from parcontact.road import files
+
+SIZE = (6e-5, 4e-5)
+HEIGHTS = 1e-6 * np.random.default_rng(5).standard_normal((16, 24))  # (ny, nx) [m]
+
+
+def write(folder: Path) -> dict[str, tuple[Path, str | None, tuple[float, float] | None]]:
+    """The same map in every format: path, and the unit and size that must be given."""
+    microns = HEIGHTS * 1e6
+    map_of = SurfaceTopography.Topography(microns.T, (SIZE[0] * 1e6, SIZE[1] * 1e6), unit="um")
+    for ending in ("nc", "x3p", "gwy"):
+        getattr(map_of, {"nc": "to_netcdf", "x3p": "to_x3p", "gwy": "to_gwy"}[ending])(str(folder / f"road.{ending}"))
+    map_of.to_matrix(str(folder / "headed.txt"))
+    np.save(folder / "road.npy", microns)
+    np.savetxt(folder / "road.txt", microns, fmt="%.17g")
+    y, x = np.indices(microns.shape)
+    table = np.stack([x.ravel() * 2.5, y.ravel() * 2.5, microns.ravel()], axis=1)
+    np.savetxt(folder / "road.xyz", np.random.default_rng(6).permutation(table), fmt="%.17g")
+    own = {"road.npy": ("um", SIZE), "road.txt": ("um", SIZE), "road.xyz": ("um", None)}
+    names = ["road.nc", "road.x3p", "road.gwy", "headed.txt", *own]
+    return {name: (folder / name, *own.get(name, (None, None))) for name in names}
+
+
+@pytest.mark.parametrize("name", ["road.nc", "road.x3p", "road.gwy", "headed.txt", "road.npy", "road.txt", "road.xyz"])
+def test_all_formats_give_the_same_map(tmp_path: Path, name: str) -> None:
+    """To 1e-12 of its height; headed.txt is written with fewer digits by SurfaceTopography."""
+    found = files.read(*write(tmp_path)[name], None)
+    assert found.heights.shape == HEIGHTS.shape
+    assert_allclose(found.heights, HEIGHTS, rtol=0.0, atol=1e-12 * np.ptp(HEIGHTS))
+    assert_allclose(found.size, SIZE, rtol=1e-12)
+
+
+def test_missing_points(tmp_path: Path) -> None:
+    """NaN in .npy and .txt, rows that are not there in .xyz."""
+    holed = HEIGHTS.copy()
+    holed[3, 5] = holed[0, 0] = np.nan
+    np.save(tmp_path / "road.npy", holed)
+    np.savetxt(tmp_path / "road.txt", holed)
+    y, x = np.indices(holed.shape)
+    table = np.stack([x.ravel(), y.ravel(), holed.ravel()], axis=1)
+    np.savetxt(tmp_path / "road.xyz", table[np.isfinite(table[:, 2])])
+    for name, size in (("road.npy", SIZE), ("road.txt", SIZE), ("road.xyz", None)):
+        found = files.read(tmp_path / name, "m", size, None)
+        assert np.array_equal(np.isnan(found.heights), np.isnan(holed))
+
+
+def save(path: Path, values: object) -> None:
+    np.save(path, np.asarray(values), allow_pickle=True)
+
+
+BAD = {
+    "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "says no unit of its heights"),
+    "no size": ("road.npy", HEIGHTS, ("m", None, None), "does not say how large its map is"),
+    "a line": ("road.npy", HEIGHTS[0], ("m", SIZE, None), "has 1 dimensions; a map of two"),
+    "a block": ("road.npy", HEIGHTS[None], ("m", SIZE, None), "has 3 dimensions; a map of two"),
+    "words": ("road.npy", [["a", "b"]], ("m", SIZE, None), "cannot be read"),
+    "objects": ("road.npy", [[None, {}]], ("m", SIZE, None), "cannot be read"),
+    "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
+    "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
+    "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
+    "two columns": ("road.xyz", "1 2\n3 4\n", ("m", None, None), "has 2 columns; x, y and z"),
+    "a word": ("road.xyz", "1 2 x\n", ("m", None, None), "cannot be read"),
+    "no grid": (
+        "road.xyz",
+        "".join(f"{x * x} {y} 0\n" for x in range(6) for y in range(6)),
+        ("m", None, None),
+        "positions along x are not equally spaced",
+    ),
+    "few positions": ("road.xyz", "0 0 1\n1 1 1\n2 2 1\n", ("m", None, None), "has 3 positions along x"),
+    "a size twice": ("road.xyz", "0 0 1\n", ("m", SIZE, None), "give no size"),
+    "an unknown format": ("road.abc", "what is this", (None, None, None), "damaged or of no format that SurfaceTopography knows"),
+    "a unit twice": ("road.nc", None, ("um", None, None), "give no unit"),
+    "its size twice": ("road.nc", None, (None, SIZE, None), "give no size"),
+    "an unknown channel": ("road.nc", None, (None, None, "Gloss"), "has no channel 'Gloss'; it has Default"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_will_not_do(tmp_path: Path, case: str) -> None:
+    name, content, given, sentence = BAD[case]
+    path = tmp_path / name
+    if content is None:
+        write(tmp_path)
+    elif isinstance(content, str):
+        path.write_text(content)
+    else:
+        save(path, content)
+    with pytest.raises(InputError) as failure:
+        files.read(path, *given)
+    assert sentence in str(failure.value)
+    assert "\n" not in str(failure.value)
+
+
+def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    write(tmp_path)
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    with pytest.raises(InputError, match="pip install 'parcontact"):
+        files.read(tmp_path / "road.x3p", None, None, None)
+    assert files.read(tmp_path / "road.npy", "um", SIZE, None).heights.shape == (16, 24)
