@@ -78,7 +78,7 @@ BAD = {
     ),
     "few positions": ("road.xyz", "0 0 1\n1 1 1\n2 2 1\n", ("m", None, None), "has 3 positions along x"),
     "a size twice": ("road.xyz", "0 0 1\n", ("m", SIZE, None), "give no size"),
-    "an unknown format": ("road.abc", "what is this", (None, None, None), "damaged or of no format that SurfaceTopography knows"),
+    "an unknown format": ("road.abc", "what is this", (None, None, None), "of no format that SurfaceTopography knows"),
     "a unit twice": ("road.nc", None, ("um", None, None), "give no unit"),
     "its size twice": ("road.nc", None, (None, SIZE, None), "give no size"),
     "an unknown channel": ("road.nc", None, (None, None, "Gloss"), "has no channel 'Gloss'; it has Default"),

@@ -1,0 +1,115 @@
+"""A measured road in a job: the truth comes back, on any number of ranks, and mistakes name their key."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact import job as jobs
+from parcontact import scene
+from parcontact.errors import InputError
+from parcontact.parallel.slab import Slab
+
+from . import truth
+
+LENGTH, POINTS, SLOPE = 1e-3, 192, 0.05
+JOB = """
+grid: {{points: [{points}, {points}], size: {size}}}
+surface: {{shape: topography, path: road.npy, unit: um, size: [1.0e-3, 1.0e-3]{more}}}
+material: {{model: elastic, shear_modulus: 1.0e6}}
+history: [{{pressure: 1.0e4}}]
+"""
+
+
+@pytest.fixture
+def road(shared_path: Path, comm: MPI.Intracomm) -> Path:
+    """A cut of a larger road in um, tilted, 2 % of it missing."""
+    if comm.rank == 0:
+        heights = truth.rough(2 * POINTS, 2 * LENGTH, 2.5e-4, 4e-5, SLOPE)[:POINTS, :POINTS]
+        y, x = np.mgrid[0:POINTS, 0:POINTS] / POINTS
+        measured = heights + 3e-5 * x - 1e-5 * y
+        measured[np.random.default_rng(0).random(measured.shape) < 0.02] = np.nan
+        np.save(shared_path / "road.npy", measured * 1e6)
+        np.save(shared_path / "truth.npy", heights)
+    comm.barrier()
+    return shared_path
+
+
+def heights_of(
+    folder: Path, comm: MPI.Intracomm, points: int = POINTS, size: float = LENGTH, more: str = ""
+) -> np.ndarray:
+    """The whole map of a job, on every rank; collective."""
+    path = folder / f"job{comm.size}.yaml"
+    if comm.rank == 0:
+        path.write_text(JOB.format(points=points, size=size, more=more))
+    comm.barrier()
+    base = scene.frame(jobs.load(path), Slab(comm, points, points))
+    rows = base.surface.heights((0.0, 0.0), base.slab.empty()) * base.units.height
+    return np.concatenate(comm.allgather(rows))
+
+
+@pytest.mark.mpi
+def test_the_same_on_any_ranks(road: Path, communicators: list[MPI.Intracomm]) -> None:
+    alone = heights_of(road, MPI.COMM_SELF)
+    for comm in communicators:
+        assert np.abs(heights_of(road, comm) - alone).max() <= 1e-12 * np.ptp(alone)
+
+
+@pytest.mark.parametrize("periodic", ["smooth", "mirror"])
+@pytest.mark.parametrize("finer", [1, 2])
+def test_the_slope_comes_back(road: Path, periodic: str, finer: int) -> None:
+    """With 2 % of missing points, a tilt and edges that do not fit, the rms slope is that of the truth to 2 %, on the
+    map's own points and on twice as many."""
+    copies = 2 if periodic == "mirror" else 1
+    found = heights_of(road, MPI.COMM_SELF, copies * finer * POINTS, copies * LENGTH, f", periodic: {periodic}")
+    inside = 2 * POINTS
+    full = truth.rough(inside, 2 * LENGTH, 2.5e-4, 4e-5, SLOPE)
+    part = full[:POINTS, :POINTS]
+    expected = truth.central_slope(part, LENGTH, 1) * SLOPE / truth.central_slope(full, 2 * LENGTH, 1)
+    assert truth.rms_slope(found, copies * LENGTH) == pytest.approx(expected, rel=0.02)
+
+
+def test_a_smaller_box_takes_the_middle(road: Path) -> None:
+    """Of half the length: the truth there, but near its edges, to 5 % of its height."""
+    found = heights_of(road, MPI.COMM_SELF, POINTS // 2, LENGTH / 2)
+    quarter = POINTS // 4
+    expected = np.load(road / "truth.npy")[quarter : 3 * quarter, quarter : 3 * quarter]
+    inner = slice(8, -8)
+    apart = (found - expected)[inner, inner]
+    assert np.abs(apart - apart.mean()).max() < 0.2 * np.ptp(expected)
+    assert np.std(apart) < 0.05 * np.ptp(expected)
+
+
+def test_a_larger_box_is_refused(road: Path) -> None:
+    with pytest.raises(InputError, match=r"the box is 0\.002 m along y, the map only 0\.001 m; make the box smaller"):
+        heights_of(road, MPI.COMM_SELF, POINTS, 2 * LENGTH)
+
+
+def test_missing_points_may_be_refused(road: Path) -> None:
+    with pytest.raises(InputError, match="of its points are missing; give fill: true"):
+        heights_of(road, MPI.COMM_SELF, more=", fill: false")
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        (", path: none.nc", "surface.path must be an existing file"),
+        (", unit: inch", "surface.unit must be m | mm | um | nm, got 'inch'"),
+        (", size: 1.0e-3", "surface.size must be two positive lengths"),
+        (", detrend: slope", "surface.detrend must be none | mean | tilt | curvature, got 'slope'"),
+        (", periodic: yes", "surface.periodic must be smooth | window | mirror | none"),
+        (", fill: 1", "surface.fill must be true or false"),
+        (", scale: 2", "surface.scale is not a key of shape topography"),
+    ],
+)
+def test_mistakes_name_their_key(road: Path, more: str, sentence: str) -> None:
+    key = more.split(":")[0].strip(", ")
+    kept = [part for part in ("path: road.npy", "unit: um", "size: [1.0e-3, 1.0e-3]") if not part.startswith(key + ":")]
+    text = JOB.format(points=8, size=1e-3, more=more)
+    text = text.replace("path: road.npy, unit: um, size: [1.0e-3, 1.0e-3]", ", ".join(kept))
+    (road / "job.yaml").write_text(text)
+    with pytest.raises(jobs.JobError) as failure:
+        jobs.load(road / "job.yaml")
+    assert sentence in str(failure.value)
+    assert ":3:" in str(failure.value)
