@@ -1,7 +1,7 @@
 """Values that are allowed one by one and yet lead to numbers that a run cannot compute with.
 
 Judged is what follows from several keys together: squares of wave numbers, slopes, strains, counts of steps. Each must
-be zero, or a number whose square and reciprocal double precision can hold without losing digits.
+be zero, or a number whose fourth power double precision can hold, and one over it.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from .history import GeometricStep, Initial, Stage, Steady
 from .material import Elastic, Zener, ZenerBranch
 from .sections import Grid
 from .source import Key
-from .surface import Cylinder, Rough, Sphere, Wave
+from .surface import Cylinder, HeightFile, Rough, Sphere, Wave
 
-SMALLEST, LARGEST = 1e-140, 1e140  # squares and reciprocals of squares are normal numbers of double precision
+SMALLEST, LARGEST = 1e-70, 1e70  # fourth powers and their reciprocals are normal numbers of double precision
 MOST_STEPS = 10**18  # of a history: instants are counted in 64 bits
 
 
@@ -73,6 +73,8 @@ def _heights(shape: Any, grid: Grid) -> Iterator[tuple[str, float]]:
         yield "radius", _ratio(grid.lx * grid.ly, shape.radius)
         for length in shape.center or ():
             yield "center", length
+    elif isinstance(shape, HeightFile):
+        yield "scale", shape.scale
     elif isinstance(shape, Rough):
         if shape.rms_height is not None:
             yield "rms_height", shape.rms_height
