@@ -17,6 +17,7 @@ SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
 AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
 FRACTION = "contact area /\nnominal area"
+MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEVELS = 3  # of names above each other, before they are turned
 
 
@@ -160,12 +161,12 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
             "textcoords": "offset points",
             "rotation": 90 if turned else 0,
         }
-        axes.annotate(style.plain(name), (x / width, 1.0), (0, 2 + LINE * level), **place, **look)
+        axes.annotate(style.plain(name, MAX_NAME), (x / width, 1.0), (0, 2 + LINE * level), **place, **look)
 
 
 def _width(name: str) -> float:
     """Of the name of a stage, with a blank [points]."""
-    return float(TextPath((0, 0), style.plain(name), size=NAMES).get_extents().width) + NAMES / 2
+    return float(TextPath((0, 0), style.plain(name, MAX_NAME), size=NAMES).get_extents().width) + NAMES / 2
 
 
 def _shares(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> list[float]:

@@ -28,9 +28,9 @@ RC: dict[Any, Any] = {
 }
 
 
-def plain(text: str) -> str:
-    """A text as it is: between dollars, there would be a formula."""
-    return text.replace("$", r"\$")
+def plain(text: str, most: int = 1000) -> str:
+    """A text as it is, up to so many letters: between dollars, there would be a formula."""
+    return (text if len(text) <= most else text[: most - 1] + "…").replace("$", r"\$")
 
 
 def line(number: int) -> dict[str, Any]:
