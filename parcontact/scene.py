@@ -10,6 +10,7 @@ import numpy as np
 from .effects import decisions, relaxation
 from .effects.effect import Decision, Effect, effects_that_follow
 from .effects.folded_branches import describe_folded_branches, fold_branches_of
+from .effects.interface import interface_of
 from .effects.relaxation import relaxation_of
 from .job import Job, extension
 from .parallel.fft import FFT
@@ -133,7 +134,7 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
     energy = _energy(base, solver, material) if decisions.energies(job).on else None
-    ledger = Ledger(slab, base.surface, base.units)
+    ledger = Ledger(slab, base.surface, base.units, interface_of(job))
     scene = Scene(base, path, branches, material, solver, ledger, energy, decisions.lasting(job).on)
     scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
     return scene

@@ -350,5 +350,5 @@ TESTED = {
         "displacement control",
         "dissipation per branch",
     ),
-    *("fields", "checkpoints"),
+    *("fields", "checkpoints", "interface"),  # the last in effects/test_interface.py
 }

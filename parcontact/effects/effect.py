@@ -47,7 +47,8 @@ class Instant:
 class Effect(Remembers, Protocol):
     """The class of an effect that is told of every step made; made with a `Scene`, only where the job asks for it.
 
-    It also has the `entries` and `restore` of whatever remembers something. Methods are collective, unless they say
+    It also has the `entries` and `restore` of whatever remembers something, and may have `rules` for the whole job, as
+    sections have them. Methods are collective, unless they say
     otherwise.
     """
 

@@ -22,6 +22,7 @@ from .part import Part
 GROUP = "parcontact.effects"
 OURS: dict[str, str] = {
     # one line for each effect of this package that has a section of its own: its name, and where the effect is
+    "interface": "parcontact.effects.interface:InterfaceColumns",
 }
 
 

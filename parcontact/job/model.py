@@ -191,11 +191,14 @@ SEPARATOR = ":"  # of sections in the name of an extended job, by which other ra
 @cache
 def extended(sections: tuple[str, ...]) -> type[Job]:
     """The model of a job that may have these sections of effects too."""
+    effects = extension.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))
-        for name, effect in extension.effects_of(sections).items()
+        for name, effect in effects.items()
     }
-    return create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
+    made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
+    made.rules = (*Job.rules, *(rule for effect in effects.values() for rule in getattr(effect, "rules", ())))
+    return made
 
 
 def __getattr__(name: str) -> Any:

@@ -54,7 +54,9 @@ class March:
         calls = tally["operator"]
         trial = scene.material.begin(step.dt, scene.path.at(step.position))
         contact, remark = self._solve(step, trial)
-        measures = scene.ledger.measures(contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position)
+        measures = scene.ledger.measures(
+            contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
+        )
         scene.material.commit(trial, contact.u)
         if scene.energy is not None:
             now, before = Pressed(contact.p, trial.alpha), Pressed(old.pressure, old.alpha)

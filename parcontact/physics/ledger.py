@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
+from .interface import InterfaceFriction, Vector
 from .surface import Surface
 from .units import Units
 
@@ -26,7 +27,8 @@ class Measures:
     `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
     the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
     spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
-    `at_edge` says that an isolated contact reaches it.
+    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, whose part of
+    it is `friction_interface`.
     """
 
     pressure: float = 0.0
@@ -39,6 +41,8 @@ class Measures:
     max_pressure: float = 0.0
     contact_area_corrected: float = 0.0
     at_edge: bool = False
+    normal_force: float = 0.0
+    friction_interface: float = 0.0
 
     @property
     def friction_x(self) -> float:
@@ -57,11 +61,13 @@ class Ledger:
     slab: Slab
     surface: Surface
     units: Units
+    interface: InterfaceFriction | None = None
 
     def measures(
-        self, p: Array, alpha: float, u: Array, h: Array, d: float, displacement: tuple[float, float]
+        self, p: Array, alpha: float, u: Array, h: Array, d: float, displacement: Vector, velocity: Vector = (0.0, 0.0)
     ) -> Measures:
-        """Of the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m]; collective."""
+        """Of the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving with
+        `velocity` [m/s]; collective."""
         units, points = self.units, self.slab.points
         *sums, largest = loops.measure(p, u, h)
         cyclic = self.surface.periodic
@@ -75,6 +81,8 @@ class Ledger:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
+        own = (0.0, 0.0) if self.interface is None else self.interface.force(count / points * area, velocity)
+        force_x, force_y = force_x + own[0], force_y + own[1]
         return Measures(
             pressure=load / points * unit_pressure,
             force_x=force_x,
@@ -86,6 +94,8 @@ class Ledger:
             max_pressure=largest * unit_pressure,
             contact_area_corrected=(count - SIDE * sides) / points,
             at_edge=edge > 0.0,
+            normal_force=normal,
+            friction_interface=math.hypot(*own) / normal if normal > 0.0 else 0.0,
         )
 
 

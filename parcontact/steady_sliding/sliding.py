@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..effects.interface import interface_of
 from ..errors import RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
@@ -58,7 +59,7 @@ class SteadySliding:
 
     def __init__(self, base: Frame) -> None:
         self.base = base
-        self.ledger = Ledger(base.slab, base.surface, base.units)
+        self.ledger = Ledger(base.slab, base.surface, base.units, interface_of(base.job))
         heights = base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype))
         finest, *coarser = nested.levels_of(base.slab, heights)
         self.levels = [Level(base.slab, base.fft, finest.heights)]
@@ -85,7 +86,8 @@ class SteadySliding:
                 "velocity nearer to one that works, a finer grid, or a larger numerics.tolerance."
             )
         self._remember(contact, speed, pressure)
-        measures = self.ledger.measures(contact.p, 1.0, contact.u, self.levels[0].heights, contact.d, (0.0, 0.0))
+        heights = self.levels[0].heights
+        measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
         lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
         seconds = time.perf_counter() - began
         return Point(velocity, pressure, measures, contact.certificate, calls, contact.sets, seconds, lost)

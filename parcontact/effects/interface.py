@@ -1,0 +1,95 @@
+"""Interface friction: a shear stress on the area in contact, beside what the body dissipates (`physics.interface`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, ClassVar
+
+from numpy.typing import DTypeLike
+from pydantic import Field
+
+from ..job import Elastic, Job, Zener
+from ..job.fault import Fault
+from ..job.part import Part, Rule
+from ..job.values import Positive
+from ..physics.entries import Entry
+from ..physics.interface import InterfaceFriction
+from ..physics.units import Units
+from .effect import Decision, Instant
+
+LEAST_POISSON = 0.49  # below it shear moves the surface, and the solve would have to be coupled
+
+
+def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
+    if (velocity is None) != (width is None):
+        missing, given = ("velocity", "width") if velocity is None else ("width", "velocity")
+        yield Fault(f"is missing; a bell over the velocity needs it beside {given}", (missing,))
+
+
+def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
+    if interface is not None and material.poisson < LEAST_POISSON:
+        yield Fault(
+            f"needs material.poisson of at least {LEAST_POISSON:g}, got {material.poisson:g}: shear on a compressible "
+            "body moves its surface, which is not solved for",
+            ("interface",),
+        )
+
+
+class Interface(Part):
+    """The `interface` section: a constant shear stress, or a bell over the logarithm of the velocity."""
+
+    label: ClassVar[str] = "interface"
+    shear_stress: Positive = Field(description="a positive shear stress on the area in contact [Pa]")
+    velocity: Positive | None = Field(default=None, description="a positive velocity [m/s], where the bell is highest")
+    width: Positive | None = Field(default=None, description="a positive number of decades, the width of the bell [-]")
+
+    rules = (Rule(("velocity", "width"), _whole_bell),)
+
+
+def interface_of(job: Job) -> InterfaceFriction | None:
+    """The law of a job; None if it has no `interface`."""
+    section: Interface | None = getattr(job, "interface", None)
+    if section is None:
+        return None
+    body = job.material if isinstance(job.material, Elastic | Zener) else job.material.fitted
+    shift = body.time_factor if isinstance(body, Zener) else 1.0
+    return InterfaceFriction(section.shear_stress, section.velocity, section.width or 1.0, shift)
+
+
+class InterfaceColumns:
+    """What of friction comes from the body, along the velocity (positive where it opposes it), and what from the
+    interface."""
+
+    section: ClassVar[type[Part]] = Interface
+    columns: ClassVar[tuple[str, ...]] = ("friction_viscous", "friction_interface")
+    rules: ClassVar[tuple[Rule, ...]] = (Rule(("interface", "material"), _incompressible),)
+
+    @staticmethod
+    def decide(job: Job) -> Decision:
+        law = interface_of(job)
+        why = "there is no interface section" if law is None else f"a shear stress of {law.shear_stress:g} Pa at most"
+        return Decision("interface", law is not None, why)
+
+    @staticmethod
+    def maps(job: Job) -> Sequence[DTypeLike]:
+        return ()
+
+    def __init__(self, scene: Any) -> None:
+        self._values = (0.0, 0.0)
+
+    def follow(self, instant: Instant) -> None:
+        measures, (x, y) = instant.measures, instant.step.velocity
+        speed = math.hypot(x, y)
+        opposing = -(measures.force_x * x + measures.force_y * y) / speed if speed else 0.0
+        whole = opposing / measures.normal_force if measures.normal_force > 0.0 else 0.0
+        self._values = whole - measures.friction_interface, measures.friction_interface
+
+    def values(self) -> Sequence[float]:
+        return self._values
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """Nothing is remembered."""
+        return {}
+
+    def restore(self, saved: Any) -> None: ...

@@ -1,0 +1,115 @@
+"""Friction of the interface: closed forms, its direction, what it needs, and that it costs nothing."""
+
+import math
+from typing import Any
+
+import pytest
+from marching import marched
+from mpi4py import MPI
+
+from parcontact import scene
+from parcontact.errors import InputError
+from parcontact.job import Job, load
+from parcontact.parallel.slab import Slab
+from parcontact.physics.interface import InterfaceFriction
+from parcontact.steady_sliding.sliding import SteadySliding
+
+PRESSURE, STRESS, SPEED, LENGTH = 1e5, 2e5, 0.2, 1e-3
+CONSTANT = {"shear_stress": STRESS}
+SLIDE = {"pressure": PRESSURE, "velocity": SPEED, "distance": 2e-4, "cells_per_step": 1}
+RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "relaxation_time": 1e-3}]}
+
+
+def job(amplitude: float = 4e-6, **more: Any) -> Job:
+    """A wave on 32 cells: in full contact below an amplitude of about 0.4 um."""
+    data = {
+        "grid": {"points": [32, 4], "size": [LENGTH, LENGTH / 8]},
+        "surface": {"shape": "wave", "amplitude": amplitude, "waves": [2, 0]},
+        "material": RUBBER,
+        "history": [SLIDE],
+        "numerics": {"tolerance": 1e-10},
+        **more,
+    }
+    return Job.model_validate(data)
+
+
+@pytest.mark.mpi
+def test_full_contact_adds_the_stress_over_the_pressure() -> None:
+    """To 1e-12: friction with the interface, less friction without."""
+    plain, added = (marched(job(1e-7, interface=section))[1][-1] for section in (None, CONSTANT))
+    assert added.measures.contact_area == 1.0
+    assert added.measures.friction - plain.measures.friction == pytest.approx(STRESS / PRESSURE, rel=1e-12)
+    assert added.added == pytest.approx((plain.measures.friction, STRESS / PRESSURE), rel=1e-12)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("speed", [SPEED, -SPEED])
+def test_partial_contact_adds_the_stress_on_the_area(speed: float) -> None:
+    """In either direction it opposes motion; pressures and area are as without, bit for bit."""
+    history = [{**SLIDE, "velocity": speed}]
+    plain, added = (marched(job(history=history, interface=section))[1][-1].measures for section in (None, CONSTANT))
+    area = added.contact_area * LENGTH * LENGTH / 8
+    assert 0.05 < added.contact_area < 0.9
+    assert added.contact_area == plain.contact_area
+    assert added.max_pressure == plain.max_pressure
+    assert added.force_x - plain.force_x == pytest.approx(-math.copysign(STRESS * area, speed), rel=1e-12)
+    assert math.copysign(1.0, added.friction_x) == math.copysign(1.0, speed)
+    assert added.friction == pytest.approx(plain.friction + STRESS * added.contact_area / PRESSURE, rel=1e-12)
+
+
+def test_rest_has_none() -> None:
+    rows = marched(job(history=[{"pressure": PRESSURE}, SLIDE], interface=CONSTANT))[1]
+    assert rows[1].measures.friction == 0.0
+    assert rows[-1].measures.friction > 0.5
+
+
+def test_a_bell_over_the_velocity() -> None:
+    """By its definition, and moved by the shift factor of the temperature: as at the reference and a_T v."""
+    bell = InterfaceFriction(STRESS, 0.01, 2.0)
+    assert bell.stress(0.01) == STRESS
+    assert bell.stress(1.0) == pytest.approx(STRESS * math.exp(-1.0), rel=1e-14)
+    assert bell.stress(1e-4) == pytest.approx(bell.stress(1.0), rel=1e-14)
+    assert InterfaceFriction(STRESS, 0.01, 2.0, shift=100.0).stress(0.01) == pytest.approx(bell.stress(1.0), rel=1e-14)
+    warm = {**RUBBER, "shift": {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}, "temperature": 5.0}
+    section = {"shear_stress": STRESS, "velocity": 0.01, "width": 2.0}
+    factor = 10.0 ** (8.86 * 15.0 / 86.6)
+    found = marched(job(1e-7, material=warm, interface=section))[1][-1].added[1]
+    assert found == pytest.approx(bell.stress(factor * SPEED) / PRESSURE, rel=1e-12)
+
+
+def test_a_steady_state_has_it_too() -> None:
+    built = job(interface=CONSTANT)
+    sliding = SteadySliding(scene.frame(built, Slab(MPI.COMM_SELF, 32, 4)))
+    measures = sliding.solve((SPEED, 0.0), PRESSURE).measures
+    assert measures.friction_interface == pytest.approx(STRESS * measures.contact_area / PRESSURE, rel=1e-12)
+    assert measures.friction > measures.friction_interface
+
+
+def test_it_costs_nothing() -> None:
+    """The same counts of everything with it as without: it adds a number to sums that are taken anyway."""
+    plain, added = (marched(job(interface=section))[0].scene.slab.tally for section in (None, CONSTANT))
+    assert {name: added[name] for name in plain} == dict(plain)
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("interface: {shear_stress: -1}", "interface.shear_stress must be a positive shear stress"),
+        ("interface: {}", "interface.shear_stress is missing"),
+        ("interface: {shear_stress: 1.0e5, velocity: 0.1}", "interface.width is missing"),
+        ("interface: {shear_stress: 1.0e5, width: 1.0}", "interface.velocity is missing"),
+        ("interface: {shear_stress: 1.0e5, speed: 1.0}", "interface.speed is not a key of interface"),
+        ("interface: {shear_stress: 1.0e5}", "interface needs material.poisson of at least 0.49, got 0.3"),
+    ],
+)
+def test_mistakes(tmp_path: Any, more: str, sentence: str) -> None:
+    path = tmp_path / "job.yaml"
+    path.write_text(
+        "grid: {points: 8, size: 1.0e-3}\nsurface: {shape: flat}\n"
+        "material: {model: elastic, shear_modulus: 1.0e6, poisson: 0.3}\n"
+        f"history: [{{pressure: 1.0e4}}]\n{more}\n"
+    )
+    with pytest.raises(InputError) as failure:
+        load(path)
+    assert sentence in str(failure.value)
+    assert ":5:" in str(failure.value)
