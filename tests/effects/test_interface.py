@@ -30,7 +30,7 @@ def job(amplitude: float = 4e-6, **more: Any) -> Job:
         "numerics": {"tolerance": 1e-10},
         **more,
     }
-    return Job.model_validate(data)
+    return Job.model_validate({key: value for key, value in data.items() if value is not None})
 
 
 @pytest.mark.mpi
