@@ -1,3 +1,44 @@
-"""Transient contact of a rough rigid surface on a viscoelastic half space, on any number of MPI ranks."""
+"""Transient contact of a rough rigid surface on a viscoelastic half space, on any number of MPI ranks.
+
+    import parcontact as pc
+
+    run = pc.Simulation("job.yaml", set={"grid.points": 256})     # or a mapping like a job file
+    for row in run.steps():
+        print(row.time, row.friction, row.contact_area)
+
+What is named here loads when it is first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import InputError, JobError, RunError
+
+if TYPE_CHECKING:
+    from .python.curves import steady
+    from .python.parts import material, surface
+    from .python.results import open
+    from .python.simulation import Simulation
 
 __version__ = "0.1.0"
+__all__ = ["InputError", "JobError", "RunError", "Simulation", "material", "open", "steady", "surface"]
+
+_ROOMS = {
+    "Simulation": "python.simulation",
+    "steady": "python.curves",
+    "open": "python.results",
+    "surface": "python.parts",
+    "material": "python.parts",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _ROOMS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f"{__name__}.{_ROOMS[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, "__version__"})

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from ..errors import InputError, RunError
+from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..parallel.mpi import MPI
 
-T = TypeVar("T")
 BLANK = " \0"  # what may follow the name of an MPI library
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # say which rank a process is
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # how many were started
@@ -56,17 +54,3 @@ def start() -> MPI.Intracomm:
             f"mpi4py ({MPI.Get_library_version().splitlines()[0].strip(BLANK)}). Use the mpirun beside this parcontact."
         )
     return world
-
-
-def on_root(world: MPI.Intracomm, act: Callable[[], T]) -> T:
-    """What root finds, on every rank, and so with what a user can put right; collective."""
-    found: tuple[T | None, Exception | None] = (None, None)
-    if world.rank == 0:
-        try:
-            found = act(), None
-        except (InputError, RunError) as error:
-            found = None, error
-    value, problem = world.bcast(found)
-    if problem is not None:
-        raise problem
-    return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..parallel.root import on_root
 from . import ranks
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def _each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs
     from ..parallel.slab import Slab
     from ..run import sweep
 
-    cases, chosen = ranks.on_root(world, lambda: _cases(options))
+    cases, chosen = on_root(world, lambda: _cases(options))
     if not cases[0].settings:
         return act(cases[0].job, Slab(world, *cases[0].job.grid.points))
     return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act, options.quiet, runs)
@@ -131,7 +132,7 @@ def theory(options: argparse.Namespace) -> int:
 
     def act(job: Job, slab: Slab) -> int:
         alone = Slab(MPI.COMM_SELF, *job.grid.points)
-        path = ranks.on_root(
+        path = on_root(
             world, lambda: prediction.write(job, prediction.predict(job, alone, options.gamma, options.waves))
         )
         if slab.root and not options.quiet:
@@ -170,7 +171,7 @@ def study(options: argparse.Namespace) -> int:
     job, words = _load(options, world), _overrides(options)
 
     def make(changes: Sequence[str]) -> Job:
-        return ranks.on_root(world, lambda: jobs.load(options.job, [*words, *changes], options.case))
+        return on_root(world, lambda: jobs.load(options.job, [*words, *changes], options.case))
 
     return runner.run(job, make, Slab(world, *job.grid.points), options.quiet)
 
@@ -179,7 +180,7 @@ def info(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..record import info as about
 
-    text, sound = ranks.on_root(world, lambda: about.describe(options.file))
+    text, sound = on_root(world, lambda: about.describe(options.file))
     if world.rank == 0:
         print(text)
     return DONE if sound else BAD_INPUT
@@ -191,7 +192,7 @@ def plot(options: argparse.Namespace) -> int:
 
     names = ("format", "panels", "over", "log", "compare", "movie", "out")
     wanted = plots.Options(**{name: getattr(options, name) for name in names})
-    pictures = ranks.on_root(world, lambda: plots.plot(options.directories, wanted))
+    pictures = on_root(world, lambda: plots.plot(options.directories, wanted))
     if world.rank == 0:
         for picture in pictures:
             print(f"picture: {picture}")
@@ -214,7 +215,7 @@ def _load(options: argparse.Namespace, world: MPI.Intracomm) -> Job:
     """Root reads the job; the others get what it found; collective."""
     from .. import job as jobs
 
-    return ranks.on_root(world, lambda: jobs.load(options.job, _overrides(options), options.case))
+    return on_root(world, lambda: jobs.load(options.job, _overrides(options), options.case))
 
 
 def _overrides(options: argparse.Namespace) -> list[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .fault import quote
+from .mapping import source_of
 from .source import Key, Mistake, Place, Source, shorten
 from .sweep import SWEEP, Setting, Sweep, refuse_overrides, take
 from .yamltext import parse, read, read_with_content
@@ -37,6 +38,9 @@ class Reading(NamedTuple):
     sweep: Sweep | None
 
 
+Overrides = tuple[str | tuple[str, Any], ...]
+
+
 class Included(NamedTuple):
     """A file that a job includes: its absolute path, and the SHA-256 of what was read from it."""
 
@@ -47,12 +51,15 @@ class Included(NamedTuple):
         return f"material: included from {self.path} (SHA-256 {self.sha256})"
 
 
-def read_job(path: Path, overrides: tuple[str, ...], case: int = 0) -> Reading:
-    """The source of a job with its overrides, the settings of a case if it has a sweep, and its included material."""
-    source = read(path, str(path))
+def read_job(path: Path, overrides: Overrides, case: int = 0, given: Source | None = None) -> Reading:
+    """The source of a job with its overrides, the settings of a case if it has a sweep, and its included material.
+
+    Data that are `given` stand for the file.
+    """
+    source = given or read(path, str(path))
     if () in source.broken:
         source.data = None
-    parsed = [_parse(text, source) for text in overrides]
+    parsed = [_parse(override, source) for override in overrides]
     of_job = [override for override in parsed if override is not None]
     for override in of_job:
         if override.path[:1] == SWEEP:
@@ -86,7 +93,14 @@ def _given(source: Source) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _parse(text: str, source: Source) -> Override | None:
+def _parse(given: str | tuple[str, Any], source: Source) -> Override | None:
+    """An override as a text `key.path=value`, or as a key and Python data."""
+    if not isinstance(given, str):
+        place = Place(f"set {shorten(given[0])}")
+        data = source_of(given[1], place)
+        source.mistakes += data.mistakes
+        return None if data.mistakes else Override(tuple(given[0].split(".")), data, place)
+    text = given
     place = Place(f"--set {shorten(text)}")
     name, equals, value = text.partition("=")
     keys = [key.strip() for key in name.split(".")]

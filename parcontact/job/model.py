@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
@@ -75,6 +75,13 @@ def _steady_at_rest(initial: Initial, material: Elastic | Zener) -> Iterator[Fau
         yield Fault(sentence, ("initial", "velocity"))
 
 
+class Origin(NamedTuple):
+    """How a job was given: from a file or as a mapping, and whether it says itself where its results go."""
+
+    from_file: bool = True
+    names_directory: bool = False
+
+
 class Job(Part):
     """A whole job. Sections have the names of the job file; equal jobs may come from different files."""
 
@@ -92,6 +99,7 @@ class Job(Part):
 
     _path: Path = PrivateAttr(default=Path("job.yaml"))
     _included: Included | None = PrivateAttr(default=None)
+    _origin: Origin = PrivateAttr(default=Origin())
 
     rules = (
         Rule(("grid", "numerics"), _kernel_fits),
@@ -150,6 +158,17 @@ class Job(Part):
     def path(self) -> Path:
         """The job file (absolute)."""
         return self._path
+
+    @property
+    def origin(self) -> Origin:
+        """How the job was given."""
+        return self._origin
+
+    def of(self, origin: Origin, path: Path | None = None) -> Job:
+        """The same job, given otherwise, or from another file."""
+        copy = self.model_copy()
+        copy._origin, copy._path = origin, path or self._path
+        return copy
 
     @property
     def included(self) -> Included | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from ..errors import InputError, JobError
 from .fault import faults_of
 from .loading import read_job
-from .model import Job
+from .mapping import NOWHERE, numbers_for_texts, source_of
+from .model import Job, Origin
 from .part import Context
 from .source import Key, Mistake, Place, Source, shorten
 from .sweep import Sweep
@@ -20,6 +21,8 @@ from .sweep import Sweep
 MANY_MISTAKES = 40  # more are not shown one by one
 SHOWN_MISTAKES = 20  # of so many
 STRICT = "an error with numerics.strict"
+Given = str | os.PathLike[str] | Mapping[str, Any]
+Changes = Sequence[str] | Mapping[str, Any]
 CASES = "cases"  # where in the output directory of a job its cases have theirs
 
 
@@ -38,34 +41,36 @@ class Case(NamedTuple):
         return f"case {self.number}: {settings}"
 
 
-def load(path: str | os.PathLike[str], overrides: Sequence[str] = (), case: int | None = None) -> Job:
-    """Reads a job file; `overrides` are texts like `grid.points=512`. Raises JobError with every mistake.
+def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
+    """Reads a job file, or takes a mapping like one, whose files are looked for from the working directory.
+
+    `overrides` are texts like `grid.points=512`, or values by such keys. Raises JobError with every mistake.
 
     Of a job with a sweep it reads one `case`, and raises InputError if none is chosen or there is no such case.
     """
     if case is not None:
-        return choose(load_cases(path, overrides), case)[0].job
-    found, mistakes, sweep = _read(Path(path), overrides, 0)
+        return choose(load_cases(given, overrides), case)[0].job
+    found, mistakes, sweep = _read(given, overrides, 0)
     if found is None:
-        raise JobError(_told(Path(path), mistakes))
+        raise JobError(_told(given, mistakes))
     if sweep:
         sentence = f"sweep has {len(sweep)} cases, numbered from 0; choose one of them with --case"
         raise JobError([str(Mistake(sweep.place, sentence))])
     return found.job
 
 
-def load_cases(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> tuple[Case, ...]:
+def load_cases(given: Given, overrides: Changes = ()) -> tuple[Case, ...]:
     """Reads all cases of a job, one if it has no sweep; else as `load`. A mistake names the first case that has it."""
-    first, mistakes, sweep = _read(Path(path), overrides, 0)
+    first, mistakes, sweep = _read(given, overrides, 0)
     if not sweep:
         if first is None:
-            raise JobError(_told(Path(path), mistakes))
+            raise JobError(_told(given, mistakes))
         return (first,)
-    read = [(first, mistakes), *(_read(Path(path), overrides, index)[:2] for index in range(1, len(sweep)))]
+    read = [(first, mistakes), *(_read(given, overrides, index)[:2] for index in range(1, len(sweep)))]
     common = set(mistakes).intersection(*(told for _, told in read))
     found = {mistake: index for index, (_, told) in reversed(list(enumerate(read))) for mistake in told}
     if found:
-        raise JobError(_told(Path(path), [_in_case(*one, sweep, one[0] in common) for one in found.items()]))
+        raise JobError(_told(given, [_in_case(*one, sweep, one[0] in common) for one in found.items()]))
     return tuple(case for case, _ in read if case)
 
 
@@ -88,19 +93,48 @@ def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistak
     return mistake._replace(sentence=f"{mistake.sentence} (in case {index}: {', '.join(map(str, settings))})")
 
 
-def _read(path: Path, overrides: Sequence[str], index: int) -> tuple[Case | None, list[Mistake], Sweep | None]:
+def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, list[Mistake], Sweep | None]:
     """A case, or its mistakes; and the sweep that it belongs to, if that is sound."""
-    source, included, sweep = read_job(path, tuple(overrides), index)
+    changes = tuple(overrides.items()) if isinstance(overrides, Mapping) else tuple(overrides)
+    source, included, sweep = read_job(_path(given), changes, index, _data(given))
     if () not in source.broken:
         try:
-            job = Job.model_validate(source.data, context=Context(path.absolute(), included))
+            job = _validated(source, Context(_path(given).absolute(), included))
             if job.numerics.strict:
-                source.mistakes += [Mistake(Place(str(path)), f"{text} ({STRICT})") for text in job.warnings]
+                source.mistakes += [Mistake(_place(given), f"{text} ({STRICT})") for text in job.warnings]
             if not source.mistakes:
-                return _case(job, index, sweep), [], sweep
+                origin = Origin(not isinstance(given, Mapping), _names_directory(source.data))
+                return _case(job.of(origin), index, sweep), [], sweep
         except ValidationError as error:
             source.mistakes += _mistakes(source, error)
     return None, source.mistakes, sweep
+
+
+def _path(given: Given) -> Path:
+    return Path("job.yaml") if isinstance(given, Mapping) else Path(given)
+
+
+def _place(given: Given) -> Place:
+    return NOWHERE if isinstance(given, Mapping) else Place(str(Path(given)))
+
+
+def _data(given: Given) -> Source | None:
+    return source_of(given) if isinstance(given, Mapping) else None
+
+
+def _validated(source: Source, context: Context) -> Job:
+    """The job of a source; texts of Python data at which it fails are tried as numbers."""
+    try:
+        return Job.model_validate(source.data, context=context)
+    except ValidationError as error:
+        if not numbers_for_texts(source, [source.written(fault.path) for fault in faults_of(error)]):
+            raise
+    return _validated(source, context)
+
+
+def _names_directory(data: Any) -> bool:
+    output = data.get("output")
+    return isinstance(output, dict) and output.get("directory") is not None
 
 
 def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
@@ -111,8 +145,8 @@ def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
     return Case(index, settings, job.model_copy(update={"output": output}))
 
 
-def _told(path: Path, mistakes: list[Mistake]) -> list[str]:
-    ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != str(path), mistake.place))
+def _told(given: Given, mistakes: list[Mistake]) -> list[str]:
+    ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != _place(given).origin, mistake.place))
     return _first(list(dict.fromkeys(map(str, ordered))))
 
 

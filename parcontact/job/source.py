@@ -30,7 +30,7 @@ class Mistake(NamedTuple):
     sentence: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.sentence}"
+        return f"{self.place}: {self.sentence}" if self.place.origin else self.sentence
 
 
 @dataclass

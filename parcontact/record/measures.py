@@ -5,7 +5,6 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from ..errors import InputError
 from . import files
@@ -18,6 +17,13 @@ COLUMNS = (
     *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds"),
 )
 LAST = ("friction_x", "contact_area_corrected")  # columns that came later stand at the end: nothing before them shifts
+UNITS = {
+    **dict.fromkeys(("time", "seconds"), "s"),
+    **dict.fromkeys(("distance", "approach", "mean_gap"), "m"),
+    **dict.fromkeys(("pressure", "max_pressure"), "Pa"),
+    **dict.fromkeys(("force_x", "force_y"), "N"),
+    **dict.fromkeys(("work", "stored", "dissipated"), "J"),
+}  # of those that have one
 MEND = "mend the line, or move the file away to go on without its rows"
 MAX_LINE = 1 << 20  # bytes: a longer one is none of ours
 
@@ -27,8 +33,8 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
     return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
 
 
-def values(row: Row, branches: int) -> list[Any]:
-    """One line of the file, in the order of `columns`."""
+def numbers(row: Row, branches: int) -> list[float]:
+    """The numbers of a row, in the order of `columns`; NaN for what was not asked for."""
     m, c = row.measures, row.certificate
     forces = (m.pressure, m.force_x, m.force_y, m.friction)
     lengths = (m.contact_area, m.approach, m.mean_gap, m.max_pressure)
@@ -36,7 +42,7 @@ def values(row: Row, branches: int) -> list[Any]:
     energies = (row.work, row.stored, row.dissipated)
     shown = [row.step, row.time, row.distance, *forces, *lengths, *solve, *energies, round(row.seconds, 6)]
     last = (m.friction_x, m.contact_area_corrected)
-    return [_text(value) for value in (*shown, *row.branch_dissipation[:branches], *last, *row.added)]
+    return [*shown, *row.branch_dissipation[:branches], *last, *row.added]
 
 
 def _text(value: float) -> str:
@@ -63,7 +69,7 @@ class MeasuresFile:
 
     def write(self, row: Row) -> None:
         """Append a row; on an error the file is as it was before."""
-        cells = values(row, self._branches)
+        cells = [_text(value) for value in numbers(row, self._branches)]
         line = ",".join(cells)
         self._append(line)
         self.table = Table(self.table.rows + 1, _checksum(self.table.checksum, self._names, cells), line)

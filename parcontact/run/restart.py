@@ -51,15 +51,12 @@ def choose(
     candidates = [given] if given else [path for _, path in slab.agree(directory.saved() if slab.root else [])]
     problems: list[str] = []
     for path in candidates:
-        found = slab.agree(_attempt(path, plain) if slab.root else None)
-        problem = found if isinstance(found, str) else checkpoint.verify(found, slab) if found else "?"
-        if isinstance(found, Contents) and not problem:
-            if difference := slab.agree(another_past(found, job) if slab.root else ""):
-                raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
+        found = sound(path, job, plain, slab)
+        if isinstance(found, Contents):
             own = slab.agree(_is_own(found, directory) if slab.root else False)
             _refuse(slab, _would_mix(directory, path) if slab.root and not own else "")
             return Origin(found, own), [f"passed over: {text}" for text in problems]
-        problems.append(problem)
+        problems.append(found)
     if problems:
         raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
     _refuse(slab, _would_lose(directory, plain) if slab.root else "")
@@ -81,6 +78,20 @@ def finished_before(
         return f"finished before, at t = {claim.finished[1]:g} s, without a checkpoint (--restart never runs it afresh)"
 
     return slab.agree(look() if slab.root else "")
+
+
+def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Contents | str:
+    """A checkpoint from which a job can go on, without its maps, or why it cannot; collective.
+
+    Raises InputError for a job whose history was another one up to there.
+    """
+    found = slab.agree(_attempt(path, plain) if slab.root else "")
+    problem = found if isinstance(found, str) else checkpoint.verify(found, slab)
+    if isinstance(found, str) or problem:
+        return problem
+    if difference := slab.agree(another_past(found, job) if slab.root else ""):
+        raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
+    return found
 
 
 def _refuse(slab: Slab, problem: str) -> None:

@@ -17,7 +17,7 @@ from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..physics.entries import Entry
 from ..record import checkpoint, header, marker, wisdom
-from ..record.checkpoint import Facts, Table
+from ..record.checkpoint import Contents, Facts, Table
 from ..record.directory import Directory
 from ..record.marker import Claim
 from ..record.provenance import Link, Provenance, extended
@@ -41,8 +41,22 @@ class Options:
     wall: float | None = None
 
 
+@dataclass(frozen=True)
+class Ended:
+    """How a run has ended: its exit code, and where it was left; or the checkpoint at which there was nothing to do."""
+
+    code: int
+    march: March | None
+    contents: Contents | None = None
+
+
 def run(job: Job, slab: Slab, options: Options) -> int:
     """Run a job; collective. Returns the exit code. Nothing is written before the whole job has proved sound."""
+    return run_to_end(job, slab, options).code
+
+
+def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
+    """As `run`; what can be gone on from in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
         plain = marker.plain_job(job) if slab.root else {}
@@ -55,19 +69,14 @@ def run(job: Job, slab: Slab, options: Options) -> int:
         if reason:
             if slab.root and not options.quiet:
                 print(f"{directory.path}: {reason}", flush=True)
-            return DONE
+            return Ended(DONE, None, origin.contents if origin else None)
         wisdom.recall(job, slab, origin.wisdom if origin else None)
-        built = scene.build(job, slab, options.until or 0.0)
-        doubts = (*job.warnings, *sanity.of_surface(built.frame))
-        marching = March(built)
-        if origin:
-            marching.restore(origin.contents)
-        elif decisions.steady_start(job).on:
-            steadystart.begin(marching)
+        marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
+        doubts = (*job.warnings, *sanity.of_surface(marching.scene.frame))
         wisdom.keep(job, slab)
-        provenance = _provenance(job, slab, origin, doubts)
+        provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = _claim(plain, directory, origin)
-        recorder = _begin(built, directory, claim, provenance, origin, len(timeline), options.quiet)
+        recorder = _begin(marching.scene, directory, claim, provenance, origin, len(timeline), options.quiet)
         try:
             for text in header.lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
@@ -77,7 +86,8 @@ def run(job: Job, slab: Slab, options: Options) -> int:
             facts = Facts(0, 0.0, plain, provenance, claim.id)
             with Signals().noted() as signals:
                 watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
-                return _Journey(marching, timeline, directory, recorder, watching, facts, options.until).go(origin)
+                journey = _Journey(marching, timeline, directory, recorder, watching, facts, options.until)
+                return Ended(journey.go(origin), marching)
         finally:
             recorder.close()
 
@@ -99,10 +109,11 @@ def _nothing_to_do(origin: Origin, timeline: Timeline, until: float | None) -> s
     return ""
 
 
-def _provenance(job: Job, slab: Slab, origin: Origin | None, doubts: tuple[str, ...]) -> Provenance:
-    link = Link(job.resolved(), slab.comm.size, origin.contents.step if origin else 0)
+def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:
+    """Where the files of a run come from that begins, or goes on from a checkpoint."""
+    link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough))
-    chain = extended(origin.contents.chain if origin else (), link)
+    chain = extended(saved.chain if saved else (), link)
     return Provenance(chain, seeds, str(job.included) if job.included else "", doubts)
 
 

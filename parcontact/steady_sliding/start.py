@@ -2,11 +2,29 @@
 
 from dataclasses import replace
 
+from ..effects import decisions
 from ..errors import InputError
+from ..job import Job
 from ..march.state import State
 from ..march.step import March
+from ..parallel.slab import Slab
 from ..physics.body import Zener
+from ..record.checkpoint import Contents
+from ..scene import build
 from .sliding import SteadySliding
+
+
+def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:
+    """A march before the first step of a job, or after that of a checkpoint; collective.
+
+    It can go on to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not fit.
+    """
+    march = March(build(job, slab, until))
+    if saved is not None:
+        march.restore(saved)
+    elif decisions.steady_start(job).on:
+        begin(march)
+    return march
 
 
 def begin(march: March) -> None:

@@ -1,0 +1,35 @@
+"""Maps of a file of fields that xarray reads piece by piece.
+
+The file is open only while a piece is read: an open one would keep a run that still goes on from writing it.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core.indexing import ExplicitIndexer, IndexingSupport, explicit_indexing_adapter
+
+
+class SavedMap(BackendArray):
+    """The instants `saved` of a map of shape (t, y, x)."""
+
+    def __init__(
+        self, path: Path, name: str, shape: tuple[int, int, int], dtype: np.dtype[Any], saved: NDArray[np.intp]
+    ) -> None:
+        self.path, self.name, self.saved = path, name, saved
+        self.shape, self.dtype = (saved.size, *shape[1:]), dtype
+
+    def __getitem__(self, key: ExplicitIndexer) -> Any:
+        return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self._read)
+
+    def _read(self, key: tuple[int | slice, int | slice, int | slice]) -> NDArray[Any]:
+        instants, *rest = key
+        with h5py.File(self.path, "r") as file:
+            dataset = file[self.name]
+            if isinstance(instants, slice):
+                pieces = [dataset[(number, *rest)] for number in self.saved[instants]]
+                return np.stack(pieces) if pieces else np.empty(self.shape, self.dtype)[(instants, *rest)]
+            return np.asarray(dataset[(self.saved[instants], *rest)])

@@ -1,0 +1,66 @@
+"""A surface and a material by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..effects.relaxation import relaxation_of
+from ..parallel.mpi import MPI
+from ..parallel.slab import Slab
+from ..physics import prony
+from ..scene import frame
+from .jobs import of_parts
+
+Array = NDArray[np.float64]
+
+
+def surface(surface: Mapping[str, Any] | Sequence[Mapping[str, Any]], grid: Mapping[str, Any]) -> Array:
+    """Heights [m] of the rigid surface that a job's `surface` means on its `grid`, shape (ny, nx), up into the body.
+
+    On this rank alone, whatever others do. Raises JobError for mistakes, InputError for files that do not fit.
+    """
+    job = of_parts(surface=surface, grid=grid)
+    base = frame(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    heights = base.surface.heights((0.0, 0.0), base.slab.empty())
+    return np.asarray(heights * base.units.height + base.surface.datum)
+
+
+def material(material: Mapping[str, Any]) -> Material:
+    """The material that a job's section means. Raises JobError for mistakes."""
+    job = of_parts(material=material)
+    spring, moduli, times = relaxation_of(job)
+    return Material(spring, tuple(moduli.tolist()), tuple(times.tolist()), job.material.poisson)
+
+
+@dataclass(frozen=True)
+class Material:
+    """A linear viscoelastic material: `G(t) = modulus_inf + sum moduli exp(-t/relaxation_times)`, in Pa and s.
+
+    All moduli are shear moduli; `poisson` is Poisson's ratio, the same at all times.
+    """
+
+    modulus_inf: float
+    moduli: tuple[float, ...]
+    relaxation_times: tuple[float, ...]
+    poisson: float
+
+    def complex_modulus(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """Storage and loss modulus [Pa], as real and imaginary part, at angular frequencies [rad/s] of any shape."""
+        return prony.complex_modulus(omega, *self._series)
+
+    def relaxation(self, t: ArrayLike) -> Array:
+        """The relaxation modulus G(t) [Pa] at times t >= 0 [s] of any shape."""
+        return prony.relaxation(t, *self._series)
+
+    def creep(self, t: ArrayLike) -> Array:
+        """The creep compliance J(t) [1/Pa] at times t >= 0 [s] of any shape."""
+        return prony.creep(t, *self._series)
+
+    @property
+    def _series(self) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+        return self.modulus_inf, self.moduli, self.relaxation_times

@@ -1,0 +1,65 @@
+"""Results of a run as an xarray.Dataset, read when they are used."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from ..errors import InputError
+from ..record import fields, hdf5, measures
+
+if TYPE_CHECKING:
+    import xarray
+
+NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install xarray"
+
+
+def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
+    """What a run has measured and saved, also of one that still goes on.
+
+    The columns of measures.csv by their names, along `step` and with the coordinate `time` [s]; each map of fields.h5
+    as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used. Variables have
+    their `units`; what was not asked for is NaN. Raises InputError for a directory without results, ImportError where
+    xarray is not installed.
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        raise ImportError(NO_XARRAY) from error
+    path = Path(directory)
+    if not (path / "measures.csv").is_file():
+        raise InputError(f"{path} holds no measures.csv: it is no output directory of a run")
+    columns = measures.read(path / "measures.csv")
+    steps = np.array(columns.pop("step"), dtype=int)
+    found: dict[str, Any] = {name: ("step", values, _units(name)) for name, values in columns.items()}
+    coordinates: dict[str, Any] = {"step": steps, "time": found.pop("time")}
+    if (path / "fields.h5").is_file():
+        _add_maps(path / "fields.h5", found, coordinates)
+    return xarray.Dataset(found, coordinates)
+
+
+def _units(name: str) -> dict[str, str]:
+    kind = measures.UNITS.get("dissipated" if name.startswith("dissipated_") else name)
+    return {"units": kind} if kind else {}
+
+
+def _add_maps(path: Path, found: dict[str, Any], coordinates: dict[str, Any]) -> None:
+    from xarray.core.indexing import LazilyIndexedArray
+
+    from .lazy import SavedMap
+
+    try:
+        with h5py.File(path, "r") as file:
+            layout = fields.Layout(file)
+            saved = np.flatnonzero(~np.isnan(layout.times))
+            coordinates["t"] = ("t", layout.times[saved], {"units": "s"})
+            coordinates |= {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
+            maps = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}
+    except hdf5.FAILURES as error:
+        raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from None
+    for name, rows in maps.items():
+        found[f"{name}_map"] = (("t", "y", "x"), LazilyIndexedArray(rows), {"units": fields.UNITS[name]})

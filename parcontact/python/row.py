@@ -1,0 +1,46 @@
+"""What a step has measured, by the names of measures.csv."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ..record import measures
+from ..record.row import Row as Recorded
+
+
+class Row(Mapping[str, float]):
+    """One instant of a run: `row.friction` and `row["friction"]` are a column of measures.csv, in the same units.
+
+    Energies [J] that the job does not ask for (`output.energy`) are NaN. `dict(row)` is a mapping of all.
+    """
+
+    def __init__(self, numbers: Mapping[str, float]) -> None:
+        self._numbers = dict(numbers)
+
+    @classmethod
+    def of(cls, row: Recorded, added: tuple[str, ...] = ()) -> Row:
+        """A recorded row; `added` names the columns of effects."""
+        branches = len(row.branch_dissipation)
+        return cls(dict(zip(measures.columns(branches, added), measures.numbers(row, branches), strict=True)))
+
+    def __getitem__(self, name: str) -> float:
+        return self._numbers[name]
+
+    def __getattr__(self, name: str) -> Any:
+        known: dict[str, float] = self.__dict__.get("_numbers", {})
+        if name not in known:
+            raise AttributeError(f"measures have no {name!r}; there are {', '.join(known)}")
+        return known[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._numbers]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __repr__(self) -> str:
+        return f"Row({', '.join(f'{name}={value:.6g}' for name, value in self._numbers.items())})"

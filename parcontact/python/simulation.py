@@ -1,0 +1,197 @@
+"""A job in this process: its steps one by one, its fields, its state."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..job import Job
+from ..job.yamltext import parse
+from ..march.rest import steps_to_make
+from ..march.step import March
+from ..parallel.mpi import MPI
+from ..parallel.root import on_root
+from ..parallel.slab import Array, Slab
+from ..physics.entries import Entry
+from ..record import checkpoint, marker, wisdom
+from ..record.checkpoint import Contents, Facts
+from ..record.fields import UNITS
+from ..run import restart, runner
+from ..steady_sliding import start
+from .jobs import Given, read
+from .row import Row
+
+
+class Simulation:
+    """A job, run from Python on the ranks of `comm`; every method is collective.
+
+    Parameters: `job`, the path of a job file or a mapping like one; `set`, values by keys like `grid.points` that
+    replace those of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
+    mistakes, InputError for files that do not fit it.
+
+    Nothing is written unless the job, or `set`, names `output.directory`, and then only by `run`. Files that a mapping
+    names are looked for from the working directory.
+    """
+
+    def __init__(self, job: Given, set: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> None:
+        self.comm = comm or MPI.COMM_WORLD
+        self.job = read(job, set, self.comm)
+        if not self.job.history:
+            raise InputError("the job has no history to run; parcontact.steady solves its steady states")
+        self._slab = Slab(self.comm, *self.job.grid.points)
+        self._saved: Contents | None = None
+        self._march_made: March | None = None
+        self._began = False  # whether the row of the initial state has been handed out
+
+    # -- running ------------------------------------------------------------------------------------------------------
+
+    def steps(self) -> Iterator[Row]:
+        """The row of the initial state, then one after each step, made when it is asked for; in memory.
+
+        Called again it goes on after the last step made. Raises RunError for a step that could not be made; the state
+        is then that before it.
+        """
+        march = self._march
+        if not self._began:
+            self._began = True
+            yield self.row
+        for step in steps_to_make(march, self.job.timeline()):
+            march.advance(step)
+            yield self.row
+
+    def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
+        """Go on to the end of the history; the last row.
+
+        A job that names an output directory runs as on the command line, with the files that it asks for: from the
+        newest checkpoint there, afresh (`restart="never"`), or from a checkpoint by its path; `quiet=False` prints a
+        line per step. It may stop early, when a signal or a stop file asks for it: see `finished`. Raises RunError for
+        a step that could not be made, InputError for a directory that is not its own.
+        """
+        if not self.job.origin.names_directory:
+            for _ in self.steps():
+                pass
+            return self.row
+        if self._march_made is not None and self._began:
+            raise InputError("run() writes the files of a whole run: it must come before the first of steps()")
+        at = str(self._saved.path if self._saved is not None else os.fspath(restart))
+        with _in_a_file(self.job, self._slab) as job:
+            ended = runner.run_to_end(job, self._slab, runner.Options(quiet, at))
+        if ended.march is None and ended.contents is None:
+            raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
+        self._march_made, self._saved, self._began = ended.march, ended.contents, True
+        return self.row
+
+    @property
+    def row(self) -> Row:
+        """What the last step has measured; of the initial state before the first."""
+        march = self._march
+        added = tuple(name for follower in march.scene.followers.values() for name in follower.columns)
+        return Row.of(march.row, added)
+
+    @property
+    def finished(self) -> bool:
+        """Whether all steps of the history are made."""
+        return self._march.row.step >= len(self.job.timeline())
+
+    # -- fields -------------------------------------------------------------------------------------------------------
+
+    @property
+    def rows(self) -> slice:
+        """Which rows of a map (along y) this rank has."""
+        return self._slab.rows
+
+    def field(self, name: str) -> Array:
+        """This rank's rows of a map, shape (ny_loc, nx), as a new array: `pressure` [Pa], `displacement` [m] of the
+        body, `height` [m] of the rigid surface where it is now, or `gap` [m] between both.
+
+        Raises InputError for another name.
+        """
+        if name not in UNITS:
+            raise InputError(f"there is no field {name!r}; there are {', '.join(UNITS)}")
+        return self._march.field(name)
+
+    def gather(self, name: str) -> Array | None:
+        """The whole map, shape (ny, nx), on root; None on the other ranks. Units and errors as for `field`."""
+        own, slab = np.ascontiguousarray(self.field(name)), self._slab
+        if not slab.root:
+            if own.size:
+                self.comm.Send(own, 0)
+            return None
+        whole = np.empty((slab.ny, slab.nx), own.dtype)
+        whole[slab.rows] = own
+        for rank, rows in enumerate(slab.dealt[1:], start=1):
+            if rows.stop > rows.start:
+                self.comm.Recv(whole[rows], rank)
+        return whole
+
+    # -- state --------------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a checkpoint, which `restore` and `parcontact --restart PATH` go on from, on any number of ranks.
+
+        Raises RunError where that cannot be.
+        """
+        march, slab = self._march, self._slab
+        plain = marker.plain_job(self.job) if slab.root else {}
+        facts = Facts(march.row.step, march.row.time, plain, runner.provenance_of(self.job, slab, self._saved))
+        entries = {**march.entries(), "plans/all": Entry(wisdom.gather(slab))}
+        checkpoint.write(Path(path), slab, facts, entries)
+
+    @classmethod
+    def restore(
+        cls,
+        path: str | os.PathLike[str],
+        set: Mapping[str, Any] | None = None,
+        comm: MPI.Intracomm | None = None,
+    ) -> Simulation:
+        """Go on from a checkpoint, in memory unless `set` names `output.directory`.
+
+        `set` may change what is to come (the stages ahead, tolerances), not what has been. Raises InputError for a
+        file that is no sound checkpoint, or not of such a job.
+        """
+        world, file = comm or MPI.COMM_WORLD, Path(path)
+        text = on_root(world, lambda: checkpoint.inspect(file).chain[-1].job)
+        job = read(parse(text, str(file)).data, set, world)
+        if not any(key.startswith("output") for key in set or {}):
+            job = job.of(job.origin._replace(names_directory=False))
+        simulation = cls(job, comm=world)
+        slab = simulation._slab
+        plain = marker.plain_job(job) if slab.root else {}
+        found = restart.sound(file, job, plain, slab)
+        if isinstance(found, str):
+            raise InputError(found)
+        simulation._saved, simulation._began = found, True
+        return simulation
+
+    @property
+    def _march(self) -> March:
+        """The march, made when it is first asked for."""
+        if self._march_made is None:
+            saved = self._saved
+            wisdom.recall(self.job, self._slab, saved.numbers.get("plans/all") if saved else None)
+            self._march_made = start.first(self.job, self._slab, saved=saved)
+        return self._march_made
+
+    def __repr__(self) -> str:
+        grid = self.job.grid
+        return f"<Simulation of {self.job.title or self.job.path.stem!r}: {grid.nx} x {grid.ny} points>"
+
+
+@contextmanager
+def _in_a_file(job: Job, slab: Slab) -> Iterator[Job]:
+    """A job that has a file, if only for a moment: a mapping is written to one; collective."""
+    if job.origin.from_file:
+        yield job
+        return
+    with TemporaryDirectory() as directory:
+        path = Path(directory, "job.yaml")
+        if slab.root:
+            path.write_text(job.resolved())
+        yield job.of(job.origin, path)

@@ -1,0 +1,297 @@
+"""The public Python interface: as good as the command line, on one rank and on several, and without files."""
+
+import csv
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from mpi4py import MPI
+
+import parcontact as pc
+from parcontact.__main__ import main
+
+ROOT = Path(__file__).parents[1]
+JOB: dict[str, Any] = {
+    "grid": {"points": [16, 12], "size": [1e-3, 7.5e-4]},
+    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
+    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [
+        {"name": "press", "pressure": 1e4, "duration": 1e-3, "time_step": 2.5e-4},
+        {"name": "slide", "pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4, "cells_per_step": 1},
+    ],
+    "numerics": {"tolerance": 1e-8},
+}
+STEPS = 9
+WORLD = MPI.COMM_WORLD
+
+
+@pytest.fixture(autouse=True)
+def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def table(directory: Path) -> list[dict[str, str]]:
+    with (directory / "measures.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def numbers(row: Any) -> dict[str, float]:
+    """But for the wall time."""
+    return {name: value for name, value in row.items() if name != "seconds" and value == value}
+
+
+def test_steps_are_rows_of_measures_csv(nowhere: Path) -> None:
+    """To the last digit those of the command line; nothing is written."""
+    rows = list(pc.Simulation(JOB, comm=MPI.COMM_SELF).steps())
+    assert list(nowhere.iterdir()) == []
+    (nowhere / "job.yaml").write_text(yaml.safe_dump(JOB))
+    assert main(["job.yaml", "--quiet"]) == 0
+    written = table(nowhere / "out" / "job")
+    assert [row.step for row in rows] == list(range(STEPS + 1))
+    for row, line in zip(rows, written, strict=True):
+        assert list(row) == list(line)
+        assert numbers(row) == {name: float(text) for name, text in line.items() if text and name != "seconds"}
+    assert rows[-1].friction == rows[-1]["friction"] == float(written[-1]["friction"]) > 0.0
+
+
+def test_a_file_is_as_good_as_a_mapping(nowhere: Path) -> None:
+    """Also one that PyYAML has read, to which 1e-3 is a text; keys may be replaced."""
+    text = yaml.safe_dump(JOB).replace("1.0e-06", "1e-6")
+    assert yaml.safe_load(text)["surface"]["amplitude"] == "1e-6"
+    (nowhere / "job.yaml").write_text(text)
+    changes = {"grid.points": "16", "history.1.velocity": np.float64(0.2)}
+    runs = [
+        pc.Simulation(job, changes, MPI.COMM_SELF) for job in ("job.yaml", yaml.safe_load(text), nowhere / "job.yaml")
+    ]
+    for run in runs:
+        assert run.job.grid.points == (16, 16)
+        assert run.job.history[1].velocity == (0.2, 0.0)
+        assert run.job == runs[0].job
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"grid": {"points": 0, "size": 1.0}}, "grid.points must be a positive whole number of points, got 0"),
+        ({"gird": 1}, "gird is not a known key; did you mean grid?"),
+        ({"title": "x", 5: 1}, "the job has a key that is no word, 5"),
+        ({"title": object()}, "title must be numbers, texts, lists or mappings, got <object object"),
+        ({"history": [{"pressure": "much"}]}, "history.0.pressure must be"),
+        ({"title": 3}, "title must be text"),
+    ],
+)
+def test_mistakes_name_the_key(change: dict[Any, Any], said: str) -> None:
+    with pytest.raises(pc.JobError) as caught:
+        pc.Simulation({**JOB, **change}, comm=MPI.COMM_SELF)
+    assert str(caught.value).startswith(said)
+    assert isinstance(caught.value, pc.InputError)
+    assert len(caught.value.mistakes) == 1
+
+
+def test_wrong_values_of_set() -> None:
+    with pytest.raises(pc.JobError, match=r"^set grid\.points: grid.points must be a positive whole number"):
+        pc.Simulation(JOB, {"grid.points": -1}, MPI.COMM_SELF)
+
+
+def test_a_mapping_that_holds_itself() -> None:
+    data: dict[str, Any] = dict(JOB)
+    data["grid"] = data
+    with pytest.raises(pc.JobError, match="is nested too deeply"):
+        pc.Simulation(data, comm=MPI.COMM_SELF)
+
+
+def test_the_job_is_not_changed() -> None:
+    before = repr(JOB)
+    pc.Simulation(JOB, {"grid.points": 8}, MPI.COMM_SELF)
+    assert repr(JOB) == before
+
+
+@pytest.mark.mpi
+def test_fields_on_any_ranks(comm: MPI.Intracomm) -> None:
+    """Rows of all ranks are the map; gap = displacement - height - approach; the mean pressure is the load."""
+    run = pc.Simulation(JOB, comm=comm)
+    for _ in run.steps():
+        pass
+    maps = {name: run.gather(name) for name in ("pressure", "displacement", "gap", "height")}
+    assert run.field("pressure").shape == (run.rows.stop - run.rows.start, 16)
+    assert run.finished
+    if comm.rank:
+        assert set(maps.values()) == {None}
+    else:
+        p, u, g, h = (np.asarray(values) for values in maps.values())
+        assert p.shape == (12, 16)
+        assert p.mean() == pytest.approx(1e4, rel=1e-12)
+        assert np.allclose(g, u - h - run.row.approach, rtol=0.0, atol=1e-12 * 1e-6 * 10)
+    own = maps["pressure"] if comm.rank == 0 else None
+    assert np.array_equal(comm.bcast(own)[run.rows], run.field("pressure"))
+    with pytest.raises(pc.InputError, match="there is no field 'presure'"):
+        run.field("presure")
+
+
+@pytest.mark.mpi
+def test_save_and_restore(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """At once the same state, and then the same digits as without a stop."""
+    whole = [numbers(row) for row in pc.Simulation(JOB, comm=comm).steps()]
+    run = pc.Simulation(JOB, comm=comm)
+    for row in run.steps():
+        if row.step == 5:
+            break
+    run.save(shared_path / "state.h5")
+    again = pc.Simulation.restore(shared_path / "state.h5", comm=comm)
+    for name in ("pressure", "displacement", "gap", "height"):
+        assert np.array_equal(again.field(name), run.field(name))
+    rest = [numbers(row) for row in again.steps()]
+    assert rest == whole[6:]
+    assert not again.job.origin.names_directory
+    assert [numbers(row) for row in run.steps()] == whole[6:]
+
+
+def test_a_saved_state_is_a_checkpoint(nowhere: Path) -> None:
+    """The command line goes on from it; a state of another job, or none, is refused."""
+    (nowhere / "job.yaml").write_text(yaml.safe_dump(JOB))
+    run = pc.Simulation("job.yaml", comm=MPI.COMM_SELF)
+    steps = run.steps()
+    for _ in range(4):
+        next(steps)
+    run.save("state.h5")
+    assert main(["job.yaml", "--quiet", "--restart", "state.h5"]) == 0
+    assert [int(row["step"]) for row in table(nowhere / "out" / "job")][-1] == STEPS
+    with pytest.raises(pc.InputError, match=r"grid.points was \[16, 12\], is \[8, 8\]"):
+        pc.Simulation.restore("state.h5", {"grid.points": 8}, MPI.COMM_SELF)
+    with pytest.raises(pc.InputError, match="incomplete or damaged"):
+        pc.Simulation.restore("job.yaml", comm=MPI.COMM_SELF)
+
+
+def test_run_in_memory(nowhere: Path) -> None:
+    run = pc.Simulation(JOB, comm=MPI.COMM_SELF)
+    assert run.run().step == STEPS
+    assert run.finished
+    assert list(nowhere.iterdir()) == []
+    assert list(run.steps()) == []
+
+
+def test_run_with_files(nowhere: Path) -> None:
+    """A job that names a directory runs as on the command line; run again it has nothing to do, and knows the end."""
+    job = JOB | {"output": {"directory": "here", "fields": ["pressure"]}}
+    first = pc.Simulation(job, comm=MPI.COMM_SELF)
+    assert first.run().step == STEPS
+    assert len(table(nowhere / "here")) == STEPS + 1
+    assert {"fields.h5", "job.yaml", "job.resolved.yaml", "checkpoint"} <= {
+        path.name for path in (nowhere / "here").iterdir()
+    }
+    assert [path.name for path in nowhere.iterdir()] == ["here"]
+    again = pc.Simulation(job, comm=MPI.COMM_SELF)
+    assert again.run().step == STEPS
+    assert np.array_equal(again.field("pressure"), first.field("pressure"))
+    assert main([str(nowhere / "here" / "job.yaml"), "--quiet", "--out", "again"]) == 0
+    assert len(table(nowhere / "again")) == STEPS + 1
+    begun = pc.Simulation(job, comm=MPI.COMM_SELF)
+    next(begun.steps())
+    with pytest.raises(pc.InputError, match="must come before the first of steps"):
+        begun.run()
+
+
+def test_a_failed_step_is_a_run_error() -> None:
+    run = pc.Simulation(JOB, {"numerics": {"max_iterations": 1, "tolerance": 1e-12}}, MPI.COMM_SELF)
+    steps = run.steps()
+    next(steps)
+    with pytest.raises(pc.RunError, match="max_iterations = 1"):
+        list(steps)
+    assert run.row.step == 0
+
+
+def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measures and maps with units; no map is read before it is used, and the file is not kept open."""
+    xarray = pytest.importorskip("xarray")
+    run = pc.Simulation(
+        JOB, {"output": {"directory": "here", "fields": ["pressure", "gap"], "every": 4}}, MPI.COMM_SELF
+    )
+    run.run()
+    data = pc.open("here")
+    assert isinstance(data, xarray.Dataset)
+    assert data.friction.sel(step=STEPS) == run.row.friction
+    assert data.pressure.attrs["units"] == "Pa"
+    assert data.pressure_map.attrs["units"] == "Pa"
+    assert data.pressure_map.dims == ("t", "y", "x")
+    assert data.t.values[-1] == data.time.values[-1] == run.row.time
+    assert np.array_equal(data.gap_map[-1], run.field("gap"))
+    assert np.array_equal(data.pressure_map[:, 3:5, 7][-1], run.field("pressure")[3:5, 7])
+    assert float(data.pressure_map.isel(t=-1).mean()) == pytest.approx(1e4)
+    (nowhere / "here" / "fields.h5").rename("elsewhere.h5")
+    with pytest.raises(FileNotFoundError):
+        pc.open("here") and data.pressure_map.isel(t=0).load()
+    with pytest.raises(pc.InputError, match="no output directory of a run"):
+        pc.open(nowhere)
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ImportError, match="needs xarray, which is not installed: pip install xarray"):
+        pc.open("here")
+
+
+def test_steady() -> None:
+    """One wave in full contact: friction `Im G (q A)^2/(2 (1 - nu) p)`; the power lost is force times speed."""
+    wave, load = 2 * np.pi / 1e-3, 1e5
+    job = {
+        "grid": {"points": [32, 4], "size": [1e-3, 1.25e-4]},
+        "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [1, 0]},
+        "material": JOB["material"],
+        "history": [{"pressure": load}],
+        "numerics": {"tolerance": 1e-10},
+    }
+    speeds = np.array([0.05, 0.2])
+    curve = pc.steady(job, velocities=speeds, pressures=[load], comm=MPI.COMM_SELF)
+    loss = pc.material(JOB["material"]).complex_modulus(wave * speeds).imag
+    # pressure has the amplitude |G| q A/(1 - nu); its part out of phase pushes, by the mean of p dh/dx
+    expected = loss / (1 - 0.5) * (wave * 1e-6) ** 2 / 2 / load
+    assert np.allclose(curve.friction, expected, rtol=1e-9)
+    assert np.allclose(curve.contact_area, 1.0)
+    assert curve.power.shape == (2, 1)
+    assert np.allclose(curve.power.sum(axis=1), -curve.force_x * speeds, rtol=1e-9)
+    assert curve.failures == ()
+    assert np.array_equal(pc.steady(job, "0.05:0.2:2", load, comm=MPI.COMM_SELF).velocity, speeds)
+    with pytest.raises(pc.InputError, match="no velocities"):
+        pc.steady(job, comm=MPI.COMM_SELF)
+
+
+def test_surface() -> None:
+    """Heights as given, to round-off, with their mean; a mistake names the key."""
+    heights = pc.surface({"shape": "wave", "amplitude": 2e-6, "waves": [1, 2]}, {"points": [8, 6], "size": [8.0, 6.0]})
+    x, y = np.meshgrid(np.arange(8), np.arange(6))
+    assert heights.shape == (6, 8)
+    assert np.allclose(heights, 2e-6 * np.cos(2 * np.pi * (x / 8 + 2 * y / 6)), rtol=0.0, atol=1e-20)
+    with pytest.raises(pc.JobError, match=r"^surface.0?.*waves"):
+        pc.surface({"shape": "wave", "amplitude": 2e-6, "waves": [5, 2]}, {"points": [8, 6], "size": 1.0})
+
+
+def test_material() -> None:
+    """One branch: `G = G_inf + G_1 i w tau/(1 + i w tau)`, and its relaxation and creep at the ends."""
+    material = pc.material(
+        {"model": "zener", "modulus_inf": "1e6", "branches": [{"modulus": 3e6, "relaxation_time": 0.5}]}
+    )
+    omega = np.array([[0.1, 2.0], [10.0, 1e3]])
+    turn = 1j * omega * 0.5
+    assert np.allclose(material.complex_modulus(omega), 1e6 + 3e6 * turn / (1 + turn), rtol=1e-14)
+    assert material.relaxation(0.0) == pytest.approx(4e6)
+    assert material.relaxation(0.5) == pytest.approx(1e6 + 3e6 / np.e)
+    assert material.creep([0.0, 1e6]) == pytest.approx([1 / 4e6, 1 / 1e6])
+    assert material.poisson == 0.5
+    assert pc.material({"model": "elastic", "shear_modulus": 2e6}).complex_modulus(1.0) == 2e6
+    with pytest.raises(pc.JobError, match=r"material\.model must be"):
+        pc.material({"model": "rubber"})
+
+
+def test_the_example_of_the_readme(nowhere: Path, outside_mpi: dict[str, str]) -> None:
+    """As it stands, in the project's directory but for its output."""
+    (section,) = re.findall(r"^## From Python\n(.*?)^## ", (ROOT / "README.md").read_text(), re.M | re.S)
+    (program,) = re.findall(r"```python\n(.*?)```", section, re.S)
+    (nowhere / "jobs").symlink_to(ROOT / "jobs")
+    words = [sys.executable, "-W", "error", "-c", program]
+    done = subprocess.run(words, env=outside_mpi, capture_output=True, text=True, cwd=nowhere)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("friction") == 9
+    assert done.stderr == ""
