@@ -133,18 +133,9 @@ def advance(p_old, t, step, p):
     return load, cut
 
 
-@loop
 def clip(p):
-    """`p <- max(p, 0)`; returns its sum."""
-    load = 0.0
-    for j in range(p.shape[0]):
-        row = 0.0
-        for i in range(p.shape[1]):
-            kept = 0.0 if p[j, i] < 0.0 else p[j, i]
-            p[j, i] = kept
-            row += kept
-        load += row
-    return load
+    """`p <- max(p, 0)`; returns the sum of p and how much of it was added by cutting off at 0."""
+    return advance(p, p, 0.0, p)
 
 
 @loop

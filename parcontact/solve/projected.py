@@ -54,7 +54,7 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
-        kernels.scale(x, load / self.slab.sum(kernels.total(x))[0])
+        kernels.scale(x, load / self.slab.sum(*kernels.clip(x))[0])
         self.operator.apply(x, u)
         self._keep_change(x, u)
 

@@ -111,9 +111,11 @@ def test_advance(shape: tuple[int, int], dtype: type[np.floating]) -> None:
 @SHAPES
 def test_clip(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
-    expected = np.maximum(maps.z, 0.0)
-    assert maps.close(kernels.clip(maps.z), expected.astype(np.float64))
+    before, expected = maps.wide("z").copy(), np.maximum(maps.z, 0.0)
+    load, cut = kernels.clip(maps.z)
     assert np.array_equal(maps.z, expected)
+    assert maps.close(load, np.maximum(before, 0.0))
+    assert maps.close(cut, np.maximum(-before, 0.0))
 
 
 @SHAPES
