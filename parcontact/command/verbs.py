@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from ..parallel.root import on_root
 from . import ranks
 
@@ -59,7 +60,9 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab) -> int:
     from ..steady_sliding import curve
 
     wanted = curve.request(job, getattr(options, "velocities", ()), getattr(options, "pressures", ()))
-    return curve.run(job, slab, wanted, options.quiet)
+    if options.restart not in ("auto", "never"):
+        raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
+    return curve.run(job, slab, wanted, options.quiet, options.restart)
 
 
 def check(options: argparse.Namespace) -> int:
@@ -219,6 +222,11 @@ def _load(options: argparse.Namespace, world: MPI.Intracomm) -> Job:
 
 
 def _overrides(options: argparse.Namespace) -> list[str]:
-    """What the command line changes in a job; the name of a directory is taken as it is, whatever YAML would read."""
+    """What the command line changes in a job; the name of a directory is taken as it is, whatever YAML would read.
+
+    Velocities and pressures of a friction curve are keys of the job, which then needs no history.
+    """
     name = "".join(f"\\U{ord(letter):08x}" for letter in options.out or "")
-    return [*options.set, *([f'output.directory="{name}"'] if options.out is not None else [])]
+    asked = {key: getattr(options, key, ()) for key in ("velocities", "pressures")}
+    curve = [f"steady.{key}={list(values)!r}" for key, values in asked.items() if values]
+    return [*options.set, *curve, *([f'output.directory="{name}"'] if options.out is not None else [])]

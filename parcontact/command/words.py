@@ -92,6 +92,8 @@ def _parser() -> argparse.ArgumentParser:
     for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
         text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
         steady.add_argument(f"--{name}", metavar="A:B:N", type=_values, default=(), help=text)
+    text = "go on with the points that lack (auto, the default), or start afresh and replace what is there (never)"
+    steady.add_argument("--restart", metavar="auto|never", choices=("auto", "never"), default="auto", help=text)
     steady.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     steady.set_defaults(act=verbs.steady)
 

@@ -3,12 +3,12 @@
 import os
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
 from . import files
 from .checkpoint import Table
+from .growing import GrowingTable
 from .row import Row
 
 SOLVED = ("iterations", "residual", "penetration", "operator_calls")
@@ -62,53 +62,14 @@ class MeasuresFile:
     ) -> None:
         """Continue the file, which holds this `table`, or begin it."""
         self.path, self.table, self._branches, self._names = path, table, branches, columns(branches, added)
-        self._handle = files.opened(path, os.O_RDWR | os.O_APPEND)
-        self._size = os.fstat(self._handle).st_size
-        if self._size == 0:
-            self._append(",".join(self._names))
+        self._file = GrowingTable(path, self._names)
+        self.sync, self.close = self._file.sync, self._file.close
 
     def write(self, row: Row) -> None:
         """Append a row; on an error the file is as it was before."""
         cells = [_text(value) for value in numbers(row, self._branches)]
-        line = ",".join(cells)
-        self._append(line)
+        line = self._file.append(cells)
         self.table = Table(self.table.rows + 1, _checksum(self.table.checksum, self._names, cells), line)
-
-    def sync(self) -> tuple[str, list[str]]:
-        """Wait until all rows are on the disk. What others did to the file: rows that are lost, and what was mended."""
-        os.fsync(self._handle)
-        if os.fstat(self._handle).st_size < self._size:
-            return f"{self.path} was cut short by another program during the run: rows are lost", []
-        if files.is_the_file(self.path, self._handle):
-            return "", []
-        aside = files.put_aside(self.path)
-        self._put_back()
-        what = f"replaced by another file, which is now {aside.name}," if aside else "removed"
-        return "", [f"{self.path} was {what} during the run: its rows were written again"]
-
-    def close(self) -> None:
-        with suppress(OSError):  # every row was written at once
-            os.close(self._handle)
-
-    def _append(self, line: str) -> None:
-        rest = memoryview(f"{line}\n".encode())
-        try:
-            while rest:
-                rest = rest[os.write(self._handle, rest) :]
-        except OSError:
-            with suppress(OSError):
-                os.ftruncate(self._handle, self._size)
-            raise
-        self._size += len(line) + 1
-
-    def _put_back(self) -> None:
-        """Write what the file held, which the system keeps as long as it is open, under its name again."""
-        with files.replaced(self.path) as new:
-            for start in range(0, self._size, MAX_LINE):
-                new.write(os.pread(self._handle, min(MAX_LINE, self._size - start), start))
-        handle = files.opened(self.path, os.O_RDWR | os.O_APPEND)
-        os.close(self._handle)
-        self._handle = handle
 
 
 def cut_back(path: Path, step: int, branches: int, then: Table, added: Sequence[str] = ()) -> tuple[Table, list[str]]:

@@ -14,6 +14,7 @@ In both only the certificate of an admissible pressure counts: an iteration that
 coarser grids makes it cheap; from far away it may cycle, and then it says so.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,14 @@ class SteadySolver:
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution
         will be; from a uniform one where it is zero everywhere. Collective."""
+        try:
+            return self._solve(h, mean, start)
+        except ZeroDivisionError:  # by the load or the points of a set, sums which all ranks have
+            nothing = Certificate(math.nan, math.nan, math.nan)
+            start.fill(0.0)
+            return SteadyContact(start, self._u, math.nan, nothing, 0, 0, 0, "no point is left that carries load")
+
+    def _solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         if not self.slab.sum(kernels.total(start))[0] > 0.0:
             start.fill(mean)
         d, certificate, projections = self._project(start, h, mean)

@@ -1,27 +1,24 @@
 """Friction curves: steady sliding solved directly at many velocities and pressures, into steady.csv and a picture."""
 
-import csv
 import math
-import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from .. import sanity, scene
 from ..errors import InputError, RunError
 from ..job import Job
-from ..parallel.slab import Slab
-from ..record import marker
-from ..record.directory import Directory
-from .sliding import Point, SteadySliding
+from ..parallel.signals import Signals
+from ..parallel.slab import Array, Slab
+from ..record import hdf5, marker
+from ..record.directory import ADVICE, Directory
+from ..record.provenance import Link, Provenance
+from ..record.steady_maps import SteadyMaps
+from .sliding import SteadySliding
+from .table import CurveTable
 
-COLUMNS = (
-    "velocity,pressure,force_x,force_y,friction,contact_area,approach,mean_gap,max_pressure,"
-    "residual,penetration,operator_calls,seconds"
-)
-LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
-HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
+DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
+SAME = (*marker.SCENE, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
 
 
 @dataclass(frozen=True)
@@ -32,6 +29,14 @@ class Request:
     pressures: tuple[float, ...]
     direction: tuple[float, float] = (1.0, 0.0)
     waves: bool = False
+
+    @property
+    def points(self) -> list[tuple[float, float]]:
+        """Speed and pressure of each point, in the order in which they are solved."""
+        return [(speed, pressure) for pressure in self.pressures for speed in self.velocities]
+
+    def velocity(self, speed: float) -> tuple[float, float]:
+        return speed * self.direction[0], speed * self.direction[1]
 
 
 def request(job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = ()) -> Request:
@@ -59,85 +64,144 @@ def _pressures(job: Job) -> tuple[float, ...]:
     return ()
 
 
-def run(job: Job, slab: Slab, wanted: Request, quiet: bool) -> int:
-    """Solve all points, writing each at once; collective. Returns the exit code: 1 if any of them has failed."""
+def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto") -> int:
+    """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
+
+    A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`.
+    """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
         sanity.refuse_impossible(job, job.timeline())
-        plain = marker.plain_job(job) if slab.root else {}
-        directory.refuse_foreign(job.path, plain, False)
+        plain = _identity(job, wanted) if slab.root else {}
+        directory.refuse_foreign(job.path, plain, restart == "never")
+        goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
         base = scene.frame(job, slab)
         doubts = [*job.warnings, *sanity.of_surface(base)]
         sliding = SteadySliding(base)
-        directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
-        table = _Table(directory.path, sliding, wanted, quiet) if slab.root else None
-        watch = sanity.ContactWatch(job, job.timeline())
+        directory.make(job.path, job.resolved(), marker.Claim(plain))
+        if not goes_on:
+            directory.clear()
+        table = _on_root(slab, lambda: CurveTable(directory.path, sliding, wanted.waves, quiet))
         if table:
             table.warn(doubts)
-        failures = 0
-        for pressure in wanted.pressures:
-            for speed in wanted.velocities:
-                velocity = (speed * wanted.direction[0], speed * wanted.direction[1])
-                try:
-                    point = sliding.solve(velocity, pressure)
-                except RunError as error:
-                    failures += 1
-                    if table:
-                        table.say(f"parcontact: {error}")
-                    continue
-                shares = sliding.shares(velocity) if wanted.waves else None
-                if table:
-                    table.write(point, shares)
-                    table.warn(watch.judge_point(point.measures, f"{speed:g} m/s under {pressure:g} Pa"))
-        if table:
-            table.close(failures)
-    return 1 if failures else 0
+        maps = _maps(job, slab, wanted, directory)
+        try:
+            with Signals().noted() as signals:
+                return _Curve(sliding, wanted, table, maps, directory, signals).go()
+        finally:
+            if table:
+                table.close()
 
 
-class _Table:
-    """Root's files and lines."""
+def _identity(job: Job, wanted: Request) -> dict[str, Any]:
+    """What a curve is of, as plain data: of the `steady` section only what no point may differ in."""
+    return {
+        **marker.kept(marker.plain_job(job)),
+        "steady": {"direction": list(wanted.direction), "waves": wanted.waves},
+    }
 
-    def __init__(self, directory: Path, sliding: SteadySliding, wanted: Request, quiet: bool) -> None:
-        self.path, self.quiet = directory / "steady.csv", quiet
-        branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
-        self._file = self.path.open("w", newline="")
-        self._csv = csv.writer(self._file, lineterminator="\n")
-        self._csv.writerow([*COLUMNS.split(","), *(f"dissipated_{k}" for k in range(branches)), *LAST])
-        self._waves = (directory / "steady_waves.csv").open("w", newline="") if wanted.waves else None
-        if self._waves:
-            self._waves.write("velocity,pressure,wavelength,share\n")
-        self.say(HEAD)
 
-    def say(self, text: str) -> None:
-        if not self.quiet or text.startswith("parcontact"):
-            print(text, flush=True)
+def _goes_on(directory: Directory, plain: Mapping[str, Any], slab: Slab) -> bool:
+    """Whether points of the same curve are there; collective. Raises InputError if they are of another."""
+    problem, there = "", False
+    if slab.root and (claim := directory.claim) is not None and directory.results():
+        there = True
+        if different := "; ".join(marker.differences(claim.job, plain, (*SAME, "steady"))):
+            problem = f"{directory.path} holds the friction curve of another job: {different}; {ADVICE}"
+    if problem := slab.agree(problem):
+        raise InputError(problem)
+    return slab.agree(there)
 
-    def warn(self, texts: list[str]) -> None:
-        """What is shown even to those who asked for quiet."""
-        for text in texts:
-            print(f"warning: {text}", file=sys.stderr, flush=True)
 
-    def write(self, point: Point, shares: Any) -> None:
-        m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
-        forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
-        solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        last = (m.friction_x, m.contact_area_corrected)
-        self._csv.writerow([speed, m.pressure, *forces, *solve, *point.dissipated, *last])
-        self._file.flush()
-        if self._waves:
-            for wavelength, share in zip(*shares, strict=True):
-                self._waves.write(f"{speed!r},{m.pressure!r},{float(wavelength)!r},{float(share)!r}\n")
-            self._waves.flush()
-        self.say(
-            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} {point.operator_calls:6.0f} "
-            f"{c.worst:9.2e}"
-        )
+def _on_root(slab: Slab, make: Any) -> CurveTable | None:
+    found: list[CurveTable] = []
+    hdf5.on_root(slab, lambda: found.append(make()), "cannot write the table of the curve", InputError)
+    return found[0] if found else None
 
-    def close(self, failures: int) -> None:
-        self._file.close()
-        if self._waves:
-            self._waves.close()
-        from ..record import plots  # matplotlib is slow to import, and for pictures only
 
-        picture = plots.draw_steady(self.path)
-        self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")
+def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> SteadyMaps | None:
+    """The file for the maps that the job asks for, if it does."""
+    if not job.output.fields:
+        return None
+    provenance = Provenance((Link(job.resolved(), slab.comm.size),))
+    path = directory.path / "steady.h5"
+    return SteadyMaps(path, slab, job.grid.size, job.output.fields, wanted.points, provenance)
+
+
+class _Curve:
+    """The points of a curve, one after the other."""
+
+    def __init__(
+        self,
+        sliding: SteadySliding,
+        wanted: Request,
+        table: CurveTable | None,
+        maps: SteadyMaps | None,
+        directory: Directory,
+        signals: Signals,
+    ) -> None:
+        self.sliding, self.wanted, self.table, self.maps = sliding, wanted, table, maps
+        self.directory, self.signals, self.slab = directory, signals, sliding.base.slab
+        job = sliding.base.job
+        self.watch, self.failures = sanity.ContactWatch(job, job.timeline()), 0
+
+    def go(self) -> int:
+        """Solve what lacks; collective. Returns the exit code."""
+        lacking = self.slab.agree(self.table.lacking(self.wanted.points) if self.table else [])
+        for count, index in enumerate(lacking):
+            if self._stopped():
+                self._say(f"stopped with {len(lacking) - count} points to go; run again to go on")
+                return AGAIN
+            self._solve(index)
+        if self.table:
+            self.table.conclude(self.failures)
+        return FAILED if self.failures else DONE
+
+    def _stopped(self) -> bool:
+        stop = self.directory.stop_file
+        asked = self.signals.stop or (self.slab.root and stop.exists())
+        if not self.slab.reduce((), [float(asked)])[0]:
+            return False
+        if self.slab.root and stop.is_file():
+            stop.unlink()
+        return True
+
+    def _say(self, text: str) -> None:
+        if self.table:
+            self.table.say(text)
+
+    def _solve(self, index: int) -> None:
+        speed, pressure = self.wanted.points[index]
+        velocity = self.wanted.velocity(speed)
+        try:
+            point = self.sliding.solve(velocity, pressure)
+        except RunError as error:
+            self.failures += 1
+            self._say(f"parcontact: {error}")
+            return
+        shares = self.sliding.shares(velocity) if self.wanted.waves else None
+        if self.maps:
+            self.maps.save(index, dict(self._fields()))
+        table = self.table
+
+        def write() -> None:
+            if table:
+                table.write(point, shares)
+                table.warn(self.watch.judge_point(point.measures, f"{speed:g} m/s under {pressure:g} Pa"))
+
+        hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
+
+    def _fields(self) -> Iterator[tuple[str, Array]]:
+        """The maps of the last point that the job asks for, in SI units."""
+        contact, base = self.sliding.contact, self.sliding.base
+        assert contact is not None
+        heights, unit = self.sliding.levels[0].heights, base.units.height
+        for name in base.job.output.fields:
+            if name == "pressure":
+                yield name, contact.p * base.units.pressure
+            elif name == "displacement":
+                yield name, contact.u * unit
+            elif name == "height":
+                yield name, heights * unit + base.surface.datum
+            else:
+                yield name, (contact.u - heights - contact.d) * unit

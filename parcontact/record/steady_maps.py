@@ -1,0 +1,91 @@
+"""steady.h5: maps of steady states, one for each speed and pressure whose point was solved."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..parallel.slab import Array, Slab
+from . import files, hdf5, layout
+from .fields import UNITS
+from .provenance import Provenance
+
+KIND = "parcontact steady maps"
+AXES = {"velocity": "m/s", "load": "Pa"}  # of the points; the load is their mean pressure
+
+
+class SteadyMaps:
+    """Maps of shape (point, y, x), with the velocity and the load of each point, NaN until it is saved; collective.
+
+    Parameters: where; this rank's rows; the box `size` (lx, ly) [m]; which maps; (velocity [m/s], mean pressure [Pa])
+    of all points. What an earlier part of the same curve has saved stays.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        slab: Slab,
+        size: tuple[float, float],
+        names: Sequence[str],
+        points: Sequence[tuple[float, float]],
+        provenance: Provenance,
+    ) -> None:
+        self.path, self.slab, self.size, self.names, self.points = path, slab, size, tuple(names), list(points)
+        if not slab.agree(slab.root and self._fits()):
+            self._make(provenance)
+
+    def save(self, index: int, maps: Mapping[str, Array]) -> None:
+        """Put the maps of a point into their place; raises RunError."""
+        rows = [hdf5.Part(name, (index,), np.ascontiguousarray(maps[name], dtype=np.float64)) for name in self.names]
+        hdf5.write(self.path, self.slab, rows)
+
+        def stamp() -> None:
+            with h5py.File(self.path, "r", locking=False) as file:
+                axes = {name: file[name][...] for name in AXES}
+            for name, value in zip(AXES, self.points[index], strict=True):
+                axes[name][index] = value
+            layout.put(self.path, axes)
+
+        hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
+
+    def _fits(self) -> bool:
+        """Whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""
+        shape = (len(self.points), self.slab.ny, self.slab.nx)
+        try:
+            with h5py.File(self.path, "r") as file:
+                wanted = {name for name in UNITS if name in file} == set(self.names)
+                if wanted and all(file[name].shape == shape for name in self.names):
+                    saved = np.array([file[name][...] for name in AXES]).T
+                    return bool(np.all(np.isnan(saved) | np.isclose(saved, self.points, rtol=1e-6)))
+        except hdf5.FAILURES:
+            pass
+        files.put_aside(self.path)
+        return False
+
+    def _make(self, provenance: Provenance) -> None:
+        new = self.slab.agree(files.unused(self.path))
+        layout.lay_out(new, self.slab, lambda file: self._build(file, provenance))
+        hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
+
+    def _build(self, file: h5py.File, provenance: Provenance) -> None:
+        file.attrs["kind"] = KIND
+        provenance.write(file)
+        count = len(self.points)
+        for name, unit in AXES.items():
+            dataset = layout.fixed(file, name, (count,), np.float64)
+            dataset[...] = np.nan
+            dataset.make_scale(name)
+            dataset.attrs["units"] = unit
+        for axis, length, points in zip("xy", self.size, (self.slab.nx, self.slab.ny), strict=True):
+            dataset = layout.fixed(file, axis, (points,), np.float64)
+            dataset[...] = np.arange(points) * (length / points)
+            dataset.make_scale(axis)
+            dataset.attrs["units"] = "m"
+        for name in self.names:
+            dataset = layout.fixed(file, name, (count, self.slab.ny, self.slab.nx), np.float64)
+            dataset.attrs["units"] = UNITS[name]
+            for axis in AXES:
+                dataset.dims[0].attach_scale(file[axis])
+            for dimension, axis in ((1, "y"), (2, "x")):
+                dataset.dims[dimension].attach_scale(file[axis])

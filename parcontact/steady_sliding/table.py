@@ -1,0 +1,106 @@
+"""steady.csv and steady_waves.csv: a line for each point of a friction curve, on root, and what is said of it."""
+
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..record import files, measures
+from ..record.growing import GrowingTable
+from .sliding import Point, SteadySliding
+
+COLUMNS = (
+    *("velocity", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure"),
+    *("residual", "penetration", "operator_calls", "seconds"),
+)
+LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
+WAVES = ("velocity", "pressure", "wavelength", "share")
+HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
+CLOSE = 1e-6  # relative: speeds and pressures that are the same but for rounding
+
+
+class CurveTable:
+    """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
+
+    def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, quiet: bool) -> None:
+        self.path, self.quiet, self.failed = directory / "steady.csv", quiet, 0
+        branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
+        self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST]
+        self.known = self._read()
+        self._file = GrowingTable(self.path, self._names)
+        self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
+        self.say(HEAD)
+
+    def _read(self) -> list[tuple[float, float]]:
+        """Speed and pressure of the points that are there; a line that was not finished is removed."""
+        if not self.path.exists():
+            return []
+        columns = measures.read(self.path)
+        if list(columns) != self._names:
+            files.put_aside(self.path)
+            return []
+        whole = self.path.read_bytes()
+        if not whole.endswith(b"\n"):
+            with files.replaced(self.path) as new:
+                new.write(whole[: whole.rfind(b"\n") + 1])
+        return list(zip(columns["velocity"], columns["pressure"], strict=True))
+
+    def lacking(self, points: Sequence[tuple[float, float]]) -> list[int]:
+        """The numbers of the points that are not there."""
+        found = [k for k, point in enumerate(points) if not any(_same(point, other) for other in self.known)]
+        if len(found) < len(points):
+            self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
+        return found
+
+    def say(self, text: str) -> None:
+        if not self.quiet or text.startswith("parcontact"):
+            print(text, flush=True)
+
+    def warn(self, texts: list[str]) -> None:
+        """What is shown even to those who asked for quiet."""
+        for text in texts:
+            print(f"warning: {text}", file=sys.stderr, flush=True)
+
+    def write(self, point: Point, shares: Any) -> None:
+        m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
+        forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
+        solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
+        last = (m.friction_x, m.contact_area_corrected)
+        if self._waves:
+            for wavelength, share in zip(*shares, strict=True):
+                self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
+        cells = [speed, m.pressure, *forces, *solve, *point.dissipated, *last]
+        self._file.append([repr(float(value)) for value in cells])
+        self.say(
+            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} {point.operator_calls:6.0f} "
+            f"{c.worst:9.2e}"
+        )
+
+    def conclude(self, failures: int) -> None:
+        """Put a curve that was solved in parts into order, draw it, and say how it went; raises OSError."""
+        lost, mended = self._file.sync()
+        self.warn([*mended, *([lost] if lost else [])])
+        if self.known:
+            self._sort()
+        from ..record import plots  # matplotlib is slow to import, and for pictures only
+
+        picture = plots.draw_steady(self.path)
+        self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")
+
+    def _sort(self) -> None:
+        """By pressure, then by speed."""
+        columns = measures.read(self.path)
+        head, *lines = self.path.read_text().splitlines()
+        keys = [(round(math.log(p), 5), v) for p, v in zip(columns["pressure"], columns["velocity"], strict=True)]
+        order = sorted(range(len(lines)), key=keys.__getitem__)
+        files.write(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
+
+    def close(self) -> None:
+        self._file.close()
+        if self._waves:
+            self._waves.close()
+
+
+def _same(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return all(math.isclose(a, b, rel_tol=CLOSE) for a, b in zip(one, other, strict=True))

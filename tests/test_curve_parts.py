@@ -1,0 +1,174 @@
+"""A friction curve in parts: it goes on where it was stopped, beside a run, and a point that fails does so alone."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+from conftest import WORLD
+
+from parcontact import __main__
+from parcontact.record.measures import read
+from parcontact.solve import kernels
+from parcontact.steady_sliding.sliding import SteadySliding
+
+pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")
+
+JOB: dict[str, Any] = {
+    "grid": {"points": [32, 4], "size": [2.5e-4, 3.125e-5]},
+    "surface": {"shape": "wave", "amplitude": 5.0e-7, "waves": [1, 0]},
+    "material": {"model": "zener", "modulus_inf": 2.75e5, "branches": [{"modulus": 2.475e6, "relaxation_time": 1e-3}]},
+}
+HISTORY = [{"pressure": 2.0e5, "velocity": 0.04, "distance": 2.34375e-5, "cells_per_step": 1}]
+CURVE = ("steady", "job.yaml", "--out", "out", "--velocities", "0.01:1:3", "--pressures", "2e5,4e5")
+DONE, FAILED, BAD_INPUT, AGAIN = 0, 1, 2, 3
+Main = Callable[..., tuple[int, str]]
+
+
+@pytest.fixture
+def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Main:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    (tmp_path / "run.yaml").write_text(yaml.safe_dump({**JOB, "history": HISTORY}))
+
+    def run(*words: str) -> tuple[int, str]:
+        capsys.readouterr()
+        code = __main__.main([*words, "--quiet"])
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        return code, said.out + said.err
+
+    return run
+
+
+@pytest.fixture
+def solved(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
+    """The points that are solved, as they are."""
+    found: list[tuple[float, float]] = []
+    solve = SteadySliding.solve
+
+    def noted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
+        found.append((velocity[0], pressure))
+        return solve(self, velocity, pressure)
+
+    monkeypatch.setattr(SteadySliding, "solve", noted)
+    return found
+
+
+def points(table: Path) -> list[tuple[float, float]]:
+    columns = read(table)
+    return [
+        (float(f"{v:.6g}"), float(f"{p:.6g}")) for v, p in zip(columns["velocity"], columns["pressure"], strict=True)
+    ]
+
+
+ALL = [(v, p) for p in (2e5, 4e5) for v in (0.01, 0.1, 1.0)]
+
+
+def test_job_without_history(main: Main, tmp_path: Path) -> None:
+    """The flags say all that a curve needs."""
+    assert main(*CURVE) == (DONE, "")
+    assert points(tmp_path / "out" / "steady.csv") == ALL
+
+
+def test_stopped_curve_goes_on(
+    main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solved: list[tuple[float, float]]
+) -> None:
+    """A signal stops it between two points with 3; the same command solves the others only; so does a longer list."""
+    solve = SteadySliding.solve
+
+    def interrupted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
+        if len(solved) == 1:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return solve(self, velocity, pressure)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SteadySliding, "solve", interrupted)
+        assert main(*CURVE) == (AGAIN, "")
+    first = (tmp_path / "out" / "steady.csv").read_bytes()
+    assert len(solved) == 2
+    with (tmp_path / "out" / "steady.csv").open("ab") as file:
+        file.write(b"0.5,2e5,0.1")  # as a run that was killed leaves it
+    assert main(*CURVE) == (DONE, "")
+    assert len(solved) == 6
+    assert (tmp_path / "out" / "steady.csv").read_bytes().startswith(first)
+    assert points(tmp_path / "out" / "steady.csv") == ALL
+    assert main("steady", "job.yaml", "--out", "out", "--velocities", "0.05,0.1", "--pressures", "2e5") == (DONE, "")
+    assert len(solved) == 7
+    assert points(tmp_path / "out" / "steady.csv") == sorted([*ALL, (0.05, 2e5)], key=lambda point: point[::-1])
+    assert main(*CURVE, "--restart", "never") == (DONE, "")
+    assert len(solved) == 13
+
+
+def test_curve_of_another_job(main: Main, tmp_path: Path) -> None:
+    """It is refused, and nothing of the curve that is there changes."""
+    assert main(*CURVE)[0] == DONE
+    before = (tmp_path / "out" / "steady.csv").read_bytes()
+    code, said = main(*CURVE, "--set", "numerics.tolerance=1e-5")
+    assert code == BAD_INPUT
+    assert "out holds the friction curve of another job: numerics.tolerance was 0.0001, is 1e-05" in said
+    assert (tmp_path / "out" / "steady.csv").read_bytes() == before
+
+
+def test_curve_beside_a_run(main: Main, tmp_path: Path) -> None:
+    """Each has its own files in one directory; of another scene neither may be there."""
+    assert main("run.yaml", "--out", "out")[0] == DONE
+    names = ("job.yaml", "job.resolved.yaml", "measures.csv")
+    before = {name: (tmp_path / "out" / name).read_bytes() for name in names}
+    assert main(*CURVE)[0] == DONE
+    assert {name: (tmp_path / "out" / name).read_bytes() for name in names} == before
+    assert main("run.yaml", "--out", "out", "--restart", "never")[0] == DONE
+    assert points(tmp_path / "out" / "steady.csv") == ALL
+    for words in (CURVE, ("run.yaml", "--out", "out")):
+        code, said = main(*words, "--set", "surface.0.amplitude=1e-6")
+        assert code == BAD_INPUT
+        assert "surface.0.amplitude was 5e-07, is 1e-06" in said
+
+
+def test_point_without_load(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no point is left that carries load, this point of the curve fails, and the others are solved."""
+    clip, speed = kernels.clip, [0.0]
+    solve = SteadySliding.solve
+
+    def noted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
+        speed[0] = velocity[0]
+        return solve(self, velocity, pressure)
+
+    def cut(x: Any) -> float:
+        if 0.05 < speed[0] < 0.5:
+            x.fill(0.0)
+        return float(clip(x))
+
+    monkeypatch.setattr(SteadySliding, "solve", noted)
+    monkeypatch.setattr(kernels, "clip", cut)
+    code, said = main(*CURVE)
+    assert code == FAILED
+    assert said.count("steady sliding at 0.1 m/s under") == 2
+    assert "no point is left that carries load" in said
+    assert points(tmp_path / "out" / "steady.csv") == [point for point in ALL if point[0] != 0.1]
+
+
+def test_maps_of_each_point(main: Main, tmp_path: Path) -> None:
+    """Their means are the pressures, and full contact leaves no gap; a curve that goes on adds to them."""
+    fields = ("--set", "output.fields=[pressure, displacement, gap, height]")
+    assert main(*CURVE, *fields)[0] == DONE
+    with h5py.File(tmp_path / "out" / "steady.h5") as file:
+        assert file["pressure"].shape == (6, 4, 32)
+        assert np.allclose(np.array([file["velocity"][...], file["load"][...]]).T, ALL)
+        assert np.allclose(file["pressure"][...].mean(axis=(1, 2)), file["load"][...], rtol=1e-9)
+        assert np.abs(file["gap"][...]).max() < 1e-4 * 1e-6  # the tolerance, of the height
+        bare = file["displacement"][...] - file["height"][...]
+        assert np.ptp(bare, axis=(1, 2)).max() < 1e-4 * 1e-6
+
+
+def test_kernel_of_cells(main: Main, tmp_path: Path) -> None:
+    """With `love` a wave of n cells is stiffer by the factor of a cell, 1/sinc(1/n), and so is friction."""
+    assert main(*CURVE)[0] == DONE
+    assert main(*CURVE[:3], "love", *CURVE[4:], "--set", "numerics.kernel=love")[0] == DONE
+    frictions = [np.array(read(tmp_path / out / "steady.csv")["friction"]) for out in ("out", "love")]
+    assert frictions[1] / frictions[0] == pytest.approx(1.0 / np.sinc(1.0 / 32.0), rel=1e-3)
