@@ -77,5 +77,3 @@ def height_of(surface: Surface) -> float:
     extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
     top, bottom = surface.slab.reduce((), extremes)
     return top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
-
-

@@ -15,14 +15,14 @@ from .effects.relaxation import relaxation_of
 from .job import Job, extension
 from .parallel.fft import FFT
 from .parallel.slab import Slab
-from .physics.body import Elastic, Zener
+from .physics.body import ElasticBody, ZenerBody
 from .physics.convolution import Convolution
 from .physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
 from .physics.entries import Remembers
 from .physics.folding import FoldedBranches
 from .physics.halfspace import HalfSpace
 from .physics.ledger import Ledger
-from .physics.motion import AnyFraction, Path, WholeCells
+from .physics.motion import AnyFraction, Motion, WholeCells
 from .physics.prony import Prony
 from .physics.roughness import Moments, moments
 from .physics.surface import Surface
@@ -71,9 +71,9 @@ class Scene:
     """Everything a march needs."""
 
     frame: Frame
-    path: Path
+    motion: Motion
     folded: FoldedBranches
-    material: Elastic | Zener
+    material: ElasticBody | ZenerBody
     solver: ContactSolver
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
@@ -129,13 +129,13 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     """
     base = frame(job, slab)
     way = AnyFraction if decisions.part_cells(job).on else WholeCells
-    path: Path = way(base.surface, base.dtype)
+    motion: Motion = way(base.surface, base.dtype)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
     energy = _energy(base, solver, material) if decisions.energies(job).on else None
     ledger = Ledger(slab, base.surface, base.units, interface_of(job))
-    scene = Scene(base, path, branches, material, solver, ledger, energy, decisions.lasting(job).on)
+    scene = Scene(base, motion, branches, material, solver, ledger, energy, decisions.lasting(job).on)
     scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
     return scene
 
@@ -165,11 +165,11 @@ def facts(built: Scene) -> list[str]:
 # -- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _material(base: Frame, branches: FoldedBranches) -> Elastic | Zener:
+def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:
     if not relaxation.decide(base.job).on:
-        return Elastic(base.slab, base.prony.modulus_inf)
+        return ElasticBody(base.slab, base.prony.modulus_inf)
     integrator = base.job.numerics.integrator
-    return Zener(base.slab, base.prony, integrator, base.dtype, branches.memoryless, branches.frozen)
+    return ZenerBody(base.slab, base.prony, integrator, base.dtype, branches.memoryless, branches.frozen)
 
 
 def _solver(base: Frame, tolerance: float) -> ContactSolver:
@@ -185,10 +185,10 @@ def _preconditioner(base: Frame) -> Convolution:
     return base.half_space.inverse(fft)
 
 
-def _energy(base: Frame, solver: ContactSolver, material: Elastic | Zener) -> ElasticEnergy | ZenerEnergy:
+def _energy(base: Frame, solver: ContactSolver, material: ElasticBody | ZenerBody) -> ElasticEnergy | ZenerEnergy:
     slab, grid, units = base.slab, base.job.grid, base.units
     unit = units.pressure * units.height * grid.dx * grid.dy
-    if isinstance(material, Elastic):
+    if isinstance(material, ElasticBody):
         return ElasticEnergy(slab, unit)
     if decisions.energy_memory(base.job).on:
         return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)

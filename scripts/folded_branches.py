@@ -23,7 +23,7 @@ from mpi4py import MPI
 from parcontact import job, scene
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import Heights, Zener
+from parcontact.physics.body import Heights, ZenerBody
 from parcontact.record.row import Row
 
 JOB = Path(__file__).parents[1] / "jobs" / "velocity_step.yaml"
@@ -48,7 +48,7 @@ def together(runs: list[March]) -> list[list[Row]]:
 def memory_pass(run: March) -> float:
     """The shortest time [s] of a pass through the memory of a run that is over."""
     body = run.scene.material
-    assert isinstance(body, Zener)
+    assert isinstance(body, ZenerBody)
     u = body.u.copy()
     spent = []
     for _ in range(PASSES):

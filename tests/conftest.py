@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 WORLD = MPI.COMM_WORLD
 REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
 UNSEEN = io.StringIO()  # what pytest says on the other ranks
-PATIENCE = 20.0  # seconds in which the other ranks must end a test that failed here
+MAX_SECONDS_APART = 20.0  # seconds in which the other ranks must end a test that failed here
 
 # All ranks must see the same examples, and a first example waits for the compiler.
 hypothesis.settings.register_profile("ranks", derandomize=WORLD.size > 1, deadline=None)
@@ -124,7 +124,7 @@ def agree(report: pytest.TestReport) -> None:
     """Make a test that fails on one rank fail on all, so that they enter the next one together."""
     own = f"on rank {WORLD.rank}: {report.outcome}\n{report.longreprtext}"
     arrival = REFEREE.Ibarrier()
-    deadline = time.monotonic() + PATIENCE if report.failed else math.inf
+    deadline = time.monotonic() + MAX_SECONDS_APART if report.failed else math.inf
     while not arrival.Test():
         if time.monotonic() > deadline:
             print(f"\n{report.nodeid} {own}\nother ranks did not finish it", file=sys.stderr, flush=True)

@@ -19,7 +19,7 @@ from parcontact.effects.effect import Decision
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
-from parcontact.physics.body import Elastic, Zener
+from parcontact.physics.body import ElasticBody, ZenerBody
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
 from parcontact.record import fields, measures
@@ -97,7 +97,7 @@ def lasting(planned: Job) -> Counter[str]:
     base = scene.frame(planned, slab)
     path = WholeCells(base.surface)
     memory = base.prony.moduli.size > 0
-    body = Zener(slab, base.prony, "exponential") if memory else Elastic(slab, base.prony.modulus_inf)
+    body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
     solver = bare_solver(base)
     ledger = Ledger(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
@@ -265,7 +265,7 @@ def test_displacement_control() -> None:
     march.advance(next(iter(planned.timeline())))
     solver, slab = march.scene.solver, march.scene.slab
     spent = slab.tally["allreduce"]
-    heights = march.scene.path.at((0.0, 0.0)).base
+    heights = march.scene.motion.at((0.0, 0.0)).base
     solver.solve(heights, Approach(-5e-7 / march.scene.units.height), slab.zeros())
     of_solve = slab.tally["allreduce"] - spent
     of_measures = 2

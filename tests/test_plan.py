@@ -17,7 +17,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.plan import machine, memory, other_ranks, report, trial
 from parcontact.plan.planning import only_steady_states
 from parcontact.plan.report import Costs
-from parcontact.plan.sample import Sample, Stage, chosen, sample
+from parcontact.plan.sample import Sample, StageCost, chosen, sample
 from parcontact.plan.scaling import Machine, Scaling
 from parcontact.steady_sliding.sliding import SteadySliding
 
@@ -131,7 +131,7 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
 
 
 def test_stages_not_tried_are_like_the_others() -> None:
-    stages = (Stage(4, 4, 4.0, {"fft": 40.0}), Stage(6))
+    stages = (StageCost(4, 4, 4.0, {"fft": 40.0}), StageCost(6))
     seen = Sample(job(), 1, 0.0, 0.0, 0.0, 0, stages)
     assert seen.total("fft") == 100.0
     assert seen.total("never counted") == 0.0
@@ -143,7 +143,7 @@ MACHINE = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10)
 def scaling(points: int, machine: Machine = MACHINE, **counts: float) -> Scaling:
     planned = job(grid={"points": points})
     sums = {"seconds": 1.0, "operator": 10.0, f"fft {points}x{points} float64": 20.0, "allreduce": 20.0, **counts}
-    return Scaling.of(planned, [Sample(planned, 1, 0.0, 1.0, 0.0, 0, (Stage(1, 1, 1.0, sums),))], machine)
+    return Scaling.of(planned, [Sample(planned, 1, 0.0, 1.0, 0.0, 0, (StageCost(1, 1, 1.0, sums),))], machine)
 
 
 def test_one_rank_is_what_was_seen() -> None:
@@ -171,7 +171,7 @@ def test_messages_grow_with_ranks_and_scaling_ends() -> None:
 def test_a_sample_on_some_ranks_is_gone_by_there(tmp_path: Path) -> None:
     """It comes from another process; others start from it, or from the one on fewer ranks."""
     planned = job()
-    stages = [(Stage(1, 1, 1.0, {"seconds": seconds, "operator": 10.0}),) for seconds in (1.0, 0.7)]
+    stages = [(StageCost(1, 1, 1.0, {"seconds": seconds, "operator": 10.0}),) for seconds in (1.0, 0.7)]
     one, two = (Sample(planned, 1 + n, 0.5, 1.0, 2.0, 1000, each) for n, each in enumerate(stages))
     other_ranks.save(tmp_path / "sample", two)
     again = other_ranks.load(tmp_path / "sample", planned, 2.5)
@@ -191,7 +191,7 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert max(tried.grid.points) <= 1024
     assert tried.grid.size == large.grid.size
     assert len(tried.timeline()) < len(large.timeline())
-    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (Stage(9, 9, 9.0, {"seconds": 9.0}),))
+    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (StageCost(9, 9, 9.0, {"seconds": 9.0}),))
     assert Scaling.of(large, [seen], MACHINE).steps == len(large.timeline())
     ratio = Scaling.of(large, [seen], MACHINE).step(1) / Scaling.of(tried, [seen], MACHINE).step(1)
     assert ratio > large.grid.nx**2 / tried.grid.nx**2
@@ -247,7 +247,7 @@ def planned_times(shares: dict[int, float], points: int = 64) -> list[str]:
     planned = job(grid={"points": points})
     counts = {"seconds": 1.0, "operator": 10.0}
     samples = [
-        Sample(planned, ranks, 0.0, 1.0, 0.0, 0, (Stage(1, 1, 1.0, counts),), share=share)
+        Sample(planned, ranks, 0.0, 1.0, 0.0, 0, (StageCost(1, 1, 1.0, counts),), share=share)
         for ranks, share in shares.items()
     ]
     return list(report.times(Costs(Scaling.of(planned, samples, MACHINE), 1e9), (1, 2, 4)))

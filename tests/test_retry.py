@@ -254,6 +254,6 @@ def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
     assert found[-1].iterations == 2
     assert march.scene.slab.tally["retry"] == 0
     march = begun(data | {"numerics": numerics})
-    march.scene.path.at((0.0, 0.0)).base[0, 0] = np.nan
+    march.scene.motion.at((0.0, 0.0)).base[0, 0] = np.nan
     with pytest.raises(StepError, match="not finite"):
         run(march, [])

@@ -15,7 +15,7 @@ from test_restart import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows,
 from parcontact.march.loop import run
 from parcontact.march.rest import remaining, steps_to_make
 from parcontact.march.step import March
-from parcontact.physics.body import Zener
+from parcontact.physics.body import ZenerBody
 from parcontact.record.row import Row
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
@@ -122,7 +122,7 @@ def test_what_remains_is_bounded(boundary: str, surface: Any, material: Any, con
 
     def look(now: March) -> None:
         body = now.scene.material
-        assert isinstance(body, Zener)
+        assert isinstance(body, ZenerBody)
         if now.row.time > 1e-3:
             scale = min(float(np.abs(body.u).max()), height) if now.state.pressure.any() else height
             predicted.append(scale * remaining(now, body, 0.051 - now.row.time))
@@ -239,7 +239,7 @@ def test_branches_without_a_map_relax_first() -> None:
     """They bear the jump of a load, though nothing remembers them: the step after it is made."""
     fast = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "relaxation_time": 1e-12}]}
     march, found = marched(job(DWELL, material=fast))
-    assert isinstance(march.scene.material, Zener)
+    assert isinstance(march.scene.material, ZenerBody)
     assert not march.scene.material.kept
     assert [row.step for row in found] == [0, 1, 2, len(march.scene.job.timeline())]
     assert found[1].measures.contact_area < 0.9 * found[2].measures.contact_area
@@ -250,7 +250,7 @@ def test_what_remains_is_the_same_whether_a_checkpoint_was_written() -> None:
     """To the last bit, though writing one advances the branches."""
     march, _ = marched(job({**DWELL, "duration": 3e-3, "time_step": 1e-3}))
     body = march.scene.material
-    assert isinstance(body, Zener)
+    assert isinstance(body, ZenerBody)
     before = remaining(march, body, 1e-3)
     march.entries()
     assert remaining(march, body, 1e-3) == before
@@ -260,8 +260,8 @@ def test_what_remains_is_the_same_whether_a_checkpoint_was_written() -> None:
 def begun_again(march: March) -> float:
     """What remains to a march that begins with the maps of another."""
     other = begun(march.scene.job)
-    assert isinstance(march.scene.material, Zener)
-    assert isinstance(other.scene.material, Zener)
+    assert isinstance(march.scene.material, ZenerBody)
+    assert isinstance(other.scene.material, ZenerBody)
     units = march.scene.units
     other.scene.material.restore({name: np.asarray(e.value) for name, e in march.scene.material.entries(units).items()})
     other.state.pressure[...] = march.state.pressure

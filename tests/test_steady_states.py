@@ -90,7 +90,7 @@ def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> N
 def test_both_methods_agree(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
     """Projected steps, and the active set that goes on where they do not help: to ten times the certificate's 1e-5."""
     projected = sphere_at(shared_path, comm, 1.0, 64)
-    monkeypatch.setattr(steady, "HALVING", 0)
+    monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 0)
     changed = sphere_at(shared_path, comm, 1.0, 64)
     assert projected.sets == 0 < changed.sets
     assert projected.measures.friction == pytest.approx(changed.measures.friction, rel=1e-4)

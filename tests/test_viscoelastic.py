@@ -9,7 +9,7 @@ from marching import BRANCHES, PRONY, SLS, begun, column, example, marched
 from numpy.testing import assert_allclose
 
 from parcontact.march.step import March
-from parcontact.physics.body import Zener
+from parcontact.physics.body import ZenerBody
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
 from parcontact.record.row import Row
 from parcontact.theory import lee_radok, westergaard
@@ -355,7 +355,7 @@ def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
     def check(march: March) -> None:
         energy, body = march.scene.energy, march.scene.material
         assert isinstance(energy, ZenerEnergy)
-        assert isinstance(body, Zener)
+        assert isinstance(body, ZenerBody)
         body.settle()
         if isinstance(energy.inverse, ElasticPressure):
             memory = energy.inverse.body
@@ -385,7 +385,7 @@ def inverse(march: March, index: int) -> np.ndarray:
     scene = march.scene
     body, energy = scene.material, scene.energy
     assert isinstance(energy, ZenerEnergy)
-    assert isinstance(body, Zener)
+    assert isinstance(body, ZenerBody)
     if isinstance(energy.inverse, ElasticPressure):
         memory = energy.inverse.body
         return [memory.u, *memory.branches][index]

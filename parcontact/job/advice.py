@@ -18,7 +18,7 @@ LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter 
 CELLS_PER_WAVE = 8  # fewer under-resolve the contact of the shortest waves (paper, end of section 3)
 STEPS_PER_WAVE = 4  # fewer skip over the shortest waves while sliding
 ROUNDINGS = 4.0  # of a number in a certificate
-ROUND_OFF = 1e-9
+SAME_LENGTH = 1e-9  # relative: lengths this close are the same
 
 
 def resolution(
@@ -46,18 +46,18 @@ def _surface(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
         if not isinstance(shape, Rough) or not directions:
             continue
         name, length, _ = min(directions, key=lambda direction: direction[1])
-        if length < LONG_WAVES * shape.long_wavelength * (1 - ROUND_OFF):
+        if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
             yield (
                 f"surface.{index}: only {length / shape.long_wavelength:.3g} long waves fit into the box along {name}; "
                 f"for a representative surface use at least {LONG_WAVES}: a size of "
                 f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
             )
         name, length, cell = max(directions, key=lambda direction: direction[2])
-        if shape.short_wavelength < CELLS_PER_WAVE * cell * (1 - ROUND_OFF):
+        if shape.short_wavelength < CELLS_PER_WAVE * cell * (1 - SAME_LENGTH):
             yield (
                 f"surface.{index}: only {shape.short_wavelength / cell:.3g} cells per shortest wave along {name}; "
                 f"for a resolved contact use at least {CELLS_PER_WAVE}: "
-                f"{math.ceil((1 - ROUND_OFF) * CELLS_PER_WAVE * length / shape.short_wavelength)} points or a "
+                f"{math.ceil((1 - SAME_LENGTH) * CELLS_PER_WAVE * length / shape.short_wavelength)} points or a "
                 f"short_wavelength of {CELLS_PER_WAVE * cell:.4g} m"
             )
 
@@ -80,7 +80,7 @@ def _stage(
         yield f"history.{index}: nothing slides in a stage without duration or distance; its velocity has no effect"
     yield from _relaxation(index, step, material, numerics)
     slid = step * stage.speed
-    if short is not None and slid > short / STEPS_PER_WAVE * (1 + ROUND_OFF):
+    if short is not None and slid > short / STEPS_PER_WAVE * (1 + SAME_LENGTH):
         yield (
             f"history.{index}: the surface slides {slid:.3g} m in one step, {slid / short:.2g} of its shortest wave; "
             f"use time steps up to {short / STEPS_PER_WAVE / stage.speed:.3g} s "
@@ -102,7 +102,7 @@ def _precision(numerics: Numerics) -> Iterator[str]:
 def _relaxation(index: int, step: float, material: Elastic | Zener, numerics: Numerics) -> Iterator[str]:
     times = [branch.relaxation_time for branch in getattr(material, "branches", ())]
     shortest = min((time for time in times if 0 < time < float("inf")), default=None)
-    if numerics.integrator == "backward-euler" and shortest is not None and step > shortest * (1 + ROUND_OFF):
+    if numerics.integrator == "backward-euler" and shortest is not None and step > shortest * (1 + SAME_LENGTH):
         yield (
             f"history.{index}: time steps up to {step:.3g} s are longer than the shortest relaxation time "
             f"{shortest:.3g} s, which backward-euler does not resolve; shorten the steps or use integrator: exponential"

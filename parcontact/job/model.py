@@ -36,7 +36,7 @@ def _waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
     """No wave may be shorter than two cells (Nyquist), and the shortest one must fit into the box."""
     cell = max([step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1], default=0.0)
     for index, shape in enumerate(surface):
-        if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - advice.ROUND_OFF):
+        if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - advice.SAME_LENGTH):
             sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), got {shape.short_wavelength!r}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
         if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):

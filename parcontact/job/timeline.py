@@ -12,7 +12,7 @@ from .history import GeometricStep, Ramp, Stage
 from .limits import first_step
 from .sections import Grid
 
-ROUND_OFF = 1e-9  # relative: a duration this close to a whole number of steps is one
+SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
 MANY = 10**12  # steps of a stage, of which one is too little to be told from the end
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
@@ -43,7 +43,7 @@ class Step(NamedTuple):
 
 def reached(time: float, until: float) -> bool:
     """Whether a time is the one asked for, or later."""
-    return time >= until * (1.0 - ROUND_OFF)
+    return time >= until * (1.0 - SAME_TIME)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Fractions:
     def beyond(self, until: float) -> int:
         """How many more steps it takes to reach the fraction `until`."""
         step = self.last
-        more = max(0, math.ceil((until * (1.0 - ROUND_OFF) - 1.0) / step) - 1)
+        more = max(0, math.ceil((until * (1.0 - SAME_TIME) - 1.0) / step) - 1)
         while not reached(self[self.count + more], until):
             more += 1
         return more
@@ -85,8 +85,8 @@ def divided(stage: Stage, grid: Grid) -> Fractions:
     steps = stage.seconds / first_step(stage, grid)
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     if growth == 1.0:
-        return Fractions(max(1, math.ceil(steps * (1.0 - ROUND_OFF))))
-    count = math.ceil(math.log1p(steps * (growth - 1.0)) / math.log(growth) * (1.0 - ROUND_OFF))
+        return Fractions(max(1, math.ceil(steps * (1.0 - SAME_TIME))))
+    count = math.ceil(math.log1p(steps * (growth - 1.0)) / math.log(growth) * (1.0 - SAME_TIME))
     return Fractions(max(1, count), growth)
 
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 
 from ..job.timeline import Span, Step, Timeline
 from ..parallel.slab import Array
-from ..physics.body import Zener
+from ..physics.body import ZenerBody
 from .step import March
 
 
@@ -46,7 +46,7 @@ def _at_rest(march: March, span: Span, number: int, target: int) -> bool:
     if target <= number or index < 1:
         return False
     material = march.scene.material
-    if not isinstance(material, Zener):
+    if not isinstance(material, ZenerBody):
         return True
     if index == 1:  # a jump of the load has just been: branches that have no map have not relaxed yet
         return False
@@ -54,7 +54,7 @@ def _at_rest(march: March, span: Span, number: int, target: int) -> bool:
     return march.scene.slab.agree(change <= march.scene.job.numerics.tolerance)
 
 
-def remaining(march: March, material: Zener, seconds: float) -> float:
+def remaining(march: March, material: ZenerBody, seconds: float) -> float:
     """By how much displacements at most change within some time, over the smaller of the largest displacement and the
     surface's height; over the latter where nothing is pressed; collective."""
     scene = march.scene

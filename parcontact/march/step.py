@@ -12,7 +12,7 @@ from ..job.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
-from ..physics.body import Trial, Zener
+from ..physics.body import Trial, ZenerBody
 from ..physics.energy import Pressed
 from ..physics.entries import Entry
 from ..physics.motion import cells_between
@@ -25,7 +25,7 @@ from . import failure, state
 from .failure import StepError
 from .state import State
 
-ROUND_OFF = 1e-14  # relative to lengths whose sum is compared with 0
+FULL_CONTACT_ROUNDING = 1e-14  # relative to lengths whose sum is compared with 0
 
 
 class March:
@@ -52,7 +52,7 @@ class March:
         """Make the next state; collective. Raises StepError, and leaves the last one, when that cannot be."""
         began, tally, scene, old = time.perf_counter(), self.scene.slab.tally, self.scene, self.state
         calls = tally["operator"]
-        trial = scene.material.begin(step.dt, scene.path.at(step.position))
+        trial = scene.material.begin(step.dt, scene.motion.at(step.position))
         contact, remark = self._solve(step, trial)
         measures = scene.ledger.measures(
             contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
@@ -151,7 +151,7 @@ class March:
         if scene.job.grid.boundary == "periodic":
             mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
             datum = scene.frame.surface.datum
-            rounding = ROUND_OFF * (abs(step.load) + abs(datum) + scene.frame.height) / scene.units.height
+            rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.frame.height) / scene.units.height
             if d + mean > rounding:
                 most = -mean * scene.units.height - datum
                 raise StepError(
@@ -202,7 +202,7 @@ class March:
 
     def _displacement(self) -> Array:
         """Of the body's surface; collective. An elastic body does not remember it: it follows from the pressure."""
-        if isinstance(self.scene.material, Zener):
+        if isinstance(self.scene.material, ZenerBody):
             return self.scene.material.u
         if self._elastic_displacement is None:
             self._elastic_displacement = self.scene.solver.displace(self.state.pressure)
@@ -220,7 +220,7 @@ class March:
         u = self._displacement()
         if name == "displacement":
             return u * units.height
-        base, offset = scene.path.at(self.state.position).parts
+        base, offset = scene.motion.at(self.state.position).parts
         heights = np.roll(base, offset, axis=1)
         if name == "height":
             return heights * units.height + scene.frame.surface.datum

@@ -1,4 +1,4 @@
-"""What the body remembers: nothing (Elastic), or one map per relaxing branch (Zener).
+"""What the body remembers: nothing (ElasticBody), or one map per relaxing branch (ZenerBody).
 
 With `G(t) = G_inf + sum_k G_k exp(-t/tau_k)` and the elastic operator A of shear modulus 1, the total pressure obeys
 
@@ -73,7 +73,7 @@ class Trial:
     advance: Advance | None = None
 
 
-class Elastic:
+class ElasticBody:
     """A body of one modulus: remembers nothing and allocates at most the moved heights."""
 
     def __init__(self, slab: Slab, modulus: float) -> None:
@@ -115,7 +115,7 @@ class _Coefficients:
     weights: tuple[Array, float]
 
 
-class Zener:
+class ZenerBody:
     """Relaxing branches: this rank's rows of one map per branch and of the last displacement.
 
     Branches are known by their number in `prony`. Those of `kept` have a map each, in that order in `branches`; the
@@ -142,7 +142,7 @@ class Zener:
         self.branches = allocate((len(self.kept), *slab.shape), dtype, slab.tally)
         self.branches.fill(0.0)
         self.u = slab.zeros(dtype)
-        self._work = slab.zeros(dtype)
+        self._buffer = slab.zeros(dtype)
         self._still: Advance = np.ones(len(self.kept)), np.zeros(len(self.kept))
         self._pending: Advance = self._still
         self._coefficients: _Coefficients | None = None
@@ -166,9 +166,9 @@ class Zener:
         if self._coefficients is None or self._coefficients.dt != dt:
             self._coefficients = self._coefficients_of(dt)
         step = self._coefficients
-        loops.begin(self.branches, *self._pending, self._work, *step.weights, self.u, *heights.parts)
+        loops.begin(self.branches, *self._pending, self._buffer, *step.weights, self.u, *heights.parts)
         self._pending = self._still
-        return Trial(step.alpha, self._work, heights, step.advance)
+        return Trial(step.alpha, self._buffer, heights, step.advance)
 
     def _coefficients_of(self, dt: float) -> _Coefficients:
         decay, gain = self.coefficients(dt)
@@ -195,11 +195,11 @@ class Zener:
     @property
     def increment(self) -> Array:
         """`u_new - u` of the step just committed; valid until the next begins."""
-        return self._work
+        return self._buffer
 
     def settle(self) -> None:
         """Advance the branch maps now, for somebody who reads them; the run goes on to the same digits."""
-        loops.begin(self.branches, *self._pending, self._work, self._still[0], 0.0, self.u, self.u, 0)
+        loops.begin(self.branches, *self._pending, self._buffer, self._still[0], 0.0, self.u, self.u, 0)
         self._pending = self._still
 
     def relaxing(self, seconds: float) -> tuple[Array, float]:

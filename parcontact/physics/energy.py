@@ -19,7 +19,7 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .body import Heights, Zener
+from .body import Heights, ZenerBody
 from .entries import Entry, MapCount, Saved
 from .prony import Prony
 from .units import Units
@@ -28,7 +28,7 @@ SMALL = 1e-2  # z below which differences of exponentials are summed as series, 
 
 
 @dataclass
-class Balance:
+class EnergyBalance:
     """Sums since the start, in the run's units; `dissipated` has one entry per branch."""
 
     work: float = 0.0
@@ -80,7 +80,7 @@ class ElasticEnergy:
 
     def __init__(self, slab: Slab, unit: float = 1.0) -> None:
         self.slab, self.unit = slab, unit
-        self.balance = Balance()
+        self.balance = EnergyBalance()
 
     def advance(self, dt: float, now: Pressed, before: Pressed, u: Array) -> None:
         """After a solve for a pressure and the displacement u; one reduction; collective."""
@@ -114,16 +114,16 @@ class ElasticPressure:
         A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     becomes at every point
           p = G_inf v + sum_k m_k,     dm_k/dt = G_k dv/dt - m_k/tau_k.
 
-    So v is the displacement of a second `Zener` body, whose every point obeys on its own to the pressure there.
+    So v is the displacement of a second `ZenerBody`, whose every point obeys on its own to the pressure there.
     """
 
     def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
-        self.body = Zener(slab, prony, integrator)
+        self.body = ZenerBody(slab, prony, integrator)
 
     @staticmethod
     def count_maps(branches: int) -> MapCount:
         """Of a body with so many branches, each of which has a map; in double precision."""
-        return Zener.count_maps(branches)
+        return ZenerBody.count_maps(branches)
 
     def advance(self, dt: float, p: Array, du: Array) -> Array:
         """What v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`; local to this rank."""
@@ -140,14 +140,14 @@ class ElasticPressure:
 
 
 class ZenerEnergy:
-    """Energies of a `Zener` body, advanced after each committed step; `unit` [J] is that of all energies here."""
+    """Energies of a `ZenerBody`, advanced after each committed step; `unit` [J] is that of all energies here."""
 
     def __init__(
-        self, slab: Slab, material: Zener, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
+        self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
     ) -> None:
         self.slab, self.material, self.inverse, self.unit = slab, material, inverse, unit
         count = len(material.prony.moduli)
-        self.balance = Balance(dissipated=np.zeros(count))
+        self.balance = EnergyBalance(dissipated=np.zeros(count))
         self._spring, self._branches = 0.0, np.zeros(count)  # <u, A^-1 u> and <h_k, A^-1 h_k>
 
     def advance(self, dt: float, now: Pressed, before: Pressed, u: Array) -> None:
@@ -188,7 +188,7 @@ class ZenerEnergy:
     def restore(self, saved: Saved) -> None:
         """The balance and the sums."""
         work, stored, spring = (float(saved[name]) for name in ("work", "stored", "spring"))
-        self.balance = Balance(work, stored, np.array(saved["dissipated"], dtype=np.float64))
+        self.balance = EnergyBalance(work, stored, np.array(saved["dissipated"], dtype=np.float64))
         self._spring, self._branches = spring, np.array(saved["branches"], dtype=np.float64)
 
 

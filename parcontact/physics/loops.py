@@ -16,13 +16,13 @@ def roll(source, offset, target):
 
 
 @loop
-def begin(branches, decay, gain, work, weight, weight_u, u, heights, offset):
-    """Advance the branches, `h_k <- decay_k h_k + gain_k work`, and form the next effective heights in `work`:
+def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
+    """Advance the branches, `h_k <- decay_k h_k + gain_k buffer`, and form the next effective heights in `buffer`:
     `heights(i - offset) + sum weight_k h_k - weight_u u`.
     """
     count, ny, nx = branches.shape
     start = offset % nx
-    effective = np.empty(nx, work.dtype)
+    effective = np.empty(nx, buffer.dtype)
     for j in range(ny):
         effective[start:] = heights[j, : nx - start]
         effective[:start] = heights[j, nx - start :]
@@ -31,22 +31,22 @@ def begin(branches, decay, gain, work, weight, weight_u, u, heights, offset):
         for k in range(count):
             a, b, c = decay[k], gain[k], weight[k]
             for i in range(nx):
-                value = a * branches[k, j, i] + b * work[j, i]
+                value = a * branches[k, j, i] + b * buffer[j, i]
                 branches[k, j, i] = value
                 effective[i] += c * value
-        work[j, :] = effective
+        buffer[j, :] = effective
 
 
 @loop
-def commit(displacement, work, u, heights, offset):
-    """`u_new = displacement - work + heights(i - offset)`: put `u_new - u` into `work` and `u_new` into `u`."""
+def commit(displacement, buffer, u, heights, offset):
+    """`u_new = displacement - buffer + heights(i - offset)`: put `u_new - u` into `buffer` and `u_new` into `u`."""
     nx = u.shape[1]
     start = offset % nx
     for j in range(u.shape[0]):
         for i in range(nx):
             source = i - start if i >= start else i - start + nx
-            new = displacement[j, i] - work[j, i] + heights[j, source]
-            work[j, i] = new - u[j, i]
+            new = displacement[j, i] - buffer[j, i] + heights[j, source]
+            buffer[j, i] = new - u[j, i]
             u[j, i] = new
 
 

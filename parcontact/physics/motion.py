@@ -16,7 +16,7 @@ def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
     return (new[0] - old[0]) / cell[0], (new[1] - old[1]) / cell[1]
 
 
-class Path(Protocol):
+class Motion(Protocol):
     """Heights of the surface at a displacement; collective."""
 
     def at(self, displacement: tuple[float, float]) -> Heights: ...

@@ -17,7 +17,7 @@ from ..job import Job
 from ..march.state import State
 from ..parallel.fft import footprint, transform_name
 from ..parallel.slab import deal
-from ..physics.body import Elastic, Zener
+from ..physics.body import ElasticBody, ZenerBody
 from ..physics.convolution import Convolution
 from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
@@ -108,10 +108,10 @@ def _maps(job: Job) -> Iterator[Maps]:
     yield Maps("heights", MapCount(1), precision)
     yield Maps("pressures", State.count_maps(decisions.lasting(job).on), precision)
     if relaxation.decide(job).on:
-        yield Maps("branches", Zener.count_maps(len(fold_branches_of(job).kept)), precision)
+        yield Maps("branches", ZenerBody.count_maps(len(fold_branches_of(job).kept)), precision)
     else:
         moved = decisions.sliding(job).on and not decisions.part_cells(job).on
-        yield Maps("moved heights", Elastic.count_maps(moved), precision)
+        yield Maps("moved heights", ElasticBody.count_maps(moved), precision)
     if decisions.energy_memory(job).on:
         yield Maps("energy memory", ElasticPressure.count_maps(relaxation_of(job).moduli.size), np.float64)
     for name, effect in effects_that_follow(job).items():

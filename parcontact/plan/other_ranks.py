@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..job import Job
-from .sample import Sample, Stage
+from .sample import Sample, StageCost
 
 MPIRUN = Path(sys.executable).with_name("mpirun")
 MARKS = ("OMPI_", "PMIX_", "PRTE_", "PMI_")  # what MPI has left in the environment would confuse another mpirun
@@ -49,5 +49,5 @@ def save(path: Path, sample: Sample) -> None:
 def load(path: Path, job: Job, whole: float) -> Sample:
     """The sample of a job that a program left which took so many seconds; what it did not try for was its start."""
     facts = json.loads(path.read_text())
-    stages = tuple(Stage(**stage) for stage in facts.pop("stages"))
+    stages = tuple(StageCost(**stage) for stage in facts.pop("stages"))
     return Sample(job=job, starting=whole - facts["took"], stages=stages, **facts)

@@ -59,7 +59,7 @@ def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) ->
     """What the steps, or the steady states, of a job cost; collective."""
     seen = try_job(job, slab, wanted.seconds, started)
     if seen is None:
-        yield "too large to be tried here: no time can be told"
+        yield "too large to be tried here: its time is unknown"
         return
     others = [count for count in wanted.ranks if 1 < count <= machine.cores()] if slab.comm.size == 1 else []
     more = other_ranks.samples(seen.job, wanted.words, sorted(others), wanted.seconds)

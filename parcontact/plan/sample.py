@@ -36,7 +36,7 @@ LATE = 2.0  # times the time given: then no more steps are made
 
 
 @dataclass
-class Stage:
+class StageCost:
     """What the steps of a stage cost: their number, how many were tried, sums over all that those stand for."""
 
     steps: int
@@ -66,7 +66,7 @@ class Sample:
     building: float
     took: float
     resident: int
-    stages: tuple[Stage, ...]
+    stages: tuple[StageCost, ...]
     held: int = 0
     share: float = 1.0
 
@@ -119,7 +119,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
     )
 
 
-def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[Stage]]:
+def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
     """Seconds that the scene took, and the stages of the history; collective."""
     began = time.perf_counter()
     numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
@@ -130,14 +130,14 @@ def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[Stage]]:
     return building, _try(march, job.timeline(), seconds)
 
 
-def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[Stage]]:
+def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
     """Seconds that the scene took, and the steady states, some far apart tried, as one stage; collective."""
     began = time.perf_counter()
     sliding = SteadySliding(scene.frame(job, slab))
     building = time.perf_counter() - began
     wanted = request(job)
     states = [(speed, pressure) for pressure in wanted.pressures for speed in wanted.velocities]
-    stage = Stage(len(states))
+    stage = StageCost(len(states))
     for index in _spread(len(states)):
         if stage.tried and slab.agree(time.perf_counter() - began - building > seconds):
             break
@@ -160,10 +160,10 @@ def _spread(count: int) -> list[int]:
     return [index for index in turned if index < count]
 
 
-def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
+def _try(march: March, timeline: Timeline, seconds: float) -> list[StageCost]:
     """The first steps tell how many can be afforded; root's clock decides for all ranks."""
     slab, began = march.scene.slab, time.perf_counter()
-    stages = [Stage(span.jumps + span.count) for span in timeline.spans]
+    stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
     per_call = float("inf")
     as_run = steps_to_make(march, timeline)
     for step in islice(as_run, FIRST):
@@ -187,12 +187,12 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[Stage]:
     return stages
 
 
-def _is_late(began: float, seconds: float, stages: list[Stage]) -> bool:
+def _is_late(began: float, seconds: float, stages: list[StageCost]) -> bool:
     """Whether to stop, but not before there is more than the first steps, which start from nothing."""
     return time.perf_counter() - began > LATE * seconds and sum(stage.tried for stage in stages) > FIRST
 
 
-def _make_as_run(march: March, step: Step, stages: list[Stage]) -> dict[str, float]:
+def _make_as_run(march: March, step: Step, stages: list[StageCost]) -> dict[str, float]:
     """Make a step of the run, which stands for itself, and for others that the run does not make."""
     cost = _make(march, step)
     stages[step.stage].steps -= step.passed

@@ -21,7 +21,7 @@ from ..parallel.slab import Slab
 from . import checkpoint, files, hdf5, marker
 from .marker import SCENE, VERBS, Claim
 
-PATIENCE = 3.0  # seconds: a run that was killed may need a moment to let go
+MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
     "steady": ("steady.csv", "steady_waves.csv", "steady.h5"),
@@ -223,7 +223,7 @@ class Directory:
 
     def _take_lock(self) -> str:
         """Take the lock, which the system gives back however this process ends. Returns what stands in the way."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + MAX_SECONDS_TO_RELEASE
         path = self.path / LOCK
         while True:
             try:

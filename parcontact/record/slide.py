@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..job import Stage
 
 DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
-ROUND_OFF = 1e-9  # relative: instants this close are the same
+SAME_INSTANT = 1e-9  # relative: instants this close are the same
 
 
 class Slide(NamedTuple):
@@ -63,6 +63,6 @@ def _during(history: Sequence[Stage], time: NDArray[np.float64]) -> NDArray[np.i
     last = sliding[-1]
     same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
     start, end = ends[min(same)], ends[last + 1]
-    round_off = ROUND_OFF * (end - start)
+    round_off = SAME_INSTANT * (end - start)
     before = np.flatnonzero(time <= start + round_off)[-1:]
     return np.append(before, np.flatnonzero((time > start + round_off) & (time <= end + round_off)))

@@ -20,7 +20,7 @@ from ..record.directory import ADVICE, Directory
 
 SAME = ("grid", "surface", "material", "initial")  # sections that must not change
 SAME_NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
-ROUND_OFF = 1e-9  # relative: steps of two histories this close are the same
+SAME_STEP = 1e-9  # relative: steps of two histories this close are the same
 
 
 @dataclass(frozen=True)
@@ -159,9 +159,9 @@ def _apart(old: Step, new: Step) -> Iterator[str]:
     size = math.hypot(*old.position)
     if old.jump != new.jump:
         yield "was a jump of the load, is none" if old.jump else "was none, is a jump of the load"
-    if not math.isclose(old.time, new.time, rel_tol=ROUND_OFF):
+    if not math.isclose(old.time, new.time, rel_tol=SAME_STEP):
         yield f"ended at t = {old.time!r} s, ends at {new.time!r} s"
-    if old.control != new.control or not math.isclose(old.load, new.load, rel_tol=ROUND_OFF):
+    if old.control != new.control or not math.isclose(old.load, new.load, rel_tol=SAME_STEP):
         yield f"had {old.control} {old.load!r}, has {new.control} {new.load!r}"
-    if math.dist(old.position, new.position) > ROUND_OFF * size:
+    if math.dist(old.position, new.position) > SAME_STEP * size:
         yield f"ended with the surface at {old.position} m, ends at {new.position} m"

@@ -29,9 +29,9 @@ import numpy as np
 from ..parallel.slab import Array, Slab
 from . import kernels
 
-STALL = 60  # iterations without a better certificate after which a solve gives up
-HALVINGS = 12  # of a step that raises f; then it is taken as it is
-ROUND_OFF = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
+MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
+MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
+UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 NOT_FINITE = "met numbers that are not finite"
 
 
@@ -95,7 +95,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Balance:
+class Iterate:
     """An iterate in numbers, for an approach d: the sums of p and of p g, and `energy = <p, A p>/2`."""
 
     d: float
@@ -108,30 +108,30 @@ class Balance:
         """`<p, A p>/2 - <p, h + d>`, with `h + d = A p - g`: no large numbers where h has a large offset."""
         return self.gaps - self.energy
 
-    def settled(self) -> "Balance":
+    def settled(self) -> "Iterate":
         """The same iterate, for the d at which `<p, g> = 0`, but for the rounding of d."""
         d = self.d + self.gaps / self.load
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load)
 
 
 def certify(
-    slab: Slab, p: Array, u: Array, h: Array, balance: Balance, mean: float | None, height: float, working: Array
+    slab: Slab, p: Array, u: Array, h: Array, iterate: Iterate, mean: float | None, height: float, working: Array
 ) -> tuple[float, float, Certificate]:
     """Mark the working set of a pressure and its image u; its size, its sum of gaps, and the certificate; collective.
 
     `mean` is the mean pressure asked for, None with a given approach; `height` what gaps are compared with.
     """
-    *sums, deepest = kernels.certify(p, u, h, balance.d, working)
+    *sums, deepest = kernels.certify(p, u, h, iterate.d, working)
     wrong, members, excess, deepest = slab.reduce(sums, [deepest])
-    complementarity = wrong / (balance.load or 1.0) / height
-    load = 0.0 if mean is None else abs(balance.load / slab.points / mean - 1.0)
+    complementarity = wrong / (iterate.load or 1.0) / height
+    load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
     return members, excess, Certificate(complementarity, max(deepest / height, 0.0), load)
 
 
-def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Balance:
+def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:
     """A pressure and its image u in numbers, for an approach d; collective."""
     load, work, gaps = slab.sum(*kernels.weigh(p, u, h, d))
-    return Balance(d, load, gaps, 0.5 * work)
+    return Iterate(d, load, gaps, 0.5 * work)
 
 
 class ContactSolver:
@@ -155,7 +155,7 @@ class ContactSolver:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
         self.dtype = dtype
-        self._rounding = ROUND_OFF * float(np.finfo(dtype).eps)
+        self._rounding = UNSEEN_RISE * float(np.finfo(dtype).eps)
         self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
         self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
         self._working = slab.zeros(np.bool_)
@@ -178,19 +178,19 @@ class ContactSolver:
             return self._separate(h, start)
         centred = mean is not None
         p, other = start, self._other
-        balance = self._begin(p, h, control)
+        iterate = self._begin(p, h, control)
         best, old_product, iteration = (np.inf, 0), 0.0, 0
         while True:
-            members, excess, certificate = self._certify(p, h, balance, mean)
+            members, excess, certificate = self._certify(p, h, iterate, mean)
             best = min(best, (certificate.worst, iteration))
             failure = self._verdict(certificate.worst, iteration, *best)
             if failure is not None:
                 if p is not start:
                     start[...] = p
-                return Contact(start, self._u, balance.d, certificate, iteration, failure)
-            level = balance.d + (excess / members if centred else 0.0)
+                return Contact(start, self._u, iterate.d, certificate, iteration, failure)
+            level = iterate.d + (excess / members if centred else 0.0)
             slope, old_product = self._turn(h, level, old_product, members, centred, other)
-            balance, halvings = self._descend(p, h, balance, length * slope, mean, other)
+            iterate, halvings = self._descend(p, h, iterate, length * slope, mean, other)
             p, other = other, p
             kernels.residual(self._working, self._w, h, level, self._w)
             iteration += 1
@@ -200,10 +200,10 @@ class ContactSolver:
     def judge(self, h: Array, control: MeanPressure | Approach, p: Array, otherwise: str) -> Contact:
         """The pressure p, scaled to the load, as it is; `otherwise` is its failure unless it solves; collective."""
         mean = control.value if isinstance(control, MeanPressure) else None
-        balance = self._begin(p, h, control)
-        *_, certificate = self._certify(p, h, balance, mean)
+        iterate = self._begin(p, h, control)
+        *_, certificate = self._certify(p, h, iterate, mean)
         failure = "" if certificate.worst <= self.tolerance else otherwise
-        return Contact(p, self._u, balance.d, certificate, 0, failure)
+        return Contact(p, self._u, iterate.d, certificate, 0, failure)
 
     def displace(self, p: Array) -> Array:
         """`A p`, in a map that is valid until the next solve; collective."""
@@ -215,7 +215,7 @@ class ContactSolver:
 
     # -- the steps of a solve; `mean` is the mean pressure asked for, None with a given approach -----------------------
 
-    def _begin(self, p: Array, h: Array, control: MeanPressure | Approach) -> Balance:
+    def _begin(self, p: Array, h: Array, control: MeanPressure | Approach) -> Iterate:
         """Make the start admissible and forget the last solve's direction and residual."""
         self._t.fill(0.0)
         self._w.fill(0.0)
@@ -230,9 +230,9 @@ class ContactSolver:
             return weigh(self.slab, p, self._u, h, control.value)
         return weigh(self.slab, p, self._u, h, 0.0).settled()
 
-    def _certify(self, p: Array, h: Array, balance: Balance, mean: float | None) -> tuple[float, float, Certificate]:
+    def _certify(self, p: Array, h: Array, iterate: Iterate, mean: float | None) -> tuple[float, float, Certificate]:
         """Mark the working set; its size, its sum of gaps, and the certificate."""
-        return certify(self.slab, p, self._u, h, balance, mean, self.height, self._working)
+        return certify(self.slab, p, self._u, h, iterate, mean, self.height, self._working)
 
     def _verdict(self, worst: float, iteration: int, best: float, best_at: int) -> str | None:
         """None: go on; empty: solved; else what happened instead."""
@@ -241,8 +241,8 @@ class ContactSolver:
         if not np.isfinite(worst):
             return NOT_FINITE
         asked = f"{worst:.3g} where {self.tolerance:.3g} was asked for"
-        if iteration - best_at >= STALL:
-            return f"stalled: no better certificate than {best:.3g} in {STALL} iterations, now {asked}"
+        if iteration - best_at >= MAX_STALLED_ITERATIONS:
+            return f"stalled: no better certificate than {best:.3g} in {MAX_STALLED_ITERATIONS} iterations, now {asked}"
         if iteration >= self.max_iterations:
             return f"did not converge in max_iterations = {iteration}: the certificate is {asked}"
         return None
@@ -266,19 +266,19 @@ class ContactSolver:
         return r_z + beta * r_t, r_z
 
     def _descend(
-        self, old_p: Array, h: Array, old: Balance, slope: float, mean: float | None, p: Array
-    ) -> tuple[Balance, int]:
-        """Step from `old_p` against `_t` to p, which leaves the old displacement in `_w`; returns the new balance and
+        self, old_p: Array, h: Array, old: Iterate, slope: float, mean: float | None, p: Array
+    ) -> tuple[Iterate, int]:
+        """Step from `old_p` against `_t` to p, which leaves the old displacement in `_w`; returns the new iterate and
         how often the step was halved."""
         curvature = self.slab.sum(kernels.dot(self._t, self.operator.apply(self._t, self._w)))[0]
         step = slope / curvature if curvature > 0.0 else 0.0
-        for halvings in range(HALVINGS + 1):
+        for halvings in range(MAX_HALVINGS + 1):
             load, cut = self.slab.sum(*kernels.advance(old_p, self._t, step, p))
             if cut and mean is not None:
                 kernels.scale(p, mean * self.slab.points / load)
             self._u, self._w = self.operator.apply(p, self._w), self._u
             new = weigh(self.slab, p, self._u, h, old.d)
-            if new.f - old.f <= self._rounding * new.energy or halvings == HALVINGS:
+            if new.f - old.f <= self._rounding * new.energy or halvings == MAX_HALVINGS:
                 break
             self._u, self._w = self._w, self._u
             step *= 0.5

@@ -4,7 +4,7 @@ On the working set c (pressure, or penetration) of an admissible pressure x, a s
 residual t and the last two changes of x, as far along each as makes the sum of squares of `C R (A x - h)` smallest (R:
 values on c, C: subtract the mean over c). Then what has become negative is put to 0, the load is restored, and A is
 applied anew, so that the changes that are kept have exact images. A need not be symmetric. Nothing is guaranteed: where
-a residual has nothing in common with the image of its own t, steps stop to help, and the caller has to notice.
+a residual has nothing in common with the image of its own t, steps no longer help, and the caller has to notice.
 """
 
 import numpy as np

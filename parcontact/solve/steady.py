@@ -2,7 +2,7 @@
 
 Find p >= 0 with mean P0 and `g = A p - h - d >= 0`, `p g = 0`, where A is positive but, for a lossy body sliding at a
 constant velocity, not symmetric: there is no energy to minimize. Projected steps (`projected`) come first: they are
-cheap, three applications of A or K each, and reach most solutions. Where they stop to help, an active set with an
+cheap, three applications of A or K each, and reach most solutions. Where they no longer help, an active set with an
 inexact linear solve goes on:
 
 1. on the set c, with x = 0 elsewhere, a few generalized conjugate residuals towards `A x - h = d` under the load;
@@ -26,9 +26,9 @@ from .contact import Certificate, Operator, certify, weigh
 from .gcr import Directions, gaps_on
 from .projected import Projected
 
-HALVING = 20  # projected steps in which the certificate must halve
+MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.01, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
-PATIENCE = 25  # changes of the set without coming nearer to a solution after which a solve gives up
+MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which a solve gives up
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class SteadySolver:
         d, certificate = self._certify(p, h, mean)
         best, since, steps = certificate.worst, 0, 0
         self._projected.begin()
-        while certificate.worst > self.tolerance and since < HALVING:
+        while certificate.worst > self.tolerance and since < MAX_STEPS_TO_HALVE:
             self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
             d, certificate = self._certify(p, h, mean)
             steps += 1
@@ -135,7 +135,7 @@ class SteadySolver:
                 guess = certificate.worst
             since = 0 if guess < best else since + 1
             best = min(best, guess)
-            if not np.isfinite(guess) or since >= PATIENCE or steps >= self.max_steps:
+            if not np.isfinite(guess) or since >= MAX_STALLED_SETS or steps >= self.max_steps:
                 self._admit(x, mean)
                 d, certificate = self._certify(x, h, mean)
                 failure = self._failure(certificate, since, steps)
@@ -144,7 +144,9 @@ class SteadySolver:
     def _failure(self, certificate: Certificate, since: int, steps: int) -> str:
         if certificate.worst <= self.tolerance:
             return ""
-        reason = f"no progress in {since} sets" if since >= PATIENCE else f"not converged in {steps} linear steps"
+        reason = (
+            f"no progress in {since} sets" if since >= MAX_STALLED_SETS else f"not converged in {steps} linear steps"
+        )
         return f"{reason}: certificate {certificate.worst:.3g}"
 
     def _next_set(self, x: Array, h: Array) -> float:
@@ -164,9 +166,9 @@ class SteadySolver:
 
     def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, whose set is marked."""
-        balance = weigh(self.slab, p, self._u, h, 0.0).settled()
-        *_, certificate = certify(self.slab, p, self._u, h, balance, mean, self.height, self._working)
-        return balance.d, certificate
+        iterate = weigh(self.slab, p, self._u, h, 0.0).settled()
+        *_, certificate = certify(self.slab, p, self._u, h, iterate, mean, self.height, self._working)
+        return iterate.d, certificate
 
 
 @loop

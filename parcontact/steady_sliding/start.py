@@ -8,7 +8,7 @@ from ..job import Job
 from ..march.state import State
 from ..march.step import March
 from ..parallel.slab import Slab
-from ..physics.body import Zener
+from ..physics.body import ZenerBody
 from ..record.checkpoint import Contents
 from ..scene import build
 from .sliding import SteadySliding
@@ -39,7 +39,7 @@ def begin(march: March) -> None:
     point = sliding.solve(initial.velocity, initial.pressure or 0.0)
     contact = sliding.contact
     assert contact is not None
-    if isinstance(scene.material, Zener):
+    if isinstance(scene.material, ZenerBody):
         scene.material.begin_with(contact.u, sliding.branch_maps(initial.velocity))
     row = replace(
         march.row,

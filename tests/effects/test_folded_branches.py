@@ -18,7 +18,7 @@ from parcontact.effects.folded_branches import bands, fold_branches_of, phases
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import Zener
+from parcontact.physics.body import ZenerBody
 from parcontact.physics.folding import Band, Phase
 from parcontact.run import runner
 
@@ -108,7 +108,7 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     numerics = {"branch_error": 0.0, "tolerance": 1e-7}
     marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
     base = marches[1].scene.frame
-    marches[1].scene.material = Zener(base.slab, base.prony, "exponential", base.dtype, frozen=[1])
+    marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", base.dtype, frozen=[1])
     timeline = list(base.job.timeline())
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
     wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]
@@ -139,8 +139,8 @@ def test_a_steady_start_freezes_nothing() -> None:
         for allowed in (1e-3, 0.0)
     )
     assert (fewer.folded.memoryless, fewer.folded.frozen) == ((0,), ())
-    assert isinstance(fewer.material, Zener)
-    assert isinstance(whole.material, Zener)
+    assert isinstance(fewer.material, ZenerBody)
+    assert isinstance(whole.material, ZenerBody)
     assert_array_equal(fewer.material.branches, whole.material.branches[1:])
 
 

@@ -7,11 +7,11 @@ from numpy.testing import assert_allclose
 from rubbers import complex_modulus
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.body import Heights, Zener
+from parcontact.physics.body import Heights, ZenerBody
 from parcontact.physics.energy import (
     AppliedInverse,
-    Balance,
     ElasticEnergy,
+    EnergyBalance,
     Pressed,
     ZenerEnergy,
     bend_weights,
@@ -55,11 +55,11 @@ class Driven:
 
     def __init__(self, integrator: Integrator) -> None:
         slab = Slab(MPI.COMM_SELF, 4, 1)
-        self.zener = Zener(slab, BODY, integrator)
+        self.zener = ZenerBody(slab, BODY, integrator)
         self.energy = ZenerEnergy(slab, self.zener, AppliedInverse(Identity(), slab.empty))
         self.p, self.alpha = slab.zeros(), 1.0
 
-    def to(self, u: Array, dt: float) -> Balance:
+    def to(self, u: Array, dt: float) -> EnergyBalance:
         heights = Heights(u.reshape(1, 4))
         trial = self.zener.begin(dt, heights)
         p, alpha = trial.effective.copy(), trial.alpha
@@ -172,7 +172,7 @@ def test_sums_go_over_all_ranks(comm: MPI.Intracomm) -> None:
     elastic = ElasticEnergy(slab)
     elastic.advance(0.0, Pressed(p, 0.5), Pressed(p, 0.5), u)
     assert elastic.balance.work == elastic.balance.stored == 0.5 * 0.5 * 6.0 * 12
-    zener = Zener(slab, BODY, "exponential")
+    zener = ZenerBody(slab, BODY, "exponential")
     energy = ZenerEnergy(slab, zener, AppliedInverse(Identity(), slab.empty))
     trial = zener.begin(0.0, Heights(u))
     zener.commit(trial, trial.effective.copy())

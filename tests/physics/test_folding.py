@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rubbers import complex_modulus
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import Heights, Zener
+from parcontact.physics.body import Heights, ZenerBody
 from parcontact.physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from parcontact.physics.prony import Integrator, Prony, creep, normal_form
 from parcontact.theory import full_contact
@@ -77,7 +77,7 @@ def test_creep_with_frozen_branches() -> None:
 # -- memoryless branches against all branches --------------------------------------------------------------------------
 
 
-def stresses(body: Zener, moments: list[tuple[float, float]]) -> Array:
+def stresses(body: ZenerBody, moments: list[tuple[float, float]]) -> Array:
     """The pressure of a point whose displacement is prescribed, a (dt, u) per step."""
     found = []
     for dt, u in moments:
@@ -126,10 +126,10 @@ def test_stress_of_a_wave_without_the_memory_of_a_branch(history: str, integrato
     errors = np.array(fold_branches(DECADES, phases, [WAVE], integrator, 1.0).memoryless_errors)
     modulus = complex_modulus(1.0, *DECADES)
     moments = displacements(dt, steps)
-    whole = stresses(Zener(POINT, DECADES, integrator), moments)
+    whole = stresses(ZenerBody(POINT, DECADES, integrator), moments)
     shares = []
     for k in range(6):
-        fewer = stresses(Zener(POINT, DECADES, integrator, memoryless=[k]), moments)
+        fewer = stresses(ZenerBody(POINT, DECADES, integrator, memoryless=[k]), moments)
         wrong = np.max(np.abs(fewer - whole)) / size * (1.0 / modulus.imag + 1.0 / abs(modulus))
         shares.append(wrong / max(errors[k], 1e-14))  # 1e-14: rounding, where exp(-z) is less
     assert max(shares) <= 1.0
@@ -141,9 +141,11 @@ def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
     dt = 1e-4
     errors = fold_branches(DECADES, [Phase(1.0, dt, dt, (0.0, 0.0), jump=True)], [WAVE], "exponential", 1.0)
     held = [(0.0, 1.0), (dt, 1.0), (dt, 1.0)]
-    whole, fewer = (stresses(Zener(POINT, DECADES, "exponential", memoryless=fast), held) for fast in ([], [0]))
+    whole, fewer = (stresses(ZenerBody(POINT, DECADES, "exponential", memoryless=fast), held) for fast in ([], [0]))
     assert whole[0] == fewer[0]
-    wrong = np.abs(fewer - whole)[1:] / Zener(POINT, DECADES, "exponential").begin(dt, Heights(np.zeros((1, 1)))).alpha
+    wrong = (
+        np.abs(fewer - whole)[1:] / ZenerBody(POINT, DECADES, "exponential").begin(dt, Heights(np.zeros((1, 1)))).alpha
+    )
     assert_allclose(wrong[0], errors.memoryless_errors[0], rtol=1e-6)
     assert wrong[1] < 1e-3 * wrong[0]
 
@@ -152,7 +154,7 @@ def test_steps_that_outgrow_stiffer_branches() -> None:
     """A stiff branch makes the modulus of the first step a thousand times the second one's; that goes to sleep long
     before. A displacement that grows with time, in steps that do: what is dropped is a part of the step's modulus."""
     prony, steps = normal_form(1e3, [1e9, 1e6], [1.0, 1e6]), 10.0 ** np.arange(0, 8)
-    whole, fewer = (Zener(POINT, prony, "exponential", memoryless=fast) for fast in ([], [1]))
+    whole, fewer = (ZenerBody(POINT, prony, "exponential", memoryless=fast) for fast in ([], [1]))
     moments = [(dt, float(time)) for dt, time in zip(steps, np.cumsum(steps), strict=True)]
     moduli = [whole.begin(dt, Heights(np.zeros((1, 1)))).alpha for dt in steps]
     wrong = np.abs(stresses(fewer, moments) - stresses(whole, moments)) / moduli / np.cumsum(steps)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from rubbers import relaxation
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import Elastic, Heights, Zener
+from parcontact.physics.body import ElasticBody, Heights, ZenerBody
 from parcontact.physics.prony import Integrator, Prony, creep, normal_form, zener_to_prony
 from parcontact.physics.units import Units
 
@@ -22,11 +22,11 @@ DT = 0.5e-3
 INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
 
 
-def body(prony: Prony, integrator: Integrator = "exponential") -> Zener:
-    return Zener(POINT, normal_form(*prony), integrator)
+def body(prony: Prony, integrator: Integrator = "exponential") -> ZenerBody:
+    return ZenerBody(POINT, normal_form(*prony), integrator)
 
 
-def push(body: Zener, u: float, dt: float) -> float:
+def push(body: ZenerBody, u: float, dt: float) -> float:
     """Prescribe the displacement of a point; returns its total pressure."""
     heights = Heights(np.full((1, 1), u))
     trial = body.begin(dt, heights)
@@ -35,7 +35,7 @@ def push(body: Zener, u: float, dt: float) -> float:
     return float(trial.alpha * displacement[0, 0])
 
 
-def load(body: Zener, p: float, dt: float) -> float:
+def load(body: ZenerBody, p: float, dt: float) -> float:
     """Prescribe the total pressure of a point; returns its displacement."""
     heights = Heights(np.zeros((1, 1)))
     trial = body.begin(dt, heights)
@@ -43,7 +43,7 @@ def load(body: Zener, p: float, dt: float) -> float:
     return float(body.u[0, 0])
 
 
-def branch(body: Zener, k: int) -> float:
+def branch(body: ZenerBody, k: int) -> float:
     """The part of branch k of the pressure."""
     body.settle()
     return float(body.branches[k, 0, 0])
@@ -190,7 +190,7 @@ def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
     """A map and an offset stand for the moved map; rounding of heights of size 1."""
     slab, rng = Slab(MPI.COMM_SELF, 6, 4), np.random.default_rng(1)
     base, prony = rng.normal(size=slab.shape), normal_form(*TWO)
-    first, second = Zener(slab, prony, integrator), Zener(slab, prony, integrator)
+    first, second = ZenerBody(slab, prony, integrator), ZenerBody(slab, prony, integrator)
     for offset, dt in ((0, 0.0), (1, 1e-3), (5, 1e-3), (7, 2e-3), (-1, 1e-4)):
         here = Heights(np.roll(base, offset, axis=1))
         trial, same = first.begin(dt, here), second.begin(dt, Heights(base, offset))
@@ -204,7 +204,7 @@ def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
 
 def test_elastic_heights() -> None:
     slab = Slab(MPI.COMM_SELF, 5, 2)
-    base, made = np.arange(10.0).reshape(2, 5), Elastic(slab, 3.0)
+    base, made = np.arange(10.0).reshape(2, 5), ElasticBody(slab, 3.0)
     assert made.begin(0.0, Heights(base)).effective is base
     trial = made.begin(1.0, Heights(base, 2))
     assert trial.alpha == 3.0
@@ -233,5 +233,5 @@ def test_state_restores_the_same_digits() -> None:
 def test_memory_is_one_map_per_branch_and_two() -> None:
     """The last displacement, and the buffer in which effective heights and increments take turns."""
     slab = Slab(MPI.COMM_SELF, 32, 16)
-    material = Zener(slab, normal_form(*TWO), "exponential")
+    material = ZenerBody(slab, normal_form(*TWO), "exponential")
     assert slab.tally["map bytes"] == (len(material.branches) + 2) * 32 * 16 * 8

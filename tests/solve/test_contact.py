@@ -327,7 +327,7 @@ def test_without_halving_steps_it_may_cycle(
     assert guarded.converged
     gap = np.array(matrix) @ guarded.p[0] - h[0] - guarded.d
     assert gap.min() > -1e-7
-    monkeypatch.setattr(contact, "HALVINGS", 0)
+    monkeypatch.setattr(contact, "MAX_HALVINGS", 0)
     assert "stalled" in attempt().failure
 
 

@@ -14,7 +14,7 @@ from parcontact.job import Job
 from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.body import Zener
+from parcontact.physics.body import ZenerBody
 from parcontact.record.row import Row
 
 Json = dict[str, Any]
@@ -61,7 +61,7 @@ class Periods:
     def __call__(self, march: March) -> None:
         if march.row.step > 1 and (march.row.step - 1) % PERIOD == 0:
             material = march.scene.material
-            assert isinstance(material, Zener)
+            assert isinstance(material, ZenerBody)
             material.settle()
             units = march.scene.units
             maps = [march.field("displacement"), *(units.modulus * units.height * value for value in material.branches)]

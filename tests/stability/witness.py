@@ -88,7 +88,7 @@ class Witness:
         slab, numerics = march.scene.slab, march.scene.job.numerics
         p, u, gap = (march.field(name) for name in ("pressure", "displacement", "gap"))
         finite = all(np.isfinite(values).all() for values in (p, u, gap))
-        heights = march.scene.path.at(step.position).base * march.scene.units.height
+        heights = march.scene.motion.at(step.position).base * march.scene.units.height
         load, wrong, tension, deepest, *sizes, infinite = slab.reduce(
             [float(p.sum()), float((p * np.abs(gap)).sum())],
             [*(float(a.max(initial=0.0)) for a in (-p, -gap, np.abs(u), np.abs(heights))), float(not finite)],
@@ -148,7 +148,7 @@ class Witness:
         if step.control == "approach":
             return False
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
-        alpha = scene.material.begin(step.dt, scene.path.at(step.position)).alpha
+        alpha = scene.material.begin(step.dt, scene.motion.at(step.position)).alpha
         strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
         return DIGITS * EPS * strain * max(grid.lx, grid.ly) > scene.job.numerics.tolerance * scene.frame.height
 
