@@ -112,7 +112,9 @@ def of_loads(grid: Grid, material: Elastic | Zener, history: tuple[Stage | None,
                 yield _fault(at, "an approach", load, "m")
                 break
             pressure = load / area if stage.control == "force" else load
-            if stage.control != "approach" and (_outside(pressure) or _outside(pressure / modulus)):
+            if (
+                stage.control != "approach" and max(pressure, pressure / modulus) > LARGEST
+            ):  # next to nothing is nothing
                 yield _fault(at, "a mean pressure over the shear modulus", pressure / modulus, "")
                 break
 
