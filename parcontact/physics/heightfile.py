@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import h5py
@@ -17,7 +18,10 @@ MANY_TIMES = 4  # as many rows as the grid has: then no more are counted
 MAX_LINKS = 30  # from a name in an HDF5 file to what it means
 HEADER_BYTES = 1_000_000  # of a .npy file
 LOWEST, HIGHEST = 1e-70, 1e70  # of the largest height: its fourth power is a number of double precision
-FAILURES = (OSError, ValueError, TypeError, KeyError, RuntimeError, OverflowError, MemoryError)  # of numpy and h5py
+FAILURES = (
+    *(OSError, ValueError, TypeError, KeyError, RuntimeError, OverflowError, MemoryError),
+    *(SyntaxError, TokenError, EOFError),  # numpy reads a header as Python
+)
 
 
 def read(path: Path, dataset: str, slab: Slab) -> Array:

@@ -144,7 +144,16 @@ def test_a_directory(comm: MPI.Intracomm, shared_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["npy", "h5"])
-@pytest.mark.parametrize("content", [b"", b"no such format\n", b"\x93NUMPY\x01\x00"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"no such format\n",
+        b"\x93NUMPY\x01\x00",
+        b"\x93NUMPY\x01\x00\x08\x00{'a': ((",
+        b"\x93NUMPY\x01\x00\x02\x00)(",
+    ],
+)
 def test_unreadable(comm: MPI.Intracomm, shared_path: Path, kind: str, content: bytes) -> None:
     path = made(comm, shared_path / f"map.{kind}", lambda path: path.write_bytes(content))
     assert "cannot be read: " in complaint(comm, path)
