@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Jobs and files that nobody would write: each must run, or end in a sentence, soon, in little memory, and leave nothing.
+"""Jobs and files that nobody would write: each must run, or end in a sentence, soon, in little memory, without a trace.
 
     .venv/bin/python scripts/fuzz_jobs.py [--jobs 2000] [--seed 0] [--from 0] [--processes 60]
 
