@@ -41,6 +41,21 @@ def test_peak_of_friction_is_named(tmp_path: Path, drawn: list[Figure]) -> None:
     assert "stage 1" in texts
 
 
+def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Where theory.csv is, friction and contact area have its line, over what the run is drawn over."""
+    out = ran(tmp_path, WAVE + ZENER + SLIDE)
+    text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e3,0.0,0.5\n1.0,2e-3,1e3,0.25,0.75\n"
+    (out / "theory.csv").write_text(text)
+    plots.plot([out])
+    friction, area, *others = drawn[0].axes
+    lines = {axes.get_ylabel(): {str(line.get_label()): line for line in axes.get_lines()} for axes in (friction, area)}
+    for found, values in zip(lines.values(), ([0.0, 0.25], [0.5, 0.75]), strict=True):
+        assert np.allclose(found["theory"].get_ydata(), values)
+        assert np.allclose(np.array(found["theory"].get_xdata())[0], 0.0)
+        assert "simulation" in found
+    assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
+
+
 def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:
     """A row that is being written does not count, nor do maps that are not there yet."""
     out = ran(tmp_path, KINDS["creep"][0])

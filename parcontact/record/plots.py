@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from ..errors import InputError
 from . import hdf5
-from .pictures import charts, histories, movie, steady, style
+from .pictures import charts, histories, movie, steady, style, sweep
 from .pictures.charts import Chart
 from .pictures.maps import maps
 from .pictures.run import Panel, Run
@@ -97,6 +97,8 @@ def _picture(directory: Path, options: Options) -> Figure:
         groups = [_panels(found, options), maps(run) if _wanted("maps", options) else []]
     if (directory / steady.TABLE).is_file() and _wanted("steady", options):
         groups.insert(1, _steady(directory, options))
+    if (directory / sweep.TABLE).is_file():
+        groups.append(_panels(_chosen(sweep.charts(directory), options), options))
     elif not groups:
         raise InputError(
             f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"

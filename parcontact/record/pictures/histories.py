@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...parallel.slab import Array
+from .. import measures
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 from .run import Run
@@ -41,7 +42,21 @@ def charts(run: Run, over: str = "") -> list[Chart]:
         return []
     along = _abscissa(run, over)
     changes: dict[str, Any] = {"stages": along.stages, "spikes": not along.marked}
-    return [replace(chart, **changes, named=number == 0) for number, chart in enumerate(_charts(run, along))]
+    found = [replace(chart, **changes, named=number == 0) for number, chart in enumerate(_charts(run, along))]
+    return found if along.marked else [_beside_theory(chart, run) for chart in found]
+
+
+def _beside_theory(chart: Chart, run: Run) -> Chart:
+    """Friction and contact area with the lines of theory.csv, if that is in the directory of the run."""
+    column = {"friction": "friction", "area": "contact_area"}.get(chart.key)
+    table = run.directory / "theory.csv"
+    if column is None or run.backwards or not table.is_file():
+        return chart
+    theory = {name: np.array(values) for name, values in measures.read(table).items()}
+    over = "distance" if chart.x.unit == "m" else "time"
+    (own,) = chart.series
+    beside = Series("theory", theory[over], theory[column], style.line(1))
+    return replace(chart, series=[replace(own, name="simulation"), beside])
 
 
 def _charts(run: Run, along: Abscissa) -> Iterator[Chart]:
