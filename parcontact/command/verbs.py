@@ -179,6 +179,31 @@ def study(options: argparse.Namespace) -> int:
     return runner.run(job, make, Slab(world, *job.grid.points), options.quiet)
 
 
+def surface(options: argparse.Namespace) -> int:
+    """Root's work alone: maps are whole."""
+    world = ranks.start()
+    from pathlib import Path
+
+    from .. import rigid_surface
+    from ..parallel.fft import FFT
+    from ..parallel.mpi import MPI
+    from ..parallel.slab import Slab
+    from ..record import surfaces
+
+    picture, options.out = Path(options.out or f"{Path(options.job).stem}-surface.png"), None
+    job = _load(options, world)
+
+    def act() -> list[str]:
+        slab = Slab(MPI.COMM_SELF, *job.grid.points)
+        made, told = rigid_surface.make_surface(job, FFT(slab))
+        return list(surfaces.describe(job, made.heights((0.0, 0.0), slab.empty()), told, picture))
+
+    lines = ranks.on_root(world, act)
+    if world.rank == 0:
+        print("\n".join(lines))
+    return DONE
+
+
 def info(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..record import info as about

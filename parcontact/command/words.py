@@ -13,7 +13,7 @@ from .. import __version__
 from ..errors import InputError
 from . import ranks, verbs
 
-VERBS = ("run", "steady", "check", "plan", "theory", "fit", "study", "info", "plot", "doctor")
+VERBS = ("run", "steady", "check", "plan", "theory", "fit", "surface", "study", "info", "plot", "doctor")
 FIRST = """\
 a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
 
@@ -141,6 +141,10 @@ def _parser() -> argparse.ArgumentParser:
     _job_arguments(study)
     study.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     study.set_defaults(act=verbs.study)
+
+    surface = found.add_parser("surface", help="say what the surface of a job is like, and draw it")
+    _job_arguments(surface)
+    surface.set_defaults(act=verbs.surface)
 
     info = found.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
     info.add_argument("file", type=Path)

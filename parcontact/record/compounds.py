@@ -27,7 +27,8 @@ def write(compound: Compound, target: Path, job_band: tuple[float, float] | None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         files.write(target, text)
-        pictures.draw(compound, picture, job_band)
+        with files.replaced(picture) as file:
+            pictures.draw(compound, file, job_band)
     except OSError as error:
         raise RunError(f"{target} cannot be written: {error}") from error
     yield from (line.removeprefix("# ") for line in text.splitlines() if line.startswith("#"))

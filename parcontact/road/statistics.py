@@ -17,7 +17,8 @@ from ..parallel.slab import Array
 
 BINS = 12  # per decade of wavenumbers
 FEWEST = 5  # bins that a Hurst exponent is fitted to
-STEADY = 0.35  # rms of the logarithm around a power law above which there is no self-affine range
+STEADY = 0.3  # rms of the logarithm around a power law above which a range is not self-affine
+FLAT = -1.0  # slope above which a range is the plateau of long waves
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,14 @@ def _along(power: Array, length: float) -> tuple[Array, Array]:
 
 
 def _hurst(q: Array, psd: Array) -> float:
-    """From the slope of log C2 over log q, -2 (1 + H), over the upper two thirds of its range."""
-    used = (psd > 0.0) & (q > q[0] * (q[-1] / q[0]) ** (1 / 3))
-    if used.sum() < FEWEST:
-        return math.nan
-    x, y = np.log(q[used]), np.log(psd[used])
-    slope, offset = np.polyfit(x, y, 1)
-    steady = float(np.sqrt(np.mean((y - slope * x - offset) ** 2))) < STEADY
-    return float(-slope / 2.0 - 1.0) if steady else math.nan
+    """From the slope of log C2 over log q, -2 (1 + H), in the widest range that is a power law."""
+    x, y = np.log(q[psd > 0.0]), np.log(psd[psd > 0.0])
+    best, found = 0.0, math.nan
+    for first in range(x.size - FEWEST):
+        for last in range(first + FEWEST, x.size + 1):
+            part = slice(first, last)
+            slope, offset = np.polyfit(x[part], y[part], 1)
+            steady = float(np.sqrt(np.mean((y[part] - slope * x[part] - offset) ** 2))) < STEADY
+            if steady and slope < FLAT and x[last - 1] - x[first] > best:
+                best, found = float(x[last - 1] - x[first]), float(-slope / 2.0 - 1.0)
+    return found

@@ -1,7 +1,10 @@
 """A measured road in a job: the truth comes back, on any number of ranks, and mistakes name their key."""
 
+import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import matplotlib.image
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -12,6 +15,9 @@ from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 
 from . import truth
+
+if TYPE_CHECKING:
+    from conftest import RunParcontact
 
 LENGTH, POINTS, SLOPE = 1e-3, 192, 0.05
 JOB = """
@@ -113,3 +119,17 @@ def test_mistakes_name_their_key(road: Path, more: str, sentence: str) -> None:
         jobs.load(road / "job.yaml")
     assert sentence in str(failure.value)
     assert ":3:" in str(failure.value)
+
+
+def test_the_verb_surface(road: Path, run_parcontact: "RunParcontact") -> None:
+    """What it says is what the truth has; its picture is one; two ranks speak once."""
+    (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=""))
+    done = run_parcontact(["surface", "job.yaml", "--out", "road.png"], ranks=2, cwd=road)
+    assert done.returncode == 0, done.stderr
+    assert "missing points (2" in done.stdout or "missing points (1.9" in done.stdout
+    (slope,) = re.findall(r"rms slope +(\S+)", done.stdout)
+    assert float(slope) == pytest.approx(SLOPE, rel=0.05)
+    assert matplotlib.image.imread(road / "road.png").shape[:2] == (900, 1160)
+    refused = run_parcontact(["surface", "job.yaml", "--out", "road.doc"], ranks=0, cwd=road)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("parcontact: --out must end in .png, .pdf, .svg")

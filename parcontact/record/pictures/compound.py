@@ -1,7 +1,7 @@
 """A picture of a fitted compound: moduli moved to the reference temperature, the fit, what it misses, the shift."""
 
 from collections.abc import Iterator
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,8 +16,8 @@ STORAGE, LOSS, BAND = style.BLUE, style.RED, "#999999"
 POINTS = 400  # of a line
 
 
-def draw(compound: Compound, picture: Path, job_band: tuple[float, float] | None = None) -> None:
-    """Write the picture; `job_band` [Hz] are the frequencies that a job excites."""
+def draw(compound: Compound, file: BinaryIO, job_band: tuple[float, float] | None = None) -> None:
+    """Write a png; `job_band` [Hz] are the frequencies that a job excites."""
     figure = Figure(figsize=(8, 6), layout="constrained")
     top, bottom = figure.subplots(2, 2, width_ratios=(2, 1))
     _moduli(top[0], compound)
@@ -31,7 +31,7 @@ def draw(compound: Compound, picture: Path, job_band: tuple[float, float] | None
     _shift(bottom[1], compound)
     for axes in (*top, *bottom):
         axes.grid(alpha=0.3)
-    figure.savefig(picture, dpi=150)
+    figure.savefig(file, dpi=150, format="png")
 
 
 def _reduced(compound: Compound) -> Iterator[tuple[Set, np.ndarray]]:
