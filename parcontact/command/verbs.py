@@ -198,7 +198,7 @@ def surface(options: argparse.Namespace) -> int:
         made, told = rigid_surface.make_surface(job, FFT(slab))
         return list(surfaces.describe(job, made.heights((0.0, 0.0), slab.empty()), told, picture))
 
-    lines = ranks.on_root(world, act)
+    lines = on_root(world, act)
     if world.rank == 0:
         print("\n".join(lines))
     return DONE
