@@ -10,13 +10,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from parcontact import scene
 from parcontact.job import Job, load
 from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
-from parcontact.steady_sliding import start as steadystart
+from parcontact.steady_sliding import start
 
 # the paper's Hertz material as one Maxwell branch beside the long-term spring: modulus 2.75 MPa at once, a tenth of it
 # in the end, relaxation time 1 ms, creep time 10 ms
@@ -47,10 +46,7 @@ def example(name: str, *overrides: str) -> Job:
 def begun(data: dict[str, Any] | Job, comm: MPI.Intracomm = MPI.COMM_SELF) -> March:
     """A march at the start of a job."""
     job = data if isinstance(data, Job) else Job.model_validate(data)
-    march = March(scene.build(job, Slab(comm, *job.grid.points)))
-    if job.initial.state == "steady":
-        steadystart.begin(march)
-    return march
+    return start.first(job, Slab(comm, *job.grid.points))
 
 
 def marched(

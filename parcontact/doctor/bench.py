@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import scene
 from ..job import Job
 from ..job.timeline import Step
 from ..march.step import March
 from ..parallel.slab import Array, Slab
 from ..record.row import Row
-from ..steady_sliding import start as steadystart
+from ..steady_sliding import start
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -75,10 +74,8 @@ class Bench:
         if self.single:
             numerics["tolerance"] = max(numerics["tolerance"], SINGLE_TOLERANCE)
         job = Job.model_validate({**data, "numerics": numerics})
-        march = March(scene.build(job, Slab(self.comm, *job.grid.points)))
-        if job.initial.state == "steady":
-            steadystart.begin(march)
-            self._note(march.row)
+        march = start.first(job, Slab(self.comm, *job.grid.points))
+        self._note(march.row)
         return march
 
     def march(self, data: Json, *watches: Watch) -> tuple[March, list[Row]]:

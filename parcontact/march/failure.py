@@ -1,16 +1,20 @@
 """What to say of a step that failed: what happened, where, and what to change."""
 
+import math
 from collections.abc import Iterator
+from dataclasses import asdict
 
 import numpy as np
 
 from ..errors import RunError
 from ..job.timeline import Step
 from ..parallel.slab import Array
+from ..physics.ledger import Measures
 from ..scene import Scene
 from ..solve.contact import Contact
 
 ROUNDINGS = 4.0  # of the largest length, over the surface's height: no certificate is sure to be better
+FINITE = "look for heights, loads or moduli that are not finite or too far apart"
 LONG = 1.5  # cells that a surface moves in a long step
 
 
@@ -20,6 +24,12 @@ class StepError(RunError):
 
 def where(scene: Scene, step: Step) -> str:
     return f"step {step.number} at t = {step.time:g} s (stage {scene.job.history[step.stage].name!r})"
+
+
+def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
+    """A step whose solve meets its conditions, and whose results are no numbers all the same."""
+    wrong = ", ".join(name for name, value in asdict(measures).items() if not math.isfinite(value))
+    return StepError(f"{where(scene, step)}: {wrong} would not be finite; {FINITE}")
 
 
 def of_solve(
@@ -38,7 +48,7 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
     """What may help, the likeliest first; collective up to its end."""
     numerics = scene.job.numerics
     if not np.isfinite(last.certificate.worst):
-        yield "look for heights, loads or moduli that are not finite or too far apart"
+        yield FINITE
         return
     reach, sharp = _reach(scene, last, h), _sharp(scene, h)
     if numerics.tolerance < reach:

@@ -57,6 +57,8 @@ class March:
         measures = scene.ledger.measures(
             contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
         )
+        if not measures.finite:
+            raise failure.not_finite(scene, step, measures)
         scene.material.commit(trial, contact.u)
         if scene.energy is not None:
             now, before = Pressed(contact.p, trial.alpha), Pressed(old.pressure, old.alpha)

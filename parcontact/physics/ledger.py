@@ -8,7 +8,7 @@ ratio of the sides of a cell: to stretch a map along x stretches its edges and t
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
@@ -43,6 +43,11 @@ class Measures:
     at_edge: bool = False
     normal_force: float = 0.0
     friction_interface: float = 0.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether all of them are numbers."""
+        return all(map(math.isfinite, astuple(self)))
 
     @property
     def friction_x(self) -> float:

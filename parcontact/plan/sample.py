@@ -14,14 +14,13 @@ from functools import partial
 from itertools import islice
 
 from .. import scene
-from ..effects import decisions
 from ..errors import RunError
 from ..job import Job
 from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
-from ..steady_sliding import start as steadystart
+from ..steady_sliding import start
 from ..steady_sliding.curve import request
 from ..steady_sliding.sliding import SteadySliding
 
@@ -123,9 +122,7 @@ def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]
     """Seconds that the scene took, and the stages of the history; collective."""
     began = time.perf_counter()
     numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
-    march = March(scene.build(job.model_copy(update={"numerics": numerics}), slab))
-    if decisions.steady_start(job).on:
-        steadystart.begin(march)
+    march = start.first(job.model_copy(update={"numerics": numerics}), slab)
     building = time.perf_counter() - began
     return building, _try(march, job.timeline(), seconds)
 

@@ -88,6 +88,8 @@ class SteadySliding:
         self._remember(contact, speed, pressure)
         heights = self.levels[0].heights
         measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
+        if not measures.finite:
+            raise RunError(f"steady sliding at {speed:g} m/s under {pressure:g} Pa: its results would not be finite")
         lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
         seconds = time.perf_counter() - began
         return Point(velocity, pressure, measures, contact.certificate, calls, contact.sets, seconds, lost)

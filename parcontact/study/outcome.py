@@ -8,14 +8,13 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 
 from .. import scene
-from ..effects import decisions
 from ..job import Job
 from ..march import loop
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..parallel.tally import Tally
 from ..record.row import Row
-from ..steady_sliding import start as steadystart
+from ..steady_sliding import start
 
 FIRST_STEPS = 2
 LAST_SHARE = 0.25  # of the last stage that slides (or lasts): its mean is taken for what has settled
@@ -50,9 +49,7 @@ def warm_up(job: Job, slab: Slab) -> None:
 
 def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
     """March through a job, writing nothing; None if `stopped` says so after a step; collective."""
-    marching = March(scene.build(job, slab))
-    if decisions.steady_start(job).on:
-        steadystart.begin(marching)
+    marching = start.first(job, slab)
     rows: list[Row] = []
 
     def note(state: March) -> bool:

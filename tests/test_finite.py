@@ -1,0 +1,77 @@
+"""Results that are not finite never pass for results, and a certificate that is not a number is none."""
+
+import math
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from marching import begun
+from test_cli import JOB
+
+from parcontact.__main__ import main
+from parcontact.march.failure import StepError
+from parcontact.physics.ledger import Ledger, Measures
+from parcontact.solve.contact import Certificate
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.mark.parametrize("wrong", [NAN, INF])
+@pytest.mark.parametrize("place", range(3))
+def test_no_certificate(wrong: float, place: int) -> None:
+    parts = [0.0, 0.0, 0.0]
+    parts[place] = wrong
+    assert not Certificate(*parts).worst <= 1.0
+
+
+@pytest.mark.parametrize("wrong", [NAN, INF, 1e308])
+def test_heights_that_are_not_finite(wrong: float) -> None:
+    """Whatever the solver makes of them: no row, and the state is as it was."""
+    march = begun(JOB)
+    first, second = islice(march.scene.job.timeline(), 2)
+    march.advance(first)
+    before, pressure = march.row, march.field("pressure")
+    path: Any = march.scene.path
+    heights = path.at(second.position)
+    heights.parts[0][...] = wrong
+    path.at = lambda position: heights
+    with np.errstate(all="ignore"), pytest.raises(StepError):
+        march.advance(second)
+    assert march.row is before
+    assert np.array_equal(march.field("pressure"), pressure)
+
+
+@pytest.fixture
+def overflowing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measures one of which overflows, of solves that are as they should be."""
+    measures = Ledger.measures
+
+    def overflow(self: Ledger, *words: Any) -> Measures:
+        return replace(measures(self, *words), force_y=INF)
+
+    monkeypatch.setattr(Ledger, "measures", overflow)
+
+
+@pytest.mark.usefixtures("overflowing")
+def test_no_run_ends_well_with_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    assert main(["job.yaml", "--quiet"]) == 1
+    assert "step 1 at t = 0 s (stage 'press'): force_y would not be finite" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("overflowing")
+def test_no_point_of_a_curve_is_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    assert main(["steady", "job.yaml", "--velocities", "0.1,1", "--pressures", "1e4", "--quiet"]) == 1
+    said = capsys.readouterr()
+    assert (said.out + said.err).count("its results would not be finite") == 2
