@@ -35,10 +35,10 @@ def test_heights_that_are_not_finite(wrong: float) -> None:
     first, second = islice(march.scene.job.timeline(), 2)
     march.advance(first)
     before, pressure = march.row, march.field("pressure")
-    path: Any = march.scene.path
-    heights = path.at(second.position)
+    motion: Any = march.scene.motion
+    heights = motion.at(second.position)
     heights.parts[0][...] = wrong
-    path.at = lambda position: heights
+    motion.at = lambda position: heights
     with np.errstate(all="ignore"), pytest.raises(StepError):
         march.advance(second)
     assert march.row is before
