@@ -17,6 +17,7 @@ from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import Convolution
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.love import love
+from parcontact.physics.prony import Prony
 
 from .maps import coordinates, gathered, product, random_map
 
@@ -220,3 +221,15 @@ def test_wave_on_a_free_half_space_looks_periodic(comm: MPI.Intracomm) -> None:
     unbounded = gathered(free(slab, size).apply(pressure, slab.empty()), slab)[112:144, 112:144]
     wrapped = gathered(OPERATORS["love"](slab, size, 0.5).apply(pressure, slab.empty()), slab)[112:144, 112:144]
     assert_allclose(unbounded - unbounded.mean(), wrapped, atol=1e-3 * wrapped.max())
+
+
+@pytest.mark.parametrize("kernel", ["spectral", "love"])
+def test_sliding_over_an_elastic_body_is_rest(comm: MPI.Intracomm, kernel: Literal["spectral", "love"]) -> None:
+    """Without a branch the velocity does not matter, for either kernel: `A p / G`, and the inverse as at rest."""
+    slab, whole, modulus = Slab(comm, 12, 10), random_map(12, 10), 3.0
+    half_space, body = HalfSpace((1.0, 2.0), 0.3, kernel), Prony(modulus, np.zeros(0), np.zeros(0))
+    fft = FFT(slab)
+    resting = applied(half_space.operator(fft), whole) / modulus, applied(half_space.inverse(fft), whole) * modulus
+    for made, expected in zip((half_space.sliding_operator, half_space.sliding_inverse), resting, strict=True):
+        found = applied(made(fft, (0.7, -0.2), body), whole)
+        assert_allclose(found, expected, atol=1e-14 * np.abs(expected).max())
