@@ -27,7 +27,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "physics/body.py": ("tests/physics/test_material.py", "tests/test_viscoelastic.py"),
     "physics/energy.py": ("tests/physics/test_energy.py",),
     "physics/wake.py": ("tests/physics/test_wake.py",),
-    "physics/folding.py": ("tests/physics/test_condense.py", "tests/effects/test_condensation.py"),
+    "physics/folding.py": ("tests/physics/test_folding.py", "tests/effects/test_folded_branches.py"),
     "physics/ledger.py": ("tests/physics/test_ledger.py",),
     "physics/loops.py": ("tests/physics/test_loops.py", "tests/physics/test_surface.py"),
     "physics/halfspace.py": ("tests/physics/test_halfspace.py", "tests/physics/test_love.py"),

@@ -89,7 +89,7 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
     problem = found if isinstance(found, str) else checkpoint.verify(found, slab)
     if isinstance(found, str) or problem:
         return problem
-    if difference := slab.agree(another_past(found, job) if slab.root else ""):
+    if difference := slab.agree(find_changed_step(found, job) if slab.root else ""):
         raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
     return found
 
@@ -143,7 +143,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
         return str(error)
 
 
-def another_past(contents: Contents, job: Job) -> str:
+def find_changed_step(contents: Contents, job: Job) -> str:
     """Which of the steps already made would be another one in this job, or ''; those to come may be others."""
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
