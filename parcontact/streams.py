@@ -47,7 +47,9 @@ class Patient(io.TextIOBase):
                 self.gone = True
 
     def isatty(self) -> bool:
-        return self._stream is not None and not self.gone and self._stream.isatty()
+        with suppress(OSError, ValueError):
+            return self._stream is not None and not self.gone and self._stream.isatty()
+        return False
 
     def let_go(self) -> None:
         """What the stream still holds, and cannot write, must not fail when Python ends."""

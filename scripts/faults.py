@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Kills runs, fills disks and damages checkpoints; then the same command must finish with the undisturbed result.
 
-    .venv/bin/python scripts/faults.py [--trials 200] [--flips 2000] [--fills 10] [--ranks 2] [--seed 0]
+    .venv/bin/python scripts/faults.py [--trials 200] [--around 100] [--flips 2000] [--fills 10] [--ranks 2] [--seed 0]
 
 Kills are SIGKILL of one rank, of all ranks, or of mpirun too, at random instants, every other time inside the writing
-of a checkpoint. Filling a disk needs root (it mounts a small tmpfs). Ends with 0 if nothing was lost, hung or changed.
+of a checkpoint. Around them (disturbances.py): races of two runs, planted links, files that vanish, locks. Filling a
+disk needs root (it mounts a small tmpfs). Ends with 0 if nothing was lost, hung or changed.
 """
 
 import argparse
@@ -17,11 +18,13 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from shutil import copytree, rmtree
 from typing import Any
 
+import disturbances
 import h5py
 from mpi4py import MPI
 
@@ -264,28 +267,37 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--trials", type=int, default=200, help="runs that are killed")
     parser.add_argument("--flips", type=int, default=2000, help="damaged checkpoints")
     parser.add_argument("--backs", type=int, default=10, help="runs that must fall back to an older checkpoint")
+    parser.add_argument("--around", type=int, default=100, help="races, links, vanishing files, locks, wishes to stop")
+    parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so many")
     parser.add_argument("--fills", type=int, default=10, help="runs on a disk that is too small (root only)")
-    parser.add_argument("--ranks", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
+    for name, value in (("--ranks", 2), ("--seed", 0)):
+        parser.add_argument(name, type=int, default=value)
     return parser.parse_args()
 
 
 def main() -> int:
     chosen = arguments()
     where = Path(tempfile.mkdtemp(prefix="faults-"))
-    campaign = Campaign(where, chosen.ranks, chosen.seed)
+    campaign, began = Campaign(where, chosen.ranks, chosen.seed), time.monotonic()
     campaign.damage(chosen.flips)
-    for trial in range(chosen.backs):
-        campaign.fall_back(trial)
-    for trial in range(chosen.fills if os.geteuid() == 0 else 0):
-        campaign.fill(trial)
-    for trial in range(chosen.trials):
-        campaign.kill(trial)
-        if (trial + 1) % 20 == 0:
-            print(f"{trial + 1} of {chosen.trials} kills, {len(campaign.bad)} bad", flush=True)
+    trials: list[Callable[[], None]] = [partial(campaign.fall_back, trial) for trial in range(chosen.backs)]
+    trials += [partial(campaign.fill, trial) for trial in range(chosen.fills if os.geteuid() == 0 else 0)]
+    trials += [partial(disturbances.ALL[trial % 5], campaign, trial) for trial in range(chosen.around)]
+    trials += [partial(campaign.kill, trial) for trial in range(chosen.trials)]
+    campaign.random.shuffle(trials)
+    for number, act in enumerate(trials, 1):
+        if time.monotonic() - began > 60.0 * chosen.minutes:
+            print(f"{number - 1} of {len(trials)} trials in {chosen.minutes:g} min")
+            break
+        act()
+        if number % 20 == 0:
+            print(f"{number} of {len(trials)} trials, {len(campaign.bad)} bad", flush=True)
+    campaign.log.flush()
+    if found := (where / "output.txt").read_text().count("Traceback"):
+        campaign.bad.append(f"{found} tracebacks in {where / 'output.txt'}")
     for what, count in sorted(campaign.count.items()):
         print(f"{count:6d} {what}")
-    print("\n".join(campaign.bad) or "nothing lost, nothing hung, nothing accepted that was damaged")
+    print("\n".join(campaign.bad) or "nothing lost, nothing hung, no traceback, nothing accepted that was damaged")
     if not campaign.bad:
         rmtree(where)
     return 1 if campaign.bad else 0

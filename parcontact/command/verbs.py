@@ -208,7 +208,7 @@ def info(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..record import info as about
 
-    text, sound = on_root(world, lambda: about.describe(options.file))
+    text, sound = on_root(world, lambda: about.describe_all(options.file))
     if world.rank == 0:
         print(text)
     return DONE if sound else BAD_INPUT

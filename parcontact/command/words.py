@@ -146,8 +146,8 @@ def _parser() -> argparse.ArgumentParser:
     _job_arguments(surface)
     surface.set_defaults(act=verbs.surface)
 
-    info = found.add_parser("info", help="say what a checkpoint or a file of fields holds, and whether it is sound")
-    info.add_argument("file", type=Path)
+    info = found.add_parser("info", help="say what checkpoints, files of fields and directories hold, and if sound")
+    info.add_argument("file", type=Path, nargs="+", help="a file, or the output directory of a run")
     info.set_defaults(act=verbs.info)
 
     plot = found.add_parser("plot", help="draw pictures of runs and friction curves, compare them, make a movie")

@@ -21,8 +21,8 @@ class GrowingTable:
         if self._size == 0:
             self.append(names)
 
-    def append(self, cells: Sequence[str]) -> str:
-        """Add a line, and return it; on an error the file is as it was before."""
+    def append(self, cells: Sequence[str]) -> None:
+        """Add a line; on an error the file is as it was before."""
         line = ",".join(cells)
         rest = memoryview(f"{line}\n".encode())
         try:
@@ -33,7 +33,6 @@ class GrowingTable:
                 os.ftruncate(self._handle, self._size)
             raise
         self._size += len(line) + 1
-        return line
 
     def sync(self) -> tuple[str, list[str]]:
         """Wait until all rows are on the disk. What others did to the file: rows that are lost, and what was mended."""

@@ -1,6 +1,7 @@
 """What a file of a run holds, and whether it is sound."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,16 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
-from . import checkpoint, fields, hdf5
+from . import checkpoint, fields, hdf5, info_directory
 from .provenance import Link, read_chain
 
 SHOWN = 20  # numbers of one name at most
 
 
 def describe(path: Path) -> tuple[str, bool]:
-    """Text about a checkpoint or a file of fields, and whether it is sound; one rank reads all of it."""
+    """Text about a checkpoint, a file of fields or an output directory, and whether it is sound; one rank reads it."""
+    if path.is_dir():
+        return info_directory.describe(path)
     try:
         if checkpoint.is_one(path):
             return _checkpoint(path)
@@ -30,6 +33,19 @@ def describe(path: Path) -> tuple[str, bool]:
     except hdf5.FAILURES as error:
         return f"{path} cannot be read: {hdf5.reason(error)}", False
     raise InputError(f"{path} is neither a checkpoint nor a file of fields")
+
+
+def describe_all(paths: Sequence[Path]) -> tuple[str, bool]:
+    """The texts about several, one below the other, and whether all are sound; one that is nothing is told so."""
+    found = []
+    for path in paths:
+        try:
+            found.append(describe(path))
+        except InputError as error:
+            if len(paths) == 1:
+                raise
+            found.append((str(error), False))
+    return "\n".join(text for text, _ in found), all(sound for _, sound in found)
 
 
 def _checkpoint(path: Path) -> tuple[str, bool]:

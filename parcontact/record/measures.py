@@ -66,10 +66,11 @@ class MeasuresFile:
         self.sync, self.close = self._file.sync, self._file.close
 
     def write(self, row: Row) -> None:
-        """Append a row; on an error the file is as it was before."""
+        """Append a row; on an error the file is as it was before, but `table` has the row, which the next run adds."""
         cells = [_text(value) for value in numbers(row, self._branches)]
-        line = self._file.append(cells)
-        self.table = Table(self.table.rows + 1, _checksum(self.table.checksum, self._names, cells), line)
+        checksum = _checksum(self.table.checksum, self._names, cells)
+        self.table = Table(self.table.rows + 1, checksum, ",".join(cells))
+        self._file.append(cells)
 
 
 def cut_back(path: Path, step: int, branches: int, then: Table, added: Sequence[str] = ()) -> tuple[Table, list[str]]:
