@@ -10,7 +10,6 @@ from .physics import heightfile
 from .physics.roughness import Roughness
 from .physics.shapes import Round, Shape
 from .physics.surface import Surface, single_wave
-from .road import surface as road
 
 FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
@@ -43,6 +42,8 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.Topography):
+        from .road import surface as road  # with much of scipy, which is slow to import
+
         rows, done = road.rows_of(part, grid, fft.slab)
         told += done
         return _transform(rows, fft)
