@@ -47,13 +47,13 @@ SURFACES = {
     "surface: wave": "2:10: surface must be one shape, or a list of shapes, got 'wave'",
     "surface: []": "2:10: surface needs at least one shape; shape: flat is one",
     "surface: [3]": (
-        "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | flat, got 3"
+        "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | topography | flat, got 3"
     ),
     "surface: {radius: 1}": (
-        "2:10: surface.shape is missing; it must be rough | sphere | cylinder | wave | file | flat"
+        "2:10: surface.shape is missing; it must be rough | sphere | cylinder | wave | file | topography | flat"
     ),
     "surface: [{shape: spher}]": (
-        "2:19: surface.0.shape must be rough | sphere | cylinder | wave | file | flat, got 'spher'; did you "
+        "2:19: surface.0.shape must be rough | sphere | cylinder | wave | file | topography | flat, got 'spher'; did you "
         "mean sphere?"
     ),
     "surface: {shape: sphere}": "2:10: surface.radius is missing; it must be a positive length [m]",
@@ -82,8 +82,10 @@ SURFACES = {
 }
 
 MATERIALS = {
-    "material: {shear_modulus: 1}": "3:11: material.model is missing; it must be elastic | zener",
-    "material: {model: elastc}": ("3:19: material.model must be elastic | zener, got 'elastc'; did you mean elastic?"),
+    "material: {shear_modulus: 1}": "3:11: material.model is missing; it must be elastic | zener | dma",
+    "material: {model: elastc}": (
+        "3:19: material.model must be elastic | zener | dma, got 'elastc'; did you mean elastic?"
+    ),
     "material: {model: elastic}": ("3:11: material.shear_modulus is missing; it must be a positive shear modulus [Pa]"),
     "material: {model: elastic, shear_modulus: 1, branches: []}": (
         "3:46: material.branches is not a key of model elastic; there are model, poisson, shear_modulus"
@@ -213,7 +215,7 @@ OTHERS = {
     "checkpoint: {every: 1, minutes: 1}": (
         "5:13: checkpoint takes at most one of every | minutes, got every and minutes"
     ),
-    "checkpoint: {keep: 0}": "5:20: checkpoint.keep must be a positive whole number of checkpoints, got 0",
+    "checkpoint: {keep: -1}": "5:20: checkpoint.keep must be a whole number of checkpoints, zero or more, got -1",
     "steady: {velocities: '1:2'}": (
         "5:22: steady.velocities must be numbers or a range first:last:count like 1e-3:1e2:31, got '1:2'"
     ),

@@ -146,7 +146,7 @@ def test_overrides_reach_a_lone_surface_by_number_and_without() -> None:
         ("history.0.velocity=[1, x]", ("history.0.velocity.1 must be a velocity [m/s]: a number along x, or [vx, vy], "
          "got 'x'")),
         ("numerics.tolerance=0", "numerics.tolerance must be a tolerance [-] above 0 and below 1, got 0"),
-        ("material.model=zenner", "material.model must be elastic | zener, got 'zenner'; did you mean zener?"),
+        ("material.model=zenner", "material.model must be elastic | zener | dma, got 'zenner'; did you mean zener?"),
     ],
 )  # fmt: skip
 def test_mistakes_in_overrides(override: str, sentence: str) -> None:
@@ -235,7 +235,7 @@ def test_a_mistake_in_an_included_file_that_says_material_is_found_there() -> No
         ("", "m.yaml:1:1: must be one mapping with the keys of a material"),
         ("{include: n, model: elastic, shear_modulus: 1}", ("m.yaml:1:2: material.include is not a key of model "
          "elastic; there are model, poisson, shear_modulus")),
-        ("{shear_modulus: 1}", "m.yaml:1:1: material.model is missing; it must be elastic | zener"),
+        ("{shear_modulus: 1}", "m.yaml:1:1: material.model is missing; it must be elastic | zener | dma"),
     ],
 )  # fmt: skip
 def test_included_files_that_are_no_material(content: str, mistake: str) -> None:
