@@ -107,7 +107,7 @@ def test_missing_sections() -> None:
     assert mistakes_of("title: nothing else\n") == [
         "job.yaml:1:1: grid is missing; it must be a mapping with points and size",
         "job.yaml:1:1: surface is missing; it must be one shape, or a list of shapes",
-        "job.yaml:1:1: material is missing; it must be a mapping with model: elastic | zener | dma",
+        "job.yaml:1:1: material is missing; it must be a mapping with model: elastic | zener",
         "job.yaml:1:1: history needs at least one stage, unless there is a steady section",
     ]
 
@@ -154,7 +154,8 @@ def test_nyquist_ignores_a_direction_with_one_point() -> None:
 def test_checks_between_sections_run_beside_other_mistakes() -> None:
     text = SMALL.replace("surface: {", "surface:\n  - {shape: ball}\n  - {").replace("waves: [1, 0]", "waves: [99, 0]")
     assert mistakes_of(text, "numerics.kernel=spectral", "grid.boundary=free", "checkpoint.keep=-1") == [
-        "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | topography | flat, got 'ball'",
+        "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | topography | flat, "
+        "got 'ball'",
         "job.yaml:4:44: surface.1.waves.0 must be within -32 and 32 waves for 64 points (Nyquist), got 99",
         "--set checkpoint.keep=-1: checkpoint.keep must be a whole number of checkpoints, zero or more, got -1",
         (
