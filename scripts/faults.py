@@ -149,7 +149,7 @@ class Campaign:
         time.sleep(self.random.uniform(0.0, 0.015))
 
     def _strike(self, process: subprocess.Popen[str], victims: str) -> None:
-        ranks = children(process.pid)
+        ranks = disturbances.children(process.pid)
         chosen = ranks if victims != "one rank" else ranks[-1:] if self.random.random() < 0.5 else ranks[:1]
         for pid in ([process.pid] if victims == "mpirun and all" else []) + chosen:
             try:
@@ -219,11 +219,6 @@ class Campaign:
         self.judge(f"damage in {name} of {newest.name}", out)
 
 
-def children(pid: int) -> list[int]:
-    """The ranks that an mpirun has started, in their order."""
-    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-
 def results(out: Path) -> dict[str, Any]:
     """Everything a run leaves that must not depend on its interruptions."""
     with (out / "measures.csv").open(newline="") as file:
@@ -264,14 +259,17 @@ def regions(path: Path) -> Iterator[tuple[str, int, int]]:
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=200, help="runs that are killed")
-    parser.add_argument("--flips", type=int, default=2000, help="damaged checkpoints")
-    parser.add_argument("--backs", type=int, default=10, help="runs that must fall back to an older checkpoint")
-    parser.add_argument("--around", type=int, default=100, help="races, links, vanishing files, locks, wishes to stop")
+    for name, value, what in (
+        ("--trials", 200, "runs that are killed"),
+        ("--around", 100, "races, links, vanishing files, locks, wishes to stop"),
+        ("--flips", 2000, "damaged checkpoints"),
+        ("--backs", 10, "runs that must fall back to an older checkpoint"),
+        ("--fills", 10, "runs on a disk that is too small (root only)"),
+        ("--ranks", 2, "ranks of each run"),
+        ("--seed", 0, "of all that is chosen"),
+    ):
+        parser.add_argument(name, type=int, default=value, help=what)
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so many")
-    parser.add_argument("--fills", type=int, default=10, help="runs on a disk that is too small (root only)")
-    for name, value in (("--ranks", 2), ("--seed", 0)):
-        parser.add_argument(name, type=int, default=value)
     return parser.parse_args()
 
 
@@ -285,14 +283,9 @@ def main() -> int:
     trials += [partial(disturbances.ALL[trial % 5], campaign, trial) for trial in range(chosen.around)]
     trials += [partial(campaign.kill, trial) for trial in range(chosen.trials)]
     campaign.random.shuffle(trials)
-    for number, act in enumerate(trials, 1):
-        if time.monotonic() - began > 60.0 * chosen.minutes:
-            print(f"{number - 1} of {len(trials)} trials in {chosen.minutes:g} min")
-            break
-        act()
-        if number % 20 == 0:
-            print(f"{number} of {len(trials)} trials, {len(campaign.bad)} bad", flush=True)
-    campaign.log.flush()
+    while trials and time.monotonic() - began < 60.0 * chosen.minutes:
+        trials.pop()()
+        campaign.count["trials"] += 1
     if found := (where / "output.txt").read_text().count("Traceback"):
         campaign.bad.append(f"{found} tracebacks in {where / 'output.txt'}")
     for what, count in sorted(campaign.count.items()):

@@ -277,6 +277,16 @@ def test_planted_links_are_not_followed(main: Main, tmp_path: Path, name: str) -
     assert code == DONE or (code == BAD_INPUT and name in said)
 
 
+def test_planted_picture(main: Main, tmp_path: Path) -> None:
+    """`plot` replaces a link instead of what it leads to."""
+    main("job.yaml", "--out", "out")
+    (tmp_path / "precious").write_text("years of work")
+    (tmp_path / "out" / "picture.png").symlink_to(tmp_path / "precious")
+    assert main("plot", "out")[0] == DONE
+    assert (tmp_path / "precious").read_text() == "years of work"
+    assert (tmp_path / "out" / "picture.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_names_of_unfinished_files_cannot_be_guessed(tmp_path: Path) -> None:
     """Two in a row differ, and what is there already is never opened."""
     path = tmp_path / "table"

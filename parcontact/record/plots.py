@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from . import hdf5
+from . import files, hdf5
 from .pictures import charts, histories, movie, steady, style, sweep
 from .pictures.charts import Chart
 from .pictures.maps import maps
@@ -79,7 +79,8 @@ def _save(figure: Figure, stem: Path, options: Options) -> Path:
     if kind not in FORMATS:
         raise InputError(f"{target}: pictures are {', '.join(FORMATS)}; say which with --format")
     try:
-        figure.savefig(target, dpi=style.DPI, format=kind)
+        with files.replaced(target) as file:
+            figure.savefig(file, dpi=style.DPI, format=kind)
     except OSError as error:
         raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
     return target

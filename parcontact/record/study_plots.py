@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from . import files
+
 TITLES = {
     "mu_max": "largest friction",
     "mu_dyn": "friction in the end",
@@ -68,7 +70,8 @@ def _convergence(path: Path, curves: Sequence[Curve]) -> Path:
     first = figure.axes[0]
     first.set_ylabel("error [%]")
     figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    figure.savefig(path, dpi=150)
+    with files.replaced(path) as file:
+        figure.savefig(file, dpi=150, format="png")
     return path
 
 
@@ -115,7 +118,8 @@ def _work_precision(path: Path, points: Mapping[str, Sequence[Point]]) -> Path:
     for row in range(2):
         grid[row][0].set_ylabel("error [%]")
     grid[0][0].legend(frameon=False, fontsize=8, loc="upper right")
-    figure.savefig(path, dpi=150)
+    with files.replaced(path) as file:
+        figure.savefig(file, dpi=150, format="png")
     return path
 
 

@@ -17,6 +17,7 @@ from ..parallel.slab import Slab
 from ..record import checkpoint, marker
 from ..record.checkpoint import Contents
 from ..record.directory import ADVICE, Directory
+from ..record.marker import Claim
 
 SAME = ("grid", "surface", "material", "initial")  # sections that must not change
 SAME_NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
@@ -61,6 +62,14 @@ def choose(
         raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
     _refuse(slab, _would_lose(directory, plain) if slab.root else "")
     return None, []
+
+
+def claim(plain: Mapping[str, Any], origin: Origin | None) -> Claim:
+    """What a run says of itself in the marker: its id stays as long as it goes on in its own directory."""
+    data = marker.kept(plain)
+    if origin and origin.own:
+        return Claim(data, origin.contents.run, saved=True) if origin.contents.run else Claim(data, saved=True)
+    return Claim(data)
 
 
 def finished_before(

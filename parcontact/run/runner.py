@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import dataclass, replace
-from typing import Any
 
 from .. import sanity, scene
 from ..effects import decisions
@@ -75,7 +74,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         doubts = (*job.warnings, *sanity.of_surface(marching.scene.frame))
         wisdom.keep(job, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
-        claim = _claim(plain, directory, origin)
+        claim = restart.claim(plain, origin)
         recorder = _begin(marching.scene, directory, claim, provenance, origin, len(timeline), options.quiet)
         try:
             for text in header.lines(slab.comm) if slab.root else ():
@@ -115,14 +114,6 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough))
     chain = extended(saved.chain if saved else (), link)
     return Provenance(chain, seeds, str(job.included) if job.included else "", doubts)
-
-
-def _claim(plain: dict[str, Any], directory: Directory, origin: Origin | None) -> Claim:
-    """What this run says of itself in the marker: the id stays as long as it goes on in its own directory."""
-    data = marker.kept(plain)
-    if origin and origin.own:
-        return Claim(data, origin.contents.run, saved=True) if origin.contents.run else Claim(data, saved=True)
-    return Claim(data)
 
 
 def _begin(
