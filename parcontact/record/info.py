@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
-from . import checkpoint, fields, hdf5, info_directory
+from . import checkpoint, fields, hdf5
 from .provenance import Link, read_chain
 
 SHOWN = 20  # numbers of one name at most
@@ -21,6 +21,7 @@ SHOWN = 20  # numbers of one name at most
 def describe(path: Path) -> tuple[str, bool]:
     """Text about a checkpoint, a file of fields or an output directory, and whether it is sound; one rank reads it."""
     if path.is_dir():
+        from . import info_directory  # with the columns of a run, and so with what computes them
         return info_directory.describe(path)
     try:
         if checkpoint.is_one(path):
