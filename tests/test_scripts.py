@@ -38,6 +38,8 @@ SMALL = {
     "fuzz_jobs": Small(["--jobs", "40", "--processes", "1"], r"(?m)^40 jobs: 0 with faults; "),
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
     "mutants": Small(["--count", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
+    "paper_claims": Small(["--from", "nowhere"], r"", (1,)),  # it reads sweeps: tests/test_paper.py has some
+    "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "profile_solve": Small(["128"], r"(?m)^FFTs .*%"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"0 violations, 0 failed solves"),
     "random_steady": Small(["--trials", "2", "--points", "64"], r"2 solved, .* 0 WRONG"),
