@@ -114,6 +114,20 @@ def test_memory_of_many_waves(road: Rings) -> None:
     assert peak < 300e6
 
 
+def test_refinement(road: Rings) -> None:
+    """Transients too are converged, to 3e-6: with nearly three times as many waves nothing changes."""
+    distances = np.array([1e-6, 1e-5, 1e-4, 4e-4])
+    fine = rings_of_spectrum(spectrum, K_LONG, K_SHORT, 5e-4, refinement=2)
+    outcomes = []
+    for rings in (road, fine):
+        memory = Memory(rings, TWELVE_DECADES)
+        memory.slide_for_ever((0.01, 0.0))
+        outcomes += list(follow(memory, [at((3.0, 0.0), distances / 3.0, PRESSURE)]))
+    coarse, better = outcomes
+    assert_allclose(coarse.traction[:, 0], better.traction[:, 0], rtol=3e-6)
+    assert_allclose(coarse.contact_area, better.contact_area, rtol=1e-5)
+
+
 @pytest.fixture(scope="module")
 def small_road() -> Rings:
     """For 20 um."""
