@@ -14,7 +14,7 @@ from .job import HeightFile, Job, meaning, size
 from .job.timeline import Timeline
 from .parallel import rows
 from .parallel.slab import Array, Slab
-from .physics.ledger import Measures
+from .physics.measures import Measures
 from .scene import Frame
 
 SEAM = (

@@ -14,8 +14,9 @@ from test_cli import JOB
 
 from parcontact.__main__ import main
 from parcontact.march.failure import StepError
-from parcontact.physics.ledger import Ledger, Measures
-from parcontact.solve.contact import Certificate
+from parcontact.physics.ledger import Ledger
+from parcontact.physics.measures import Measures
+from parcontact.solve.certificate import Certificate
 
 NAN, INF = math.nan, math.inf
 

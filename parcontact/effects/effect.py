@@ -16,7 +16,7 @@ from ..job.part import Part
 from ..job.timeline import Step
 from ..parallel.slab import Array
 from ..physics.entries import Remembers
-from ..physics.ledger import Measures
+from ..physics.measures import Measures
 
 
 @dataclass(frozen=True)

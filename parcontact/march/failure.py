@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import RunError
 from ..job.timeline import Step
 from ..parallel.slab import Array
-from ..physics.ledger import Measures
+from ..physics.measures import Measures
 from ..scene import Scene
 from ..solve.contact import Contact
 

@@ -8,55 +8,17 @@ ratio of the sides of a cell: to stretch a map along x stretches its edges and t
 """
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
 from .interface import InterfaceFriction, Vector
+from .measures import Measures
 from .surface import Surface
 from .units import Units
 
 SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # cells counted too many per side of a cell on the edge of contact
-
-
-@dataclass(frozen=True)
-class Measures:
-    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; area as a share of the nominal.
-
-    `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
-    the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
-    spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
-    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, whose part of
-    it is `friction_interface`.
-    """
-
-    pressure: float = 0.0
-    force_x: float = 0.0
-    force_y: float = 0.0
-    friction: float = 0.0
-    contact_area: float = 0.0
-    approach: float = 0.0
-    mean_gap: float = 0.0
-    max_pressure: float = 0.0
-    contact_area_corrected: float = 0.0
-    at_edge: bool = False
-    normal_force: float = 0.0
-    friction_interface: float = 0.0
-
-    @property
-    def finite(self) -> bool:
-        """Whether all of them are numbers."""
-        return all(map(math.isfinite, astuple(self)))
-
-    @property
-    def friction_x(self) -> float:
-        """Tangential over normal force along x, positive where it opposes motion along +x: `-force_x/normal force`.
-
-        Unlike `friction` it changes its sign with the direction of sliding; 0 at zero load.
-        """
-        force = math.hypot(self.force_x, self.force_y)
-        return 0.0 - self.friction * (self.force_x / force) if force > 0.0 else 0.0
 
 
 @dataclass(frozen=True)

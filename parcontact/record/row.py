@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
-from ..physics.ledger import Measures
-from ..solve.contact import Certificate
+from ..physics.measures import Measures
+from ..solve.certificate import Certificate
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,6 @@ where g < 0, only helps. Thus f falls for every step that is small enough (D. P.
 the number of iterations nearly independent of the grid. Everything here is dimensionless.
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -28,6 +27,7 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import kernels
+from .certificate import Certificate
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
@@ -53,25 +53,6 @@ class Approach:
     """Displacement control: the rigid approach d is given, the load follows."""
 
     value: float
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """How well a returned pressure meets the contact conditions, all three computed from it.
-
-    complementarity: `sum(p |g|) / sum(p)`, the gap where there is pressure, weighted by it, over the surface's height;
-    penetration: `max(-g, 0)` over all points, over the surface's height;
-    load: `|mean(p)/P0 - 1|` (0 with a given approach).
-    """
-
-    complementarity: float
-    penetration: float
-    load: float
-
-    @property
-    def worst(self) -> float:
-        total = self.complementarity + self.penetration + self.load
-        return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)
 
 
 @dataclass(frozen=True)

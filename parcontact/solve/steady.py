@@ -22,7 +22,8 @@ import numpy as np
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .contact import Certificate, Operator, certify, weigh
+from .certificate import Certificate
+from .contact import Operator, certify, weigh
 from .gcr import Directions, gaps_on
 from .projected import Projected
 

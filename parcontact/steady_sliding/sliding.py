@@ -12,11 +12,12 @@ from ..errors import RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution, wavenumbers
-from ..physics.ledger import Ledger, Measures
+from ..physics.ledger import Ledger
+from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..scene import Frame
 from ..solve import nested
-from ..solve.contact import Certificate
+from ..solve.certificate import Certificate
 from ..solve.steady import SteadyContact, SteadySolver
 
 COARSE_TOLERANCE = 7e-4  # of the certificate on all grids but the finest

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from parcontact.physics.ledger import Measures
+from parcontact.physics.measures import Measures
 from parcontact.record import measures
 from parcontact.record.checkpoint import Table
 from parcontact.record.measures import COLUMNS, LAST, MeasuresFile

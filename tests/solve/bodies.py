@@ -11,7 +11,8 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
-from parcontact.solve.contact import Certificate, Contact, ContactSolver
+from parcontact.solve.certificate import Certificate
+from parcontact.solve.contact import Contact, ContactSolver
 
 Map = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve import contact
+from parcontact.solve import certificate, contact
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
 from . import polonsky_keer
@@ -385,5 +385,5 @@ def test_stall(control: MeanPressure | Approach) -> None:
 
 
 def test_what_a_contact_reports_is_documented() -> None:
-    for field in dataclasses.fields(contact.Certificate):
-        assert f"{field.name}: " in str(contact.Certificate.__doc__)
+    for field in dataclasses.fields(certificate.Certificate):
+        assert f"{field.name}: " in str(certificate.Certificate.__doc__)

@@ -1,0 +1,43 @@
+"""What one instant of a contact is in numbers; it loads nothing, so that tables are read at once."""
+
+import math
+from dataclasses import astuple, dataclass
+
+
+@dataclass(frozen=True)
+class Measures:
+    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; area as a share of the nominal.
+
+    `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
+    the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
+    spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
+    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, whose part of
+    it is `friction_interface`.
+    """
+
+    pressure: float = 0.0
+    force_x: float = 0.0
+    force_y: float = 0.0
+    friction: float = 0.0
+    contact_area: float = 0.0
+    approach: float = 0.0
+    mean_gap: float = 0.0
+    max_pressure: float = 0.0
+    contact_area_corrected: float = 0.0
+    at_edge: bool = False
+    normal_force: float = 0.0
+    friction_interface: float = 0.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether all of them are numbers."""
+        return all(map(math.isfinite, astuple(self)))
+
+    @property
+    def friction_x(self) -> float:
+        """Tangential over normal force along x, positive where it opposes motion along +x: `-force_x/normal force`.
+
+        Unlike `friction` it changes its sign with the direction of sliding; 0 at zero load.
+        """
+        force = math.hypot(self.force_x, self.force_y)
+        return 0.0 - self.friction * (self.force_x / force) if force > 0.0 else 0.0
