@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -15,7 +16,7 @@ from .job import Job
 from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
 from .physics.prony import Prony
-from .physics.roughness import Roughness
+from .physics.roughness import EDGE, Roughness
 from .record import files, hdf5
 from .theory import full_contact, persson_rings
 from .theory.persson_history import Leg, Memory, follow
@@ -96,6 +97,8 @@ def _continuum(job: Job, timeline: Timeline) -> Rings:
     (part,) = rough
     longest = min(part.long_wavelength, max(job.grid.size))
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
+    if k_long >= EDGE * k_short:
+        raise InputError("surface: the theory needs waves between long_wavelength and short_wavelength, got equal ones")
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
     limits = (k_long, k_short, _longest_slide(timeline), (k_rolloff,))
     unit = persson_rings.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)
@@ -111,8 +114,9 @@ def _continuum(job: Job, timeline: Timeline) -> Rings:
 
 
 def _longest_slide(timeline: Timeline) -> float:
-    """How far the surface is moved in any stage [m]: so long its old waves and its new ones interfere."""
-    return max((math.dist(span.origin, span.position(span.ends.count)) for span in timeline.spans), default=0.0)
+    """The largest distance between two places of the surface [m]: old and new waves are that far out of phase."""
+    places = {place for span in timeline.spans for place in (span.origin, span.position(span.ends.count))}
+    return max((math.dist(*pair) for pair in combinations(places, 2)), default=0.0)
 
 
 # -- the history ------------------------------------------------------------------------------------------------------
