@@ -93,7 +93,7 @@ def fig03(out: Path) -> Figure:
     for modulus, label in ((glassy, "Hertz, $G_0$ and $G_\\infty$"), (rubbery, "")):
         p = hertz.pressure(np.abs(r), force, RADIUS, modulus)
         axes.plot(r / a, p / mean, ":", color=style.GREY, lw=0.9, label=label or None)
-    centre, speed = job.surface[0].center[0], job.history[0].speed  # type: ignore[union-attr,index]
+    centre, speed = job.surface[0].center[0], job.history[0].speed
     with h5py.File(directory / "fields.h5") as fields:
         times, x, pressure = fields["t"][:], fields["x"][:], fields["pressure"]
         middle = pressure.shape[1] // 2
@@ -137,12 +137,12 @@ def fig05(out: Path) -> Figure:
     top.grid(visible=False)
     figure.colorbar(shown, ax=top, label="height [µm]", shrink=0.9)
     k, found = ring_means(heights, size)
-    k_long, k_short = 2 * np.pi / part.long_wavelength, 2 * np.pi / part.short_wavelength  # type: ignore[union-attr]
-    exponent = 2 - 2 * part.hurst  # type: ignore[union-attr]
-    constant = part.rms_slope**2 * 2 * np.pi * exponent / (k_long**4 * ((k_short / k_long) ** exponent - 1))  # type: ignore[union-attr,operator]
+    k_long, k_short = 2 * np.pi / part.long_wavelength, 2 * np.pi / part.short_wavelength
+    exponent = 2 - 2 * part.hurst
+    constant = part.rms_slope**2 * 2 * np.pi * exponent / (k_long**4 * ((k_short / k_long) ** exponent - 1))
     inside = (k >= 0.999 * k_long) & (k < 1.001 * k_short)
     bottom.loglog(k[inside], found[inside], ".", color=style.BLUE, label="found, means of rings")
-    asked = constant * (k[inside] / k_long) ** (-2 * (1 + part.hurst))  # type: ignore[union-attr]
+    asked = constant * (k[inside] / k_long) ** (-2 * (1 + part.hurst))
     bottom.loglog(k[inside], asked, "--", color=style.RED, label=f"asked, C = {constant:.3g} m⁴")
     bottom.set(xlabel="wave number k [rad/m]", ylabel="Φ [m⁴]")
     bottom.xaxis.set_minor_formatter(NullFormatter())
@@ -161,8 +161,8 @@ def fig07(out: Path) -> Figure:
         top.loglog(omega, 1e-6 * values, **style.line(number), label=label)
     bottom.semilogx(omega, modulus.imag / modulus.real, color=style.COLORS[3])
     speeds = (job.initial.velocity[0], job.history[-1].speed)
-    low = 2 * np.pi / part.long_wavelength * speeds[0]  # type: ignore[union-attr]
-    high = 2 * np.pi / part.short_wavelength * speeds[1]  # type: ignore[union-attr]
+    low = 2 * np.pi / part.long_wavelength * speeds[0]
+    high = 2 * np.pi / part.short_wavelength * speeds[1]
     for axes in (top, bottom):
         axes.axvspan(low, high, color="0.9", zorder=0)
         axes.set(xlim=(omega[0], omega[-1]))
@@ -240,7 +240,16 @@ def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> 
 
 
 def fig09(out: Path) -> Figure:
-    return over_key(out, "fig09_velocities", "history.1.velocity", "velocity $V_1$ [m/s]")
+    """With the steady states of the periodic box, for one surface, if they are there."""
+    figure = over_key(out, "fig09_velocities", "history.1.velocity", "velocity $V_1$ [m/s]")
+    if (table := out / "fig09_steady" / "cases" / "000" / "steady.csv").is_file():
+        found = columns(table.parent, table.name)
+        for axes, name in zip(figure.axes, ("friction", "contact_area"), strict=False):
+            axes.plot(found["velocity"], found[name], "kx", label="steady in the box")
+            axes.legend(
+                loc="upper center" if name == "friction" else "upper right", ncols=2 if name == "friction" else 1
+            )
+    return figure
 
 
 def fig10(out: Path) -> Figure:
