@@ -32,6 +32,9 @@ SMALL = {
     "check_plan": Small(
         ["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED
     ),
+    "check_report": Small(
+        [], r"no chromium is installed|0 of 0 views are wrong", (0, 1)
+    ),  # pages: tests/test_report.py
     "folded_branches": Small(["64"], r"(?m)^ +0\.001 +5 "),
     "convergence": Small(["32", "64"], r"order +-?[\d.]+ +2\.\d\d +1\.[5-9]"),
     "faults": Small(["--trials", "1", "--around", "1", "--flips", "4", "--backs", "1", "--fills", "0"], r""),

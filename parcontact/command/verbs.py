@@ -227,6 +227,17 @@ def plot(options: argparse.Namespace) -> int:
     return DONE
 
 
+def report(options: argparse.Namespace) -> int:
+    """Root's work alone."""
+    world = ranks.start()
+    from ..report import page
+
+    target = on_root(world, lambda: page.write(options.directories, options.out))
+    if world.rank == 0:
+        print(f"report: {target}")
+    return DONE
+
+
 def doctor(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..doctor import cases

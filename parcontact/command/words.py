@@ -13,7 +13,7 @@ from .. import __version__
 from ..errors import InputError
 from . import ranks, verbs
 
-VERBS = ("run", "steady", "check", "plan", "theory", "fit", "surface", "study", "info", "plot", "doctor")
+VERBS = ("run", "steady", "check", "plan", "theory", "fit", "surface", "study", "info", "plot", "report", "doctor")
 FIRST = """\
 a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
 
@@ -153,6 +153,11 @@ def _parser() -> argparse.ArgumentParser:
     plot = found.add_parser("plot", help="draw pictures of runs and friction curves, compare them, make a movie")
     _plot_arguments(plot)
     plot.set_defaults(act=verbs.plot)
+
+    report = found.add_parser("report", help="write one HTML file to send: what was asked, results, data, origin")
+    report.add_argument("directories", metavar="OUT", nargs="+", type=Path, help="an output directory")
+    report.add_argument("--out", metavar="FILE", type=Path, help="default: report.html in the first directory")
+    report.set_defaults(act=verbs.report)
 
     doctor = found.add_parser("doctor", help="run small hard cases on this machine, and say what came out of each")
     doctor.add_argument("--precision", choices=("double", "single", "mixed"), default="double")

@@ -22,6 +22,7 @@ def describe(path: Path) -> tuple[str, bool]:
     """Text about a checkpoint, a file of fields or an output directory, and whether it is sound; one rank reads it."""
     if path.is_dir():
         from . import info_directory  # with the columns of a run, and so with what computes them
+
         return info_directory.describe(path)
     try:
         if checkpoint.is_one(path):

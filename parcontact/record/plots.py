@@ -111,19 +111,25 @@ def _picture(directory: Path, options: Options) -> Figure:
 
 def _comparison(directories: Sequence[Path], options: Options) -> Figure:
     """The lines of all directories in one picture."""
-    names = _names(directories)
-    found: list[tuple[str, Sequence[Chart]]] = []
-    for name, directory in zip(names, directories, strict=True):
-        lines: list[Chart] = []
-        if (directory / "measures.csv").is_file():
-            lines += _chosen(histories.charts(Run(directory), options.over), options)
-        if (directory / steady.TABLE).is_file() and _wanted("steady", options):
-            lines += steady.charts(directory, options.over)
-        if not lines:
+    for directory in directories:
+        if not _lines(directory, options):
             raise InputError(f"{directory} holds nothing to compare")
-        found.append((name, lines))
-    together = charts.compared(found)
-    return _figure("", [_panels(together, options)], legend=True)
+    return _figure("", [_panels(compared_charts(directories, options), options)], legend=True)
+
+
+def compared_charts(directories: Sequence[Path], options: Options = Options()) -> list[Chart]:
+    """Charts with the lines of all directories that have any."""
+    found = [(name, _lines(path, options)) for name, path in zip(_names(directories), directories, strict=True)]
+    return charts.compared([(name, lines) for name, lines in found if lines])
+
+
+def _lines(directory: Path, options: Options) -> list[Chart]:
+    lines: list[Chart] = []
+    if (directory / "measures.csv").is_file():
+        lines += _chosen(histories.charts(Run(directory), options.over), options)
+    if (directory / steady.TABLE).is_file() and _wanted("steady", options):
+        lines += steady.charts(directory, options.over)
+    return lines
 
 
 def _names(directories: Sequence[Path]) -> list[str]:

@@ -8,7 +8,7 @@ import pytest
 from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.job.timeline import Timeline
-from parcontact.record.pictures.run import _job
+from parcontact.record.pictures.run import shown_job
 
 from .texts import SMALL, job_of, with_stage
 
@@ -66,11 +66,11 @@ def test_a_resolved_job_reads_back_with_any_title(tmp_path: Path, title: str) ->
     titled = job.model_copy(update={"title": title})
     path = tmp_path / "job.resolved.yaml"
     path.write_text(titled.resolved())
-    assert _job(path).title == title
+    assert shown_job(path).title == title
 
 
 def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "job.resolved.yaml"
     path.write_text("[1, 2")
     with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):
-        _job(path)
+        shown_job(path)

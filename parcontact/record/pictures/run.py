@@ -20,7 +20,7 @@ Panel = Callable[[Axes], None]
 RESOLVED = "job.resolved.yaml"
 SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady")  # versions differ in other sections
 STEADY_RESOLVED = "steady.resolved.yaml"
-
+FILES = ("file", "topography")  # shapes that come from files
 
 MEASURED = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
@@ -32,7 +32,7 @@ class Run:
     """A run's job and rows. The rows before the first load of a body at rest are left out: nothing has happened yet."""
 
     def __init__(self, directory: Path) -> None:
-        self.directory, self.job = directory, _job(directory / RESOLVED)
+        self.directory, self.job = directory, shown_job(directory / RESOLVED)
         self._columns = table(directory / "measures.csv", MEASURED)
         if not self._columns["step"].size:
             raise InputError(f"{directory} holds no step yet")
@@ -127,17 +127,17 @@ def box(directory: Path) -> float:
     """The area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
     for name in (STEADY_RESOLVED, RESOLVED):
         if (directory / name).is_file():
-            grid = _job(directory / name).grid
+            grid = shown_job(directory / name).grid
             return grid.lx * grid.ly if grid.boundary == "free" else 0.0
     return 0.0
 
 
-def _job(path: Path) -> Job:
+def shown_job(path: Path) -> Job:
     """What pictures show of the resolved job; its files of heights need not be there any more."""
     try:
         data = yamltext.parse(path.read_bytes(), str(path)).data
         data = {name: data[name] for name in SHOWN if name in data}
-        data["surface"] = [{"shape": "flat"} if shape["shape"] == "file" else shape for shape in data["surface"]]
+        data["surface"] = [{"shape": "flat"} if shape["shape"] in FILES else shape for shape in data["surface"]]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:
         raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error

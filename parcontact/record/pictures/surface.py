@@ -33,11 +33,8 @@ def draw(sketch: Sketch, file: BinaryIO, kind: str) -> None:
     """Write the picture, a png, pdf or svg."""
     with mpl.rc_context(style.RC):
         figure = Figure(figsize=(style.WIDTH, 2 * style.HEIGHT), layout="constrained")
-        (left, right), (first, second) = figure.subplots(2, 2)
-        _map(left, sketch)
-        _distribution(right, sketch)
-        _profiles(first, sketch)
-        _over_directions(second, sketch)
+        for axes, panel in zip(figure.subplots(2, 2).ravel(), PANELS.values(), strict=True):
+            panel(axes, sketch)
         figure.savefig(file, dpi=style.DPI, format=kind)
 
 
@@ -88,3 +85,11 @@ def _over_directions(axes: Axes, sketch: Sketch) -> None:
     _limits(axes, sketch)
     axes.set(xscale="log", yscale="log", xlabel="wavenumber [1/m]", ylabel="PSD over directions [m⁴]")
     axes.legend()
+
+
+PANELS = {
+    "map of the heights": _map,
+    "distribution of the heights": _distribution,
+    "spectra of profiles": _profiles,
+    "spectrum over directions": _over_directions,
+}

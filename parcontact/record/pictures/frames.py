@@ -1,0 +1,77 @@
+"""A saved map, one instant after the other, in one figure with one range of colours."""
+
+from collections.abc import Sequence
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from ...parallel.slab import Array
+from . import maps, style, units
+
+UNITS = {"pressure": "Pa"}  # all other maps are lengths [m]
+
+
+class Frames:
+    """Maps of shape (instant, y, x) in a file, of which those with the indices `chosen` are to be shown.
+
+    `figure` shows one at a time: the last for which `show` was called.
+    """
+
+    def __init__(self, file: h5py.File, name: str, chosen: Sequence[int], size: tuple[float, float] = (4.5, 4.0)):
+        self.file, self.name, unit = file, name, UNITS.get(name, "m")
+        ranges = [maps.colour_range(self._map(index)) for index in chosen]
+        low, high = min(lowest for lowest, _ in ranges), max(highest for _, highest in ranges)
+        label, _ = units.scaled(unit, np.array([low, high]))
+        self.figure = Figure(figsize=size, layout="constrained")
+        self.axes, self.scale = self.figure.subplots(), units.size_of(label, unit) if label else 1.0
+        x, y, limits = file["x"][...], file["y"][...], (low / self.scale, high / self.scale)
+        draw = _Line if min(x.size, y.size) <= maps.STRIP else _Image
+        self._frame = draw(self.axes, (x, y), limits, units.labelled(name, label), blank=name == "pressure")
+
+    def show(self, index: int, title: str) -> None:
+        """Put the map of this index into the figure."""
+        self._frame.show(self._map(index) / self.scale)
+        self.axes.set_title(title)
+
+    def _map(self, index: int) -> Array:
+        values: Array = self.file[self.name][index]
+        return values
+
+
+class _Image:
+    """A map in colours."""
+
+    def __init__(
+        self, axes: Axes, points: tuple[Array, Array], limits: tuple[float, float], label: str, blank: bool
+    ) -> None:
+        self.blank = blank
+        length, (x, y) = units.scaled("m", *(maps.edges(values) for values in points))
+        axes.set_facecolor("0.92")
+        axes.grid(False)
+        empty = np.zeros((y.size - 1, x.size - 1))
+        self.mesh = axes.pcolormesh(x, y, empty, cmap="inferno" if blank else "viridis", norm=Normalize(*limits))
+        axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", aspect="equal")
+        axes.figure.colorbar(self.mesh, ax=axes, label=label)
+
+    def show(self, values: Array) -> None:
+        self.mesh.set_array(np.where(values > 0.0, values, np.nan) if self.blank else values)
+
+
+class _Line:
+    """A map so narrow that it is a line."""
+
+    def __init__(
+        self, axes: Axes, points: tuple[Array, Array], limits: tuple[float, float], label: str, blank: bool
+    ) -> None:
+        x, y = points
+        self.lies = x.size > y.size
+        length, (along,) = units.scaled("m", x if self.lies else y)
+        (self.line,) = axes.plot(along, np.zeros_like(along), color=style.BLUE)
+        axes.set(xlabel=f"{'x' if self.lies else 'y'} [{length}]", ylabel=label)
+        axes.set_ylim(limits[0], limits[0] + 1.05 * (limits[1] - limits[0]))
+
+    def show(self, values: Array) -> None:
+        self.line.set_ydata(values[0] if self.lies else values[:, 0])

@@ -1,0 +1,84 @@
+"""Maps that are browsed over time or velocity: one small picture for each saved instant, inside the page."""
+
+import io
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import h5py
+import numpy as np
+from matplotlib import rc_context
+from PIL import Image
+
+from ..record import hdf5
+from ..record.pictures import units
+from ..record.pictures.frames import Frames
+from .parts import RC, Browser, uri_of
+
+MAPS = ("pressure", "gap", "displacement", "height")
+MOST = 24  # pictures of one map: instants in between are left out
+DPI = 100
+COLORS = 256  # of a picture: less than half of the bytes that true colours need, and one does not see it
+SIZE = (4.2, 3.5)  # [inch]
+
+Labels = dict[int, str]  # of the maps that were saved, by their index
+
+
+def of_run(directory: Path) -> list[Browser]:
+    """Of all maps that a run has saved in a directory, over time."""
+    return list(_of(directory / "fields.h5", _instants))
+
+
+def of_curve(directory: Path) -> list[Browser]:
+    """Of all maps that a friction curve has saved in a directory, over velocity and load."""
+    return list(_of(directory / "steady.h5", _states))
+
+
+def _of(path: Path, label: Callable[[h5py.File], Labels]) -> Iterator[Browser]:
+    """None where the file is missing or cannot be read: a report tells what there is."""
+    found: list[Browser] = []
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            labels = label(file)
+            chosen = _spread(list(labels))
+            for name in MAPS:
+                if name in file and chosen:
+                    found.append(_browser(file, name, {index: labels[index] for index in chosen}))
+    except hdf5.FAILURES:
+        pass
+    yield from found
+
+
+def _browser(file: h5py.File, name: str, labels: Labels) -> Browser:
+    with rc_context(RC):
+        frames = Frames(file, name, list(labels), SIZE)
+        uris = []
+        for index, label in labels.items():
+            frames.show(index, f"{name}, {label}")
+            image = io.BytesIO()
+            frames.figure.savefig(image, format="png", dpi=DPI)
+            uris.append(uri_of(_fewer_colours(image), "image/png"))
+    return Browser(name, list(labels.values()), uris)
+
+
+def _fewer_colours(png: io.BytesIO) -> bytes:
+    small = io.BytesIO()
+    Image.open(png).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(small, "png", optimize=True)
+    return small.getvalue()
+
+
+def _spread(indices: Sequence[int]) -> list[int]:
+    """At most so many of them, the first and the last among them."""
+    count = min(len(indices), MOST)
+    return [indices[int(k)] for k in np.linspace(0, len(indices) - 1, count)] if count else []
+
+
+def _instants(file: h5py.File) -> Labels:
+    times, steps = file["t"][...], file["step"][...]
+    known = np.flatnonzero(~np.isnan(times))
+    return {int(k): f"{units.text(float(times[k]), 's', 4)} (step {int(steps[k])})" for k in known}
+
+
+def _states(file: h5py.File) -> Labels:
+    speeds, loads = file["velocity"][...], file["load"][...]
+    known = np.flatnonzero(~np.isnan(speeds))
+    return {int(k): f"{units.text(float(speeds[k]), 'm/s')}, {units.text(float(loads[k]), 'Pa')}" for k in known}

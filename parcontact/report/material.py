@@ -1,0 +1,73 @@
+"""The section about the rubber: its moduli, its branches, its shift with temperature, and the band that is excited."""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..effects.folded_branches import excited_band
+from ..effects.relaxation import relaxation_of
+from ..job import Dma, Job, Zener
+from ..physics.prony import complex_modulus
+from ..record.pictures import style, units
+from .parts import Section, Table, of_panel
+
+DECADES = 1.5  # that a picture shows beyond the relaxation times
+POINTS = 400  # of a line
+CAPTION = "moduli and loss tangent over frequency, at the temperature of the job"
+
+
+def section(job: Job) -> Section:
+    """Of the material of a job at its temperature."""
+    series = relaxation_of(job)
+    instant = series.modulus_inf + float(np.sum(series.moduli))
+    rows = [
+        ("shear modulus in the long run", units.text(series.modulus_inf, "Pa", 4)),
+        ("shear modulus at once", units.text(instant, "Pa", 4)),
+        ("Poisson's ratio", f"{job.material.poisson:g}"),
+        ("relaxing branches", str(series.moduli.size)),
+        *_temperature(job),
+    ]
+    if job.included:
+        rows.append(("included from", str(job.included)))
+    tables = [Table(("property", "value"), rows)]
+    if not series.moduli.size:
+        return Section("Rubber", tables=tables)
+    branches = zip(series.relaxation_times, series.moduli, strict=True)
+    listed = [(units.text(float(tau), "s"), units.text(float(modulus), "Pa")) for tau, modulus in branches]
+    tables.append(Table(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
+    return Section("Rubber", tables=tables, pictures=[of_panel(partial(_moduli, job=job), CAPTION)])
+
+
+def _temperature(job: Job) -> Iterator[tuple[str, str]]:
+    found = job.material.fitted if isinstance(job.material, Dma) else job.material
+    if isinstance(job.material, Dma):
+        yield "fitted to", str(job.material.path)
+    if isinstance(found, Zener) and found.shift is not None:
+        reference = found.shift.made.reference
+        temperature = reference if found.temperature is None else found.temperature
+        yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
+        yield "shift factor a_T", f"{found.time_factor:.4g}"
+
+
+def _moduli(axes: Axes, job: Job) -> None:
+    """Storage and loss modulus over frequency, and the loss tangent."""
+    series = relaxation_of(job)
+    ends = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
+    frequency = np.logspace(ends.min() - DECADES, ends.max() + DECADES, POINTS)
+    omega = 2 * math.pi * frequency
+    value = np.asarray(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times))
+    axes.loglog(frequency, value.real, label="G' storage", **style.line(0))
+    axes.loglog(frequency, value.imag, label="G'' loss", **style.line(1))
+    axes.set(xlabel="frequency [Hz]", ylabel="shear modulus [Pa]")
+    if band := excited_band(job):
+        axes.axvspan(*band, color=style.GREY, alpha=0.2, lw=0, label="excited by the job")
+    beside = axes.twinx()
+    beside.semilogx(frequency, value.imag / value.real, label="tan δ", **style.line(2))
+    beside.set_ylabel("tan δ")
+    beside.set_ylim(bottom=0.0)
+    beside.grid(False)
+    (handles, names), (more, other) = axes.get_legend_handles_labels(), beside.get_legend_handles_labels()
+    beside.legend([*handles, *more], [*names, *other], fontsize=8)

@@ -1,0 +1,109 @@
+"""What a report consists of: texts, tables, pictures, maps to browse and data, all of it inside the page."""
+
+import base64
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from ..record.pictures import style
+from ..record.pictures.charts import Chart, draw
+from ..record.pictures.run import Panel
+
+SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
+RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells under the names of columns, both as texts."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture as a data: URI, and what it shows; a `wide` one stands alone."""
+
+    uri: str
+    caption: str
+    wide: bool = False
+
+
+@dataclass(frozen=True)
+class Browser:
+    """Pictures of a map, one of which is shown at a time: what each of them shows, and their data: URIs."""
+
+    name: str
+    labels: Sequence[str]
+    uris: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Download:
+    """A file inside the page."""
+
+    name: str
+    uri: str
+    size: int
+
+
+@dataclass(frozen=True)
+class Section:
+    """One heading of a report and all that is under it, in this order; `texts` are shown as they are."""
+
+    title: str
+    sentences: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    pictures: Sequence[Picture] = ()
+    browsers: Sequence[Browser] = ()
+    texts: Sequence[tuple[str, str]] = ()
+    downloads: Sequence[Download] = ()
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is nothing to show."""
+        parts = (self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads)
+        return not any(parts)
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """All about one output directory."""
+
+    title: str
+    directory: Path
+    kind: str
+    sections: Sequence[Section]
+
+
+def of_chart(chart: Chart, caption: str = "") -> Picture:
+    """A picture of one chart."""
+    return of_panel(partial(draw, chart), caption or f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
+
+
+def of_panel(panel: Panel, caption: str) -> Picture:
+    """A picture of one panel, as SVG."""
+    file = io.BytesIO()
+    with rc_context(RC):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        panel(figure.subplots())
+        figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
+    return Picture(uri_of(file.getvalue(), "image/svg+xml"), caption)
+
+
+def of_file(path: Path, kind: str = "text/csv") -> Download:
+    """A file to be downloaded from the page."""
+    data = path.read_bytes()
+    return Download(path.name, uri_of(data, kind), len(data))
+
+
+def uri_of(data: bytes, kind: str) -> str:
+    """Data as a URI: nothing has to be loaded from elsewhere."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"

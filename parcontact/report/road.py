@@ -1,0 +1,42 @@
+"""The section about the rigid surface: its shapes, its spectra, and what it is like on the grid of the job."""
+
+from functools import partial
+
+from .. import rigid_surface
+from ..errors import InputError
+from ..job import Job, table
+from ..parallel.fft import FFT
+from ..parallel.mpi import MPI
+from ..parallel.slab import Slab
+from ..record.pictures import surface, units
+from ..road import statistics
+from .parts import Section, Table, of_panel
+
+MOST_POINTS = 2**22  # of a surface that is made anew for a report
+
+
+def section(job: Job) -> Section:
+    """Of the surface of a job, made anew; where its files are gone or it is too large, of what the job says."""
+    shapes = Table(("shape",), [(table.line(part),) for part in job.surface], "shapes, whose heights add up")
+    if job.grid.nx * job.grid.ny > MOST_POINTS:
+        return Section("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
+    slab = Slab(MPI.COMM_SELF, *job.grid.points)
+    try:
+        made, told = rigid_surface.make_surface(job, FFT(slab))
+    except InputError as error:
+        return Section("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
+    heights = made.heights((0.0, 0.0), slab.empty())
+    found = statistics.describe(heights, job.grid.size)
+    if not found.rms_height:
+        return Section("Surface", [*told, "The surface is flat."], [shapes])
+    rows = [
+        ("rms height", units.text(found.rms_height, "m", 4)),
+        ("rms slope", f"{found.rms_slope:.4g}"),
+        ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
+        ("Nayak's parameter", f"{found.nayak:.4g}"),
+        ("Hurst exponent", f"{found.hurst:.3g}" if found.hurst == found.hurst else "no self-affine range was found"),
+    ]
+    tables = [shapes, Table(("on the grid of the job", "value"), rows)]
+    sketch = surface.Sketch(heights, job.grid.size, found)
+    pictures = [of_panel(partial(panel, sketch=sketch), caption) for caption, panel in surface.PANELS.items()]
+    return Section("Surface", told, tables, pictures)

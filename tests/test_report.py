@@ -1,0 +1,179 @@
+"""`parcontact report`: one file that loads nothing from elsewhere and holds all that a directory tells."""
+
+import base64
+import csv
+import io
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from drawing import ELASTIC, LOADS, SLIDE, STRIP, WAVE, ZENER, ran
+from mpi4py import MPI
+from PIL import Image
+
+from parcontact import job
+from parcontact.errors import InputError
+from parcontact.parallel.slab import Slab
+from parcontact.report import page
+from parcontact.steady_sliding import curve
+
+VOID = {"meta", "link", "img", "input", "br"}
+LOADS_FROM = {"src", "href", "srcset", "data", "poster", "action"}
+
+
+class Page(HTMLParser):
+    """Whether every element is closed in order, and what a page holds."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: Counter[str] = Counter()
+        self.urls: list[tuple[str, str]] = []
+        self.headings: list[str] = []
+        self.downloads: dict[str, bytes] = {}
+        self.text = text
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen[tag] += 1
+        found = {name: value or "" for name, value in attrs}
+        self.urls += [(tag, value) for name, value in found.items() if name in LOADS_FROM]
+        if "download" in found:
+            self.downloads[found["download"]] = decoded(found["href"])
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "h2":
+            self.headings.append(data)
+
+    @property
+    def pictures(self) -> list[bytes]:
+        return [decoded(url) for tag, url in self.urls if tag == "img"]
+
+
+def decoded(uri: str) -> bytes:
+    assert uri.startswith("data:")
+    return base64.b64decode(uri.partition(",")[2], validate=True)
+
+
+def size(picture: bytes) -> tuple[float, float]:
+    """Of an SVG [pt] or another picture [pixels]."""
+    if picture.startswith(b"<?xml"):
+        root = ElementTree.fromstring(picture)
+        assert len(list(root.iter())) > 20
+        return float(root.attrib["width"].removesuffix("pt")), float(root.attrib["height"].removesuffix("pt"))
+    return Image.open(io.BytesIO(picture)).size
+
+
+def check(found: Page) -> None:
+    """Nothing is loaded from elsewhere, and every picture is one."""
+    for tag, url in found.urls:
+        assert url.startswith("data:" if tag != "a" else ("data:", "#")), url
+    assert "@import" not in found.text
+    assert "url(" not in found.text
+    assert "fetch(" not in found.text
+    assert all(min(size(picture)) > 100 for picture in found.pictures)
+
+
+COMMON = ["What was asked", "Rubber", "Surface", "Cost", "Warnings", "Provenance", "What to cite", "Data"]
+
+
+def test_run(tmp_path: Path) -> None:
+    """Four charts, four panels of the surface, the moduli, and two maps of each of the saved instants."""
+    out = ran(
+        tmp_path, f"title: <b>Rubber</b> & road\n{WAVE}{ZENER}{SLIDE}output: {{fields: [pressure, gap], every: 8}}\n"
+    )
+    found = Page(page.write([out]).read_text())
+    check(found)
+    assert found.headings == ["Results of the run", *COMMON]
+    assert "&lt;b&gt;Rubber&lt;/b&gt; &amp; road" in found.text
+    saved = 3  # the initial state, and steps 8 and 16
+    assert len(found.pictures) == 4 + 4 + 1 + 2 * saved
+    assert found.seen["input"] == 2
+    assert found.downloads == {"measures.csv": (out / "measures.csv").read_bytes()}
+    for told in ("relaxation_time: 1.0e-3", "<td>2 MPa</td>", "<td>1 ms</td>", "operator calls"):
+        assert told in found.text
+
+
+def test_single_solves_and_strips(tmp_path: Path) -> None:
+    found = Page(page.write([ran(tmp_path, STRIP + ELASTIC + LOADS + "output: {fields: pressure}\n")]).read_text())
+    check(found)
+    assert found.headings == ["Results of the run", *COMMON]
+
+
+def solved(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "curve.yaml"
+    path.write_text(text)
+    loaded = job.load(path, [f"output.directory={tmp_path / 'steady'}", "steady.pressures=[1.0e3]"])
+    assert curve.run(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points), curve.request(loaded), quiet=True) == 0
+    return tmp_path / "steady"
+
+
+def test_curve_and_run_together(tmp_path: Path) -> None:
+    """Both in one page, without a comparison, for they have no axis in common; maps are browsed over velocity."""
+    steady = solved(tmp_path, WAVE + ZENER + "steady: {velocities: [0.1, 1.0]}\noutput: {fields: pressure}\n")
+    out = ran(tmp_path, WAVE + ZENER + SLIDE)
+    found = Page(page.write([steady, out], tmp_path / "both.html").read_text())
+    check(found)
+    assert found.headings == ["Friction curve", *COMMON, "Results of the run", *COMMON]
+    assert "1 m/s, 1 kPa" in found.text
+    assert set(found.downloads) == {"steady.csv", "measures.csv"}
+
+
+def test_two_curves_together(tmp_path: Path) -> None:
+    """What they have in common, friction and contact area, is drawn above the chapter of each."""
+    paths = []
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        text = (
+            "velocity,pressure,friction,contact_area,seconds,operator_calls\n0.1,1e3,0.1,0.2,1,5\n1,1e3,0.2,0.1,1,5\n"
+        )
+        (tmp_path / name / "steady.csv").write_text(text)
+        paths.append(tmp_path / name)
+    found = Page(page.write(paths).read_text())
+    check(found)
+    assert found.headings == ["Together", *2 * ["Friction curve", "Provenance", "What to cite", "Data"]]
+    assert len(found.pictures) == 2 + 2 * 2
+
+
+def test_sweep_and_study(tmp_path: Path) -> None:
+    """Tables without maps: the words of their files are cells, and no key of a job is lost."""
+    head = ("case", "history.0.velocity", "state", "mu_max", "mu_dyn", "contact_area")
+    with (tmp_path / "sweep.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([head, (0, 0.1, "done", 0.25, 0.2, 0.5), (1, 1.0, "failed", "", "", "")])
+    (tmp_path / "study.csv").write_text("fingerprint,mesh,integrator,mu_max\nabc,64,exponential,0.123456789\n")
+    (tmp_path / "study.txt").write_text("for 1 %: mesh 64\n")
+    found = Page(page.write([tmp_path]).read_text())
+    check(found)
+    assert found.headings == ["Sweep", "What accuracy costs", "Provenance", "What to cite", "Data"]
+    for told in ("<td>failed</td>", "<td>0.12346</td>", "<td>exponential</td>", "for 1 %: mesh 64"):
+        assert told in found.text
+
+
+def test_heights_that_are_gone(tmp_path: Path) -> None:
+    """A report tells what there is: the surface cannot be made anew, all else is there."""
+    np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(32, 32)))
+    surface = WAVE.replace(
+        "{shape: wave, amplitude: 1.0e-6, waves: [1, 1]}", "{shape: file, path: road.npy, scale: 1.0e-7}"
+    )
+    out = ran(tmp_path, surface + ELASTIC + LOADS)
+    (tmp_path / "road.npy").unlink()
+    assert Page(page.write([out]).read_text()).headings == ["Results of the run", *COMMON]
+
+
+@pytest.mark.parametrize(
+    ("name", "out", "told"),
+    [("nowhere", None, "is no directory"), (".", None, "holds no results"), (".", "report.pdf", r"must end in \.html")],
+)
+def test_nothing_to_report(tmp_path: Path, name: str, out: str | None, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        page.write([tmp_path / name], tmp_path / out if out else None)
+    assert not list(tmp_path.iterdir())
