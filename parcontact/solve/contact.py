@@ -8,7 +8,8 @@ with A a symmetric positive operator. It is the minimum of `f(p) = <p, A p>/2 - 
 iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C` = subtract the mean over it:
 
 1. the working set is the contact (p > 0) and the points that penetrate (g < 0): these enter by the search direction;
-2. residual `r = C R g`, preconditioned `z = C R K r` with K close to the inverse of A;
+2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on a few
+   cells beyond the set (`surround`);
 3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is no descent;
 4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, then scaled to the mean P0;
 5. f must not rise: else the step is halved along this path and the direction is forgotten.
@@ -21,24 +22,19 @@ the number of iterations nearly independent of the grid. Everything here is dime
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import kernels
 from .certificate import Certificate
+from .operator import Operator
+from .surround import Surround
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 NOT_FINITE = "met numbers that are not finite"
-
-
-class Operator(Protocol):
-    """A linear map from maps to maps; applying it is collective."""
-
-    def apply(self, field: Array, out: Array) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,7 @@ def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:
 
 
 class ContactSolver:
-    """Loop for contacts on one grid, and the maps that it works in: four, and a byte per point.
+    """Loop for contacts on one grid, and the maps that it works in: four, and two bytes per point.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
     lowest to its highest point, in the unit of h: what gaps are compared with; `tolerance` on the certificate;
@@ -140,11 +136,12 @@ class ContactSolver:
         self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
         self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
         self._working = slab.zeros(np.bool_)
+        self._surround = Surround(slab, preconditioner)
 
     @staticmethod
     def footprint(cells: int, itemsize: int) -> int:
         """Bytes that it holds for so many points of this rank."""
-        return (4 * itemsize + 1) * cells
+        return (4 * itemsize + 1) * cells + Surround.footprint(cells)
 
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution
@@ -236,7 +233,7 @@ class ContactSolver:
         The residual is `u - h - level` on the working set; the one before is in `_w`. The map z is free to be used.
         """
         kernels.residual(self._working, self._u, h, level, z)
-        self.preconditioner.apply(z, z)
+        self._surround.apply(self._working, z)
         sums = kernels.products(self._working, self._u, h, level, self._w, z, self._t)
         sum_z, sum_t, sum_old, r_z, old_z, r_t = self.slab.sum(*sums)
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
-from .contact import Operator
+from .operator import Operator
 
 
 class Directions:

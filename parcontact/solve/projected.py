@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .contact import Operator
 from .gcr import gaps_on, residual, spread, sum_on
+from .operator import Operator
 from .surround import Surround
 
 Set = NDArray[np.bool_]
@@ -35,7 +35,7 @@ class Projected:
         self.slab, self.operator = slab, operator
         t, w, self.r, self.z = lent
         self.t, self.w = t[:DIRECTIONS], w[:DIRECTIONS]
-        self.surround = Surround(slab, preconditioner, dtype)
+        self.surround = Surround(slab, preconditioner)
 
     def begin(self) -> None:
         """Forget earlier changes."""
@@ -46,7 +46,8 @@ class Projected:
         """Move x, which is then admissible and has the sum `load`, and its image u with it; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         residual(working, u, h, total / members, self.r)
-        self.surround.apply(working, self.r, self.z)
+        self.z[...] = self.r
+        self.surround.apply(working, self.z)
         _, mean = self.slab.sum(*sum_on(working, self.z))
         spread(working, self.z, mean / members, self.t[0])
         self.operator.apply(self.t[0], self.w[0])

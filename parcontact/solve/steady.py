@@ -23,8 +23,9 @@ from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
 from .certificate import Certificate
-from .contact import Operator, certify, weigh
+from .contact import certify, weigh
 from .gcr import Directions, gaps_on
+from .operator import Operator
 from .projected import Projected
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
