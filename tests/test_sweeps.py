@@ -1,6 +1,7 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
 import csv
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -68,6 +69,21 @@ def test_a_case_that_fails_does_not_stop_the_others(
 
 def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> None:
     assert seeds_done(cases, {2: 3}) == (3, [1, 2, 3])
+
+
+def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    begun: list[int] = []
+
+    def slab_of(job: Job) -> Slab:
+        return Slab(MPI.COMM_SELF, *job.grid.points)
+
+    def act(job: Job, slab: Slab) -> int:
+        begun.append(1)
+        return 0
+
+    assert sweep.run(cases, cases, slab_of, act, limit=time.time() + 1.0) == 3
+    assert not begun
+    assert capsys.readouterr().out == "stopped before case 0: the wall time is nearly used up; run again to go on\n"
 
 
 def test_a_stop_file_ends_the_sweep_between_cases(cases: tuple[Case, ...]) -> None:

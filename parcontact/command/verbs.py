@@ -40,12 +40,13 @@ def steady(options: argparse.Namespace) -> int:
 def _each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
     """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective."""
     from ..parallel.slab import Slab
-    from ..run import sweep
+    from ..run import sweep, watch
 
     cases, chosen = on_root(world, lambda: _cases(options))
     if not cases[0].settings:
         return act(cases[0].job, Slab(world, *cases[0].job.grid.points))
-    return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act, options.quiet, runs)
+    limit = watch.limit(getattr(options, "wall", None))
+    return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act, options.quiet, runs, limit)
 
 
 def _cases(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:

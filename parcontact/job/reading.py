@@ -54,7 +54,8 @@ def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
     if found is None:
         raise JobError(_told(given, mistakes))
     if sweep:
-        sentence = f"sweep has {len(sweep)} cases, numbered from 0; choose one of them with --case"
+        advice = "choose one of them (--case) or leave it out (--set sweep=null)"
+        sentence = f"sweep has {len(sweep)} cases, numbered from 0; {advice}"
         raise JobError([str(Mistake(sweep.place, sentence))])
     return found.job
 

@@ -1,6 +1,7 @@
 """The cases of a sweep, one after the other; those that have finished are passed over."""
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from ..errors import InputError, RunError
 from ..job import Case, Job
 from ..parallel.slab import Slab
 from ..record import sweep_table
+from . import watch
 from .runner import AGAIN, DONE
 
 FAILED = 1
@@ -21,16 +23,20 @@ def run(
     act: Callable[[Job, Slab], int],
     quiet: bool = False,
     runs: bool = True,
+    limit: float | None = None,
 ) -> int:
     """Do `act` with each of the chosen cases, and collect what all have come to; collective. Returns the exit code.
 
     A case that fails does not stop the others: the code is 1 in the end. One that stops early with a checkpoint stops
-    the sweep, with its code: the same command goes on with it. Unless `act` runs the case, its failure is not noted.
+    the sweep, with its code: the same command goes on with it. So do a stop file, and the end of the wall time, `limit`
+    in the time of `time.time`, before a case begins. Unless `act` runs the case, its failure is not noted.
     """
     directory, code = cases[0].job.output.directory.parent.parent, DONE
     for case in chosen:
         slab = slab_of(case.job)
-        if slab.agree(_stopped(directory) if slab.root else False):
+        if reason := slab.agree(_reason_to_stop(directory, limit) if slab.root else ""):
+            if slab.root and not quiet:
+                print(f"stopped before case {case.number}: {reason}; run again to go on", flush=True)
             return AGAIN
         if slab.root and not quiet:
             print(f"{case} (of {len(cases)})", flush=True)
@@ -56,8 +62,10 @@ def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool
     return code
 
 
-def _stopped(directory: Path) -> bool:
+def _reason_to_stop(directory: Path, limit: float | None) -> str:
+    if limit is not None and time.time() + watch.RESERVE_SECONDS > limit:
+        return watch.REASONS[watch.WALL]
     file = directory / STOP
     found = file.exists()
     file.unlink(missing_ok=True)
-    return found
+    return watch.REASONS[watch.FILE] if found else ""
