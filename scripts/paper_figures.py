@@ -9,7 +9,7 @@ Run it with the Python of .venv. What is not there yet is left out, and said.
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,19 +40,19 @@ class MissingError(Exception):
     """What a figure is drawn from is not there."""
 
 
-def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray]:
-    path = directory / name
+def there(path: Path) -> Path:
     if not path.is_file():
         raise MissingError(f"{path} is missing")
-    return {key: np.array(values) for key, values in measures.read(path).items()}
+    return path
+
+
+def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray]:
+    return {key: np.array(values) for key, values in measures.read(there(directory / name)).items()}
 
 
 def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
     figure = Figure(figsize=(WIDTH, 0.15 + height * count), layout="constrained")
     return figure, figure.subplots(count, 1, squeeze=False)[:, 0]
-
-
-# -- the sphere -------------------------------------------------------------------------------------------------------
 
 
 def moduli(job: Job) -> tuple[float, float]:
@@ -80,9 +80,7 @@ def fig02(out: Path) -> Figure:
 
 
 def fig03(out: Path) -> Figure:
-    directory = out / "fig03_sphere_pressure"
-    if not (directory / "fields.h5").is_file():
-        raise MissingError(f"{directory / 'fields.h5'} is missing")
+    directory = there(out / "fig03_sphere_pressure" / "fields.h5").parent
     job = load(JOBS / "fig03_sphere_pressure.yaml")
     glassy, rubbery = moduli(job)
     force = job.history[0].load.end
@@ -100,15 +98,11 @@ def fig03(out: Path) -> Figure:
         for number, instant in enumerate(INSTANTS):
             at = int(np.nanargmin(np.abs(times / CREEP_TIME - instant) - 1e-9 * np.arange(times.size)))
             where = (x - centre - speed * times[at]) / a
-            axes.plot(
-                where, pressure[at, middle] / mean, **style.line(number), label=f"t = {times[at] / CREEP_TIME:.2g} τ₀"
-            )
+            label = f"t = {times[at] / CREEP_TIME:.2g} τ₀"
+            axes.plot(where, pressure[at, middle] / mean, **style.line(number), label=label)
     axes.set(xlabel="position $(x - Vt)/a^*$", ylabel="pressure $p/p_0$", xlim=(-2.6, 2.6), ylim=(0, 2.2))
     axes.legend(loc="upper center", ncols=2)
     return figure
-
-
-# -- the surface and the compound -------------------------------------------------------------------------------------
 
 
 def ring_means(heights: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -123,9 +117,7 @@ def ring_means(heights: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray
 
 
 def fig05(out: Path) -> Figure:
-    directory = out / "fig05_surface"
-    if not (directory / "fields.h5").is_file():
-        raise MissingError(f"{directory / 'fields.h5'} is missing")
+    directory = there(out / "fig05_surface" / "fields.h5").parent
     job = load(directory / "job.resolved.yaml")
     part, size = job.surface[0], job.grid.lx
     with h5py.File(directory / "fields.h5") as fields:
@@ -173,9 +165,6 @@ def fig07(out: Path) -> Figure:
     return figure
 
 
-# -- rough sliding ----------------------------------------------------------------------------------------------------
-
-
 def over_distance(axes: Axes, directory: Path, name: str, label: str, number: int = 0, start: float = 0.0) -> None:
     """Simulation and theory of one case over the distance slid since an instant [s]; logarithmic, in um."""
     for table, dashes, of in (("measures.csv", "-", "simulation"), ("theory.csv", "--", "theory")):
@@ -200,13 +189,6 @@ def fig08(out: Path) -> Figure:
     return figure
 
 
-def sweep_rows(out: Path, name: str) -> list[dict[str, Any]]:
-    path = out / name / "sweep.csv"
-    if not path.is_file():
-        raise MissingError(f"{path} is missing")
-    return sweep_table.read(path)
-
-
 def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Values of a key, means and standard deviations over its cases that are done."""
     at = sorted({row[key] for row in rows})
@@ -218,7 +200,7 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
 
 def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> Figure:
     """Friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds."""
-    rows = sweep_rows(out, name)
+    rows = sweep_table.read(there(out / name / "sweep.csv"))
     figure, (top, middle, bottom) = panels(3, 1.75)
     quantities = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))
     for number, (axes, (column, short)) in enumerate(zip((top, top, middle), quantities, strict=True)):
@@ -286,26 +268,16 @@ def box(out: Path) -> Figure:
     return figure
 
 
-FIGURES: dict[str, Callable[[Path], Figure]] = {
-    "2": fig02,
-    "3": fig03,
-    "5": fig05,
-    "7": fig07,
-    "8": fig08,
-    "9": fig09,
-    "10": fig10,
-    "11": fig11,
-    "box": box,
-}
-STEMS = {name: f"fig{int(name):02d}" if name.isdecimal() else name for name in FIGURES}
+FIGURES = {"2": fig02, "3": fig03, "5": fig05, "7": fig07, "8": fig08, "9": fig09, "10": fig10, "11": fig11, "box": box}
 
 
 def draw(name: str, out: Path, to: Path) -> Path:
     with rc_context(RC):
         figure = FIGURES[name](out)
         to.mkdir(parents=True, exist_ok=True)
-        figure.savefig(to / f"{STEMS[name]}.png", dpi=DPI)
-    return to / f"{STEMS[name]}.png"
+        path = to / (f"fig{int(name):02d}.png" if name.isdecimal() else f"{name}.png")
+        figure.savefig(path, dpi=DPI)
+    return path
 
 
 def main(argv: Sequence[str] | None = None) -> int:
