@@ -1,29 +1,30 @@
 """What Persson's theory predicts for a job with one rough surface: friction and contact area at each instant."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from . import job as jobs
 from . import scene
-from .effects.relaxation import relaxation_of
+from .effects.relaxation import relaxation_of, time_factor_of
 from .errors import InputError
 from .job import Job
 from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
-from .physics.prony import Prony
+from .physics.prony import Prony, complex_modulus
 from .physics.roughness import EDGE, Roughness
 from .record import files, hdf5
-from .theory import full_contact, persson_rings
+from .steady_sliding.curve import Request
+from .theory import full_contact, persson, persson_rings
 from .theory.persson_history import Leg, Memory, follow
 from .theory.persson_rings import Rings
 
 COLUMNS = ("time", "distance", "pressure", "friction", "contact_area")
-FILE = "theory.csv"
+FILE, STEADY_FILE = "theory.csv", "steady_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
 
@@ -45,20 +46,66 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
     """
     _refuse_unknown(job)
     timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)
-    rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, timeline)
+    rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
     memory = Memory(rings, _material(job))
     if job.initial.state == "steady":
         memory.slide_for_ever(job.initial.velocity)
     return _rows(job, timeline, memory, gamma)
 
 
+class SteadyInstant(NamedTuple):
+    """One row of steady_theory.csv: m/s, Pa, deg C (NaN: that of the job), a_T, and two ratios."""
+
+    velocity: float
+    pressure: float
+    temperature: float
+    shift_factor: float
+    friction: float
+    contact_area: float
+
+
+def has_spectrum(job: Job) -> bool:
+    """Whether the theory knows the surface of a job without its heights: a periodic one with one rough surface."""
+    rough = [part for part in job.surface if isinstance(part, jobs.Rough)]
+    known = all(isinstance(part, jobs.Rough | jobs.Flat) for part in job.surface)
+    return job.grid.boundary == "periodic" and len(rough) == 1 and known
+
+
+def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> Iterator[SteadyInstant]:
+    """Friction and contact area of the steady states of a curve, for the job's spectrum as an unbounded surface has it.
+
+    Raises InputError for jobs that the theory does not know.
+    """
+    rings = _continuum(job, 0.0)
+    _, kx, ky = rings.waves
+    for speed, pressure, temperature in wanted.points:
+        at = job if math.isnan(temperature) else job.at_temperature(temperature)
+        body, (vx, vy) = _material(at), wanted.velocity(speed)
+        omega = full_contact.frequency(kx, ky, vx, vy)
+        modulus = complex_modulus(omega, body.modulus_inf, body.moduli, body.relaxation_times)
+        friction = persson.friction_coefficient(pressure, rings, vx, vy, modulus, gamma)
+        area = persson.contact_area(pressure, rings, modulus)
+        yield SteadyInstant(speed, pressure, temperature, time_factor_of(at), float(friction), float(area))
+
+
+def write_steady(job: Job, wanted: Request) -> Path:
+    """The prediction for a curve as steady_theory.csv beside it, in whose picture it is then; returns the picture."""
+    _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, predict_steady(job, wanted))
+    from .record import plots  # matplotlib is slow to import, and for pictures only
+
+    return plots.draw_steady(job.output.directory / "steady.csv")
+
+
 def write(job: Job, rows: Iterator[Instant]) -> Path:
     """The rows as theory.csv in the output directory of the job; returns its path."""
-    path = job.output.directory / FILE
+    return _write(job.output.directory / FILE, COLUMNS, rows)
+
+
+def _write(path: Path, columns: Sequence[str], rows: Iterator[Any]) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.replaced(path) as file:
-            file.write(f"{','.join(COLUMNS)}\n".encode())
+            file.write(f"{','.join(columns)}\n".encode())
             for row in rows:
                 file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
     except OSError as error:
@@ -89,7 +136,7 @@ def _lattice(job: Job, slab: Slab) -> Rings:
         raise InputError(f"surface: {error}") from None
 
 
-def _continuum(job: Job, timeline: Timeline) -> Rings:
+def _continuum(job: Job, slide: float) -> Rings:
     """The spectrum between the limits of the job, of which the box holds nothing longer than its longer side."""
     rough = [part for part in job.surface if isinstance(part, jobs.Rough)]
     if len(rough) != 1 or any(not isinstance(part, jobs.Rough | jobs.Flat) for part in job.surface):
@@ -100,7 +147,7 @@ def _continuum(job: Job, timeline: Timeline) -> Rings:
     if k_long >= EDGE * k_short:
         raise InputError("surface: the theory needs waves between long_wavelength and short_wavelength, got equal ones")
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
-    limits = (k_long, k_short, _longest_slide(timeline), (k_rolloff,))
+    limits = (k_long, k_short, slide, (k_rolloff,))
     unit = persson_rings.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)
     amplitude, kx, ky = unit.waves
     power = np.abs(amplitude) ** 2 / 2

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     Act = Callable[[Job, Slab], int]
 
+OF_A_CURVE = ("velocities", "pressures", "temperatures")
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: stopped early, run again
 
 
@@ -58,12 +59,17 @@ def _cases(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]
 
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab) -> int:
+    from .. import prediction
     from ..steady_sliding import curve
 
-    wanted = curve.request(job, getattr(options, "velocities", ()), getattr(options, "pressures", ()))
+    asked = [getattr(options, name, ()) for name in OF_A_CURVE]
+    wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    return curve.run(job, slab, wanted, options.quiet, options.restart)
+    code = curve.run(job, slab, wanted, options.quiet, options.restart)
+    if code == DONE and prediction.has_spectrum(job):
+        on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
+    return code
 
 
 def check(options: argparse.Namespace) -> int:
@@ -261,9 +267,9 @@ def _load(options: argparse.Namespace, world: MPI.Intracomm) -> Job:
 def _overrides(options: argparse.Namespace) -> list[str]:
     """What the command line changes in a job; the name of a directory is taken as it is, whatever YAML would read.
 
-    Velocities and pressures of a friction curve are keys of the job, which then needs no history.
+    Velocities, pressures and temperatures of a friction curve are keys of the job, which then needs no history.
     """
     name = "".join(f"\\U{ord(letter):08x}" for letter in options.out or "")
-    asked = {key: getattr(options, key, ()) for key in ("velocities", "pressures")}
+    asked = {key: getattr(options, key, ()) for key in OF_A_CURVE}
     curve = [f"steady.{key}={list(values)!r}" for key, values in asked.items() if values]
     return [*options.set, *curve, *([f'output.directory="{name}"'] if options.out is not None else [])]

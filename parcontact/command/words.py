@@ -92,6 +92,8 @@ def _parser() -> argparse.ArgumentParser:
     for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
         text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
         steady.add_argument(f"--{name}", metavar="A:B:N", type=_values, default=(), help=text)
+    text = "temperatures [deg C], T,T,... (negative ones first: --temperatures=-20,0); the material needs a shift"
+    steady.add_argument("--temperatures", metavar="T,...", type=_degrees, default=(), help=text)
     text = "go on with the points that lack (auto, the default), or start afresh and replace what is there (never)"
     steady.add_argument("--restart", metavar="auto|never", choices=("auto", "never"), default="auto", help=text)
     steady.add_argument("--quiet", action="store_true", help="print only warnings and errors")
@@ -269,6 +271,13 @@ def _values(text: str) -> tuple[float, ...]:
         return _spaced(text) if ":" in text else tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be first:last:count or a list of numbers, got {text!r}") from None
+
+
+def _degrees(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a list of temperatures [deg C], got {text!r}") from None
 
 
 def _spaced(text: str) -> tuple[float, ...]:

@@ -9,14 +9,16 @@ from typing import Any, ClassVar
 from numpy.typing import DTypeLike
 from pydantic import Field
 
-from ..job import Elastic, Job, Zener
+from ..job import Job
 from ..job.fault import Fault
 from ..job.part import Part, Rule
 from ..job.values import Positive
 from ..physics.entries import Entry
 from ..physics.interface import InterfaceFriction
+from ..physics.measures import Measures
 from ..physics.units import Units
 from .effect import Decision, Instant
+from .relaxation import time_factor_of
 
 LEAST_POISSON = 0.49  # below it shear moves the surface, and the solve would have to be coupled
 
@@ -52,9 +54,15 @@ def interface_of(job: Job) -> InterfaceFriction | None:
     section: Interface | None = getattr(job, "interface", None)
     if section is None:
         return None
-    body = job.material if isinstance(job.material, Elastic | Zener) else job.material.fitted
-    shift = body.time_factor if isinstance(body, Zener) else 1.0
-    return InterfaceFriction(section.shear_stress, section.velocity, section.width or 1.0, shift)
+    return InterfaceFriction(section.shear_stress, section.velocity, section.width or 1.0, time_factor_of(job))
+
+
+def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
+    """What of friction comes from the body, along the velocity, and what from the interface."""
+    speed = math.hypot(*velocity)
+    opposing = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / speed if speed else 0.0
+    whole = opposing / measures.normal_force if measures.normal_force > 0.0 else 0.0
+    return whole - measures.friction_interface, measures.friction_interface
 
 
 class InterfaceColumns:
@@ -79,11 +87,7 @@ class InterfaceColumns:
         self._values = (0.0, 0.0)
 
     def follow(self, instant: Instant) -> None:
-        measures, (x, y) = instant.measures, instant.step.velocity
-        speed = math.hypot(x, y)
-        opposing = -(measures.force_x * x + measures.force_y * y) / speed if speed else 0.0
-        whole = opposing / measures.normal_force if measures.normal_force > 0.0 else 0.0
-        self._values = whole - measures.friction_interface, measures.friction_interface
+        self._values = shares(instant.measures, instant.step.velocity)
 
     def values(self) -> Sequence[float]:
         return self._values

@@ -24,6 +24,12 @@ def relaxation_of(job: Job) -> Prony:
     return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], all_times)
 
 
+def time_factor_of(job: Job) -> float:
+    """By what factor relaxation times at the temperature of a job are longer than at the reference, a_T [-]."""
+    body = job.material.fitted if isinstance(job.material, jobs.Dma) else job.material
+    return body.time_factor if isinstance(body, jobs.Zener) else 1.0
+
+
 def decide(job: Job) -> Decision:
     """One map per branch that relaxes, and the last displacement."""
     count = relaxation_of(job).moduli.size

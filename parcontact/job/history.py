@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create
 
 from .fault import Fault, quote, refuse
 from .part import Part, Rule
+from .temperature import Celsius
 from .values import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 
 Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
@@ -183,7 +184,7 @@ def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
 
 
 class Steady(Part):
-    """Steady sliding solved directly, for each speed under each pressure."""
+    """Steady sliding solved directly, for each speed under each pressure, at each temperature."""
 
     velocities: Annotated[tuple[Positive, ...], BeforeValidator(_numbers)] = Field(
         description="positive speeds [m/s]: a list, or first:last:count"
@@ -191,10 +192,13 @@ class Steady(Part):
     pressures: Annotated[tuple[Positive, ...] | None, BeforeValidator(_numbers)] = Field(
         default=None, description="positive pressures [Pa]: a list, or first:last:count"
     )
+    temperatures: Annotated[tuple[Celsius, ...] | None, BeforeValidator(listed)] = Field(
+        default=None, description="temperatures [deg C]: a list"
+    )  # default: that of the material
     direction: tuple[Real, Real] = Field(default=(1.0, 0.0), description="a direction [x, y] [-]")
     waves: Flag = Field(default=False, description="true or false")
 
-    rules = (_some("velocities"), _some("pressures"), Rule(("direction",), _directed))
+    rules = (_some("velocities"), _some("pressures"), _some("temperatures"), Rule(("direction",), _directed))
 
     @property
     def unit_direction(self) -> tuple[float, float]:

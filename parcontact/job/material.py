@@ -203,5 +203,15 @@ class Dma(Part):
         return self._fitted.long_modulus
 
 
+def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
+    """A material at another temperature [deg C]. Raises InputError where nothing says how it depends on it."""
+    body = material.fitted if isinstance(material, Dma) else material
+    if not isinstance(body, Zener):
+        raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")
+    if faults := list(shifted(body.shift, temperature)):
+        raise InputError(f"temperature {temperature:g} C: {faults[0].predicate}")
+    return body.model_copy(update={"temperature": temperature})
+
+
 KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}
 Material = Annotated[Elastic | Zener | Dma, PlainValidator(chosen("model", KINDS))]

@@ -18,7 +18,7 @@ from . import advice, extension, limits, meaning, size, table
 from .fault import Fault
 from .history import Initial, Stage, Steady
 from .loading import Included
-from .material import Dma, Elastic, Material, Zener
+from .material import Dma, Elastic, Material, Zener, heated
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
@@ -190,6 +190,10 @@ class Job(Part):
             *meaning.warnings(*scene, self.initial, self.steady),
             *size.warnings(self.grid, self.timeline(), self.output),
         )
+
+    def at_temperature(self, temperature: float) -> Job:
+        """The same job with its material at another temperature [deg C]; raises InputError where it has no shift."""
+        return self.model_copy(update={"material": heated(self.material, temperature)})
 
     def section(self, name: str) -> Any:
         """The section that an effect has added, None if this job has not given it."""

@@ -133,12 +133,14 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
     sliding = SteadySliding(scene.frame(job, slab))
     building = time.perf_counter() - began
     wanted = request(job)
-    states = [(speed, pressure) for pressure in wanted.pressures for speed in wanted.velocities]
+    states = wanted.points
     stage = StageCost(len(states))
     for index in _spread(len(states)):
         if stage.tried and slab.agree(time.perf_counter() - began - building > seconds):
             break
-        speed, pressure = states[index]
+        speed, pressure, temperature = states[index]
+        if temperature == temperature:
+            sliding.heat(temperature)
         velocity = (speed * wanted.direction[0], speed * wanted.direction[1])
         stage.add(1.0, _cost(slab, partial(_solve_or_fail, sliding, velocity, pressure)))
     return building, [stage]

@@ -24,7 +24,7 @@ from .marker import SCENE, VERBS, Claim
 MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
-    "steady": ("steady.csv", "steady_waves.csv", "steady.h5"),
+    "steady": ("steady.csv", "steady_waves.csv", "steady.h5", "steady_theory.csv"),
     "study": ("study.csv", "study.txt", "convergence.png", "work_precision.png"),
 }
 COPIES = {  # of the job: as given, and with every default

@@ -12,14 +12,14 @@ from .fields import UNITS
 from .provenance import Provenance
 
 KIND = "parcontact steady maps"
-AXES = {"velocity": "m/s", "load": "Pa"}  # of the points; the load is their mean pressure
+AXES = {"velocity": "m/s", "load": "Pa", "temperature": "deg C"}  # of the points; the load is their mean pressure
 
 
 class SteadyMaps:
     """Maps of shape (point, y, x), with the velocity and the load of each point, NaN until it is saved; collective.
 
-    Parameters: where; this rank's rows; the box `size` (lx, ly) [m]; which maps; (velocity [m/s], mean pressure [Pa])
-    of all points. What an earlier part of the same curve has saved stays.
+    Parameters: where; this rank's rows; the box `size` (lx, ly) [m]; which maps; (velocity [m/s], mean pressure [Pa],
+    and perhaps temperature [deg C]) of all points. What an earlier part of the same curve has saved stays.
     """
 
     def __init__(
@@ -28,10 +28,11 @@ class SteadyMaps:
         slab: Slab,
         size: tuple[float, float],
         names: Sequence[str],
-        points: Sequence[tuple[float, float]],
+        points: Sequence[tuple[float, ...]],
         provenance: Provenance,
     ) -> None:
         self.path, self.slab, self.size, self.names, self.points = path, slab, size, tuple(names), list(points)
+        self.axes = dict(list(AXES.items())[: len(self.points[0])])
         if not slab.agree(slab.root and self._fits()):
             self._make(provenance)
 
@@ -42,8 +43,8 @@ class SteadyMaps:
 
         def stamp() -> None:
             with h5py.File(self.path, "r", locking=False) as file:
-                axes = {name: file[name][...] for name in AXES}
-            for name, value in zip(AXES, self.points[index], strict=True):
+                axes = {name: file[name][...] for name in self.axes}
+            for name, value in zip(self.axes, self.points[index], strict=True):
                 axes[name][index] = value
             layout.put(self.path, axes)
 
@@ -56,7 +57,7 @@ class SteadyMaps:
             with h5py.File(self.path, "r") as file:
                 wanted = {name for name in UNITS if name in file} == set(self.names)
                 if wanted and all(file[name].shape == shape for name in self.names):
-                    saved = np.array([file[name][...] for name in AXES]).T
+                    saved = np.array([file[name][...] for name in self.axes]).T
                     return bool(np.all(np.isnan(saved) | np.isclose(saved, self.points, rtol=1e-6)))
         except hdf5.FAILURES:
             pass
@@ -72,7 +73,7 @@ class SteadyMaps:
         file.attrs["kind"] = KIND
         provenance.write(file)
         count = len(self.points)
-        for name, unit in AXES.items():
+        for name, unit in self.axes.items():
             dataset = layout.fixed(file, name, (count,), np.float64)
             dataset[...] = np.nan
             dataset.make_scale(name)
@@ -85,7 +86,7 @@ class SteadyMaps:
         for name in self.names:
             dataset = layout.fixed(file, name, (count, self.slab.ny, self.slab.nx), np.float64)
             dataset.attrs["units"] = UNITS[name]
-            for axis in AXES:
+            for axis in self.axes:
                 dataset.dims[0].attach_scale(file[axis])
             for dimension, axis in ((1, "y"), (2, "x")):
                 dataset.dims[dimension].attach_scale(file[axis])

@@ -17,7 +17,16 @@ KINDS = {  # by the table that each of them has
     "study.csv": ("study", results.of_study),
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
-TABLES = ("measures.csv", "theory.csv", "steady.csv", "steady_waves.csv", "sweep.csv", "sweep_mean.csv", "study.csv")
+TABLES = (
+    "measures.csv",
+    "theory.csv",
+    "steady.csv",
+    "steady_waves.csv",
+    "steady_theory.csv",
+    "sweep.csv",
+    "sweep_mean.csv",
+    "study.csv",
+)
 
 
 def chapter(directory: Path) -> Chapter:

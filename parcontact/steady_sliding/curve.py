@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 from .. import sanity, scene
 from ..errors import InputError, RunError
@@ -21,25 +22,38 @@ DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed
 SAME = (*marker.SCENE, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
 
 
+class Wanted(NamedTuple):
+    """One steady state: speed [m/s], mean pressure [Pa], temperature [deg C], NaN for that of the material."""
+
+    speed: float
+    pressure: float
+    temperature: float = math.nan
+
+
 @dataclass(frozen=True)
 class Request:
-    """Which steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa]."""
+    """Which steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa], at each
+    of the temperatures [deg C], if there are any."""
 
     velocities: tuple[float, ...]
     pressures: tuple[float, ...]
     direction: tuple[float, float] = (1.0, 0.0)
     waves: bool = False
+    temperatures: tuple[float, ...] = ()
 
     @property
-    def points(self) -> list[tuple[float, float]]:
-        """Speed and pressure of each point, in the order in which they are solved."""
-        return [(speed, pressure) for pressure in self.pressures for speed in self.velocities]
+    def points(self) -> list[Wanted]:
+        """All points, in the order in which they are solved."""
+        order = product(self.temperatures or (math.nan,), self.pressures, self.velocities)
+        return [Wanted(speed, pressure, temperature) for temperature, pressure, speed in order]
 
     def velocity(self, speed: float) -> tuple[float, float]:
         return speed * self.direction[0], speed * self.direction[1]
 
 
-def request(job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = ()) -> Request:
+def request(
+    job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
+) -> Request:
     """What a job's `steady` section asks for, changed by what is given here; raises InputError if something lacks."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
@@ -53,7 +67,10 @@ def request(job: Job, velocities: Sequence[float] = (), pressures: Sequence[floa
     if job.grid.boundary == "free" and section and section.waves:
         raise InputError("steady.waves: the waves of a free scene are not independent; it needs a periodic one")
     direction = section.unit_direction if section else (1.0, 0.0)
-    return Request(speeds, loads, direction, bool(section and section.waves))
+    degrees = tuple(temperatures) or (section.temperatures if section and section.temperatures else ())
+    for temperature in degrees:
+        job.at_temperature(temperature)
+    return Request(speeds, loads, direction, bool(section and section.waves), degrees)
 
 
 def _pressures(job: Job) -> tuple[float, ...]:
@@ -81,7 +98,8 @@ def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:
             directory.clear()
-        table = _on_root(slab, lambda: CurveTable(directory.path, sliding, wanted.waves, quiet))
+        columns = wanted.waves, bool(wanted.temperatures)
+        table = _on_root(slab, lambda: CurveTable(directory.path, sliding, *columns, quiet))
         if table:
             table.warn(doubts)
         maps = _maps(job, slab, wanted, directory)
@@ -125,7 +143,8 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
         return None
     provenance = Provenance((Link(job.resolved(), slab.comm.size),))
     path = directory.path / "steady.h5"
-    return SteadyMaps(path, slab, job.grid.size, job.output.fields, wanted.points, provenance)
+    points = [point if wanted.temperatures else point[:2] for point in wanted.points]
+    return SteadyMaps(path, slab, job.grid.size, job.output.fields, points, provenance)
 
 
 class _Curve:
@@ -171,9 +190,12 @@ class _Curve:
             self.table.say(text)
 
     def _solve(self, index: int) -> None:
-        speed, pressure = self.wanted.points[index]
+        speed, pressure, temperature = self.wanted.points[index]
         velocity = self.wanted.velocity(speed)
+        at = f"{speed:g} m/s under {pressure:g} Pa" + (f" at {temperature:g} C" if temperature == temperature else "")
         try:
+            if temperature == temperature:
+                self.sliding.heat(temperature)
             point = self.sliding.solve(velocity, pressure)
         except RunError as error:
             self.failures += 1
@@ -187,7 +209,7 @@ class _Curve:
         def write() -> None:
             if table:
                 table.write(point, shares)
-                table.warn(self.watch.judge_point(point.measures, f"{speed:g} m/s under {pressure:g} Pa"))
+                table.warn(self.watch.judge_point(point.measures, at))
 
         hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
 

@@ -3,11 +3,12 @@
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..effects.interface import interface_of
+from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
@@ -27,7 +28,8 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Point:
-    """A steady state: velocity [m/s], pressure [Pa], what it measures, its certificate, and what it took.
+    """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN where none was asked for), by what factor
+    relaxation times are longer than at the reference, what it measures, its certificate, and what it took.
 
     `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did (`solve.steady`).
     `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box).
@@ -35,6 +37,8 @@ class Point:
 
     velocity: Vector
     pressure: float
+    temperature: float
+    shift_factor: float
     measures: Measures
     certificate: Certificate
     operator_calls: float
@@ -66,7 +70,19 @@ class SteadySliding:
         self.levels = [Level(base.slab, base.fft, finest.heights)]
         self.levels += [Level(level.slab, FFT(level.slab, dtype=base.fft.dtype), level.heights) for level in coarser]
         self.contact: SteadyContact | None = None
-        self._speed = self._pressure = 0.0
+        self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
+        self.temperature, self._slow = math.nan, time_factor_of(base.job)
+
+    def heat(self, temperature: float) -> None:
+        """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
+        if temperature == self.temperature:
+            return
+        job = self.base.job.at_temperature(temperature)
+        series = relaxation_of(job)
+        scaled = Prony(self.base.prony.modulus_inf, self.base.prony.moduli, series.relaxation_times)
+        self.base = replace(self.base, job=job, prony=scaled)
+        self.ledger = Ledger(self.base.slab, self.base.surface, self.base.units, interface_of(job))
+        self.temperature, self._slow = temperature, time_factor_of(job)
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
@@ -76,7 +92,8 @@ class SteadySliding:
         began = time.perf_counter()
         mean = pressure / self.base.units.pressure
         speed, calls = math.hypot(*velocity), 0.0
-        for start in self._starts(speed, pressure):
+        reduced = self._slow * speed
+        for start in self._starts(reduced, pressure):
             contact, more = self._descend(velocity, mean, start)
             calls += more
             if contact.converged:
@@ -86,14 +103,15 @@ class SteadySliding:
                 f"steady sliding at {speed:g} m/s under {pressure:g} Pa: {contact.failure}. Try a "
                 "velocity nearer to one that works, a finer grid, or a larger numerics.tolerance."
             )
-        self._remember(contact, speed, pressure)
+        self._remember(contact, reduced, pressure)
         heights = self.levels[0].heights
         measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
         if not measures.finite:
             raise RunError(f"steady sliding at {speed:g} m/s under {pressure:g} Pa: its results would not be finite")
         lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
         seconds = time.perf_counter() - began
-        return Point(velocity, pressure, measures, contact.certificate, calls, contact.sets, seconds, lost)
+        place = velocity, pressure, self.temperature, self._slow
+        return Point(*place, measures, contact.certificate, calls, contact.sets, seconds, lost)
 
     def branch_maps(self, velocity: Vector) -> Iterator[Array]:
         """The map h_k of each branch in the last state, the same array each time; collective."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..effects.interface import InterfaceColumns, interface_of, shares
 from ..record import files, measures
 from ..record.growing import GrowingTable
 from .sliding import Point, SteadySliding
@@ -15,6 +16,7 @@ COLUMNS = (
     *("residual", "penetration", "operator_calls", "seconds"),
 )
 LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
+HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 WAVES = ("velocity", "pressure", "wavelength", "share")
 HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
 CLOSE = 1e-6  # relative: speeds and pressures that are the same but for rounding
@@ -23,17 +25,19 @@ CLOSE = 1e-6  # relative: speeds and pressures that are the same but for roundin
 class CurveTable:
     """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
 
-    def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, quiet: bool) -> None:
-        self.path, self.quiet, self.failed = directory / "steady.csv", quiet, 0
+    def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, heated: bool, quiet: bool) -> None:
+        self.path, self.heated, self.quiet, self.failed = directory / "steady.csv", heated, quiet, 0
         branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
-        self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST]
+        self.interface = InterfaceColumns.columns if interface_of(sliding.base.job) else ()
+        added = (*(HEATED if heated else ()), *self.interface)
+        self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
         self.say(HEAD)
 
-    def _read(self) -> list[tuple[float, float]]:
-        """Speed and pressure of the points that are there; a line that was not finished is removed."""
+    def _read(self) -> list[tuple[float, ...]]:
+        """Speed, pressure, temperature of the points that are there; a line that was not finished is removed."""
         if not self.path.exists():
             return []
         columns = measures.read(self.path)
@@ -44,9 +48,10 @@ class CurveTable:
         if not whole.endswith(b"\n"):
             with files.replaced(self.path) as new:
                 new.write(whole[: whole.rfind(b"\n") + 1])
-        return list(zip(columns["velocity"], columns["pressure"], strict=True))
+        degrees = columns["temperature"] if self.heated else [math.nan] * len(columns["velocity"])
+        return list(zip(columns["velocity"], columns["pressure"], degrees, strict=True))
 
-    def lacking(self, points: Sequence[tuple[float, float]]) -> list[int]:
+    def lacking(self, points: Sequence[tuple[float, ...]]) -> list[int]:
         """The numbers of the points that are not there."""
         found = [k for k, point in enumerate(points) if not any(_same(point, other) for other in self.known)]
         if len(found) < len(points):
@@ -62,19 +67,21 @@ class CurveTable:
         for text in texts:
             print(f"warning: {text}", file=sys.stderr, flush=True)
 
-    def write(self, point: Point, shares: Any) -> None:
+    def write(self, point: Point, waves: Any) -> None:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
         forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        last = (m.friction_x, m.contact_area_corrected)
+        last = [m.friction_x, m.contact_area_corrected]
+        last += (point.temperature, point.shift_factor) if self.heated else ()
+        last += shares(m, point.velocity) if self.interface else ()
         if self._waves:
-            for wavelength, share in zip(*shares, strict=True):
+            for wavelength, share in zip(*waves, strict=True):
                 self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
         cells = [speed, m.pressure, *forces, *solve, *point.dissipated, *last]
         self._file.append([repr(float(value)) for value in cells])
         self.say(
             f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} {point.operator_calls:6.0f} "
-            f"{c.worst:9.2e}"
+            f"{c.worst:9.2e}{f'  {point.temperature:g} C' if self.heated else ''}"
         )
 
     def conclude(self, failures: int) -> None:
@@ -89,10 +96,12 @@ class CurveTable:
         self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")
 
     def _sort(self) -> None:
-        """By pressure, then by speed."""
+        """By temperature, then by pressure, then by speed."""
         columns = measures.read(self.path)
         head, *lines = self.path.read_text().splitlines()
-        keys = [(round(math.log(p), 5), v) for p, v in zip(columns["pressure"], columns["velocity"], strict=True)]
+        degrees = columns["temperature"] if self.heated else [0.0] * len(lines)
+        points = zip(degrees, columns["pressure"], columns["velocity"], strict=True)
+        keys = [(t, round(math.log(p), 5), v) for t, p, v in points]
         order = sorted(range(len(lines)), key=keys.__getitem__)
         files.write(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
 
@@ -102,5 +111,7 @@ class CurveTable:
             self._waves.close()
 
 
-def _same(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    return all(math.isclose(a, b, rel_tol=CLOSE) for a, b in zip(one, other, strict=True))
+def _same(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Temperatures that were not asked for are the same."""
+    pairs = zip(one, other, strict=True)
+    return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
