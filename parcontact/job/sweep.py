@@ -99,7 +99,8 @@ def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, P
         settings = [Setting(name, value, key_place, at) for value, at in zip(values, places, strict=True)]
     else:
         try:
-            settings = [Setting(name, value, key_place, place) for value in log_range(str(values))]
+            numbers = [float(f"{value:.12g}") for value in log_range(str(values))]  # 1e5, not 99999.99999999999
+            settings = [Setting(name, value, key_place, place) for value in numbers]
         except ValueError:
             sentence = f"{shorten(name)} needs a list of values or a range first:last:count, got {quote(values)}"
             source.mistakes.append(Mistake(place, sentence))

@@ -56,8 +56,10 @@ def test_a_job_without_a_sweep_is_one_case(path: Path) -> None:
 
 
 def test_ranges_and_a_lone_mapping(path: Path) -> None:
-    cases = cases_of(path, "  history.0.pressure: 1e3:1e5:3\n")
-    assert [case.job.history[0].load.start for case in cases] == pytest.approx([1e3, 1e4, 1e5])
+    """Powers of ten come out as such."""
+    cases = cases_of(path, "  history.0.pressure: 1e4:1e7:7\n")
+    assert [case.job.history[0].load.start for case in cases[::2]] == [1e4, 1e5, 1e6, 1e7]
+    assert cases[1].job.history[0].load.start == pytest.approx(1e4 * 10**0.5, rel=1e-11)
 
 
 def test_whole_sections_and_materials(path: Path) -> None:
