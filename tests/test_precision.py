@@ -60,7 +60,7 @@ def results(boundary: str, precision: str) -> Results:
             {"pressure": 1e5, "duration": 1e-4, "time_step": {"first": 1e-6, "growth": 1.3}},
             {"pressure": 1e5, "velocity": 1.0, "distance": 3e-4, "cells_per_step": 1},
         ],
-        "numerics": {"precision": precision, "tolerance": 1e-5},
+        "numerics": {"precision": precision, "tolerance": 9e-6},  # at 1e-5 rounding decides when the second step stops
         "output": {"energy": True},
     }
     march, found = marched(data)
