@@ -141,7 +141,7 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
 
 
 def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
-    """A solver for the body of a frame on another grid, for a retry; collective.
+    """A solver for the body of a frame on another grid, for a start or a retry; collective.
 
     Its transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give other
     last digits.

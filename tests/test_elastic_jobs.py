@@ -23,6 +23,7 @@ from parcontact.march.loop import run as run_march
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.row import Row
+from parcontact.solve import cold
 from parcontact.theory import hertz, jgh, westergaard
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
@@ -307,3 +308,23 @@ def test_coming_from_another_load_changes_nothing(bumps: Path) -> None:
     """An elastic body has no memory: to the tolerance of the solves."""
     direct, detour = run(bumps)[-1], run(bumps, "history=[{pressure: 5.0e4}, {pressure: 1.0}, {pressure: 5.0e3}]")[-1]
     assert_allclose(detour[1]["pressure"], direct[1]["pressure"], atol=1e-8 * direct[0].measures.max_pressure)
+
+
+# -- starts ------------------------------------------------------------------------------------------------------------
+
+
+def test_only_the_first_solve_of_a_large_job_starts_on_coarser_grids(
+    bumps: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the limit lowered: its pressure is the same to the tolerance, at fewer calls; later steps start as ever."""
+    words = ("grid.points=64", "surface.short_wavelength=1.25e-4", "history=[{pressure: 5.0e3}, {pressure: 6.0e3}]")
+    (small, fields), (small_after, _) = run(bumps, *words)
+    monkeypatch.setattr(cold, "WORTHWHILE", 64 * 64)
+    grids = list[int]()
+    start = cold.start_on_coarse_grids
+    monkeypatch.setattr(cold, "start_on_coarse_grids", lambda *all: grids.append(start(*all)))
+    (large, expected), (large_after, _) = run(bumps, *words)
+    assert grids == [2]
+    assert_allclose(fields["pressure"], expected["pressure"], rtol=0, atol=1e-7 * expected["pressure"].max())
+    assert large.operator_calls < small.operator_calls
+    assert abs(large_after.operator_calls - small_after.operator_calls) <= 3  # an iteration

@@ -19,7 +19,7 @@ from ..physics.motion import cells_between
 from ..record.checkpoint import Contents
 from ..record.row import Row
 from ..scene import Scene, solver_on
-from ..solve import retry
+from ..solve import cold, retry
 from ..solve.contact import Approach, Contact, MeanPressure
 from . import failure, state
 from .failure import StepError
@@ -109,6 +109,8 @@ class March:
         """The contact of a step, and what was unusual about it; collective. Raises StepError."""
         control, start = self._control(step, trial), self._start(step, trial.alpha)
         self._elastic_displacement = None
+        if self.state.alpha == 0.0:  # nothing has been solved before
+            cold.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
         contact, remark = self.scene.solver.solve(trial.effective, control, start), ""
         if contact.failure and not self._accepts(contact):
             contact, remark = self._retry(step, trial.effective, control, contact)

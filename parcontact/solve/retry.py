@@ -5,20 +5,17 @@ Nothing here is made or called for a solve that succeeds. What is tried depends 
 ranks try the same, and a run that is repeated tries it again.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from ..parallel.slab import Array, Slab
-from . import active_set, nested
-from .contact import Approach, Contact, ContactSolver, MeanPressure
+from ..parallel.slab import Array
+from . import active_set
+from .cold import Control, SolverOn, start_on_coarse_grids
+from .contact import Contact, ContactSolver
 
 SHORT = 0.5  # length of a safeguarded step over the exact one
-LOOSE = 1e-3  # tolerance on the coarse grids, whose pressure is only a start
-
-Control = MeanPressure | Approach
-SolverOn = Callable[[Slab, float], ContactSolver]
 
 
 def again(
@@ -46,19 +43,8 @@ def _attempts(
     p = failed.p
     if np.isfinite(failed.certificate.worst):
         yield "shorter steps", solver.solve(h, control, p, SHORT)
-    name = _start_on_coarse_grids(solver, h, control, p, solver_on)
+    grids = start_on_coarse_grids(solver, h, control, p, solver_on)
     contact = solver.solve(h, control, p)
-    yield name, contact
+    yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact
     if np.isfinite(contact.certificate.worst):
         yield "sets of points", active_set.solve(solver, h, control, p)
-
-
-def _start_on_coarse_grids(solver: ContactSolver, h: Array, control: Control, start: Array, solver_on: SolverOn) -> str:
-    """Solve loosely on coarser grids and put the start that follows into `start`: 0 if there is none."""
-    levels = nested.levels_of(solver.slab, h)
-
-    def solve(level: nested.Level, below: Array) -> Array:
-        return solver_on(level.slab, max(LOOSE, solver.tolerance)).solve(level.heights, control, below).p
-
-    nested.descend(levels, solve, start)
-    return "a cold start" if len(levels) == 1 else f"a cold start on {len(levels)} nested grids"

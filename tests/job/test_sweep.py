@@ -87,9 +87,7 @@ def test_one_case(path: Path) -> None:
     assert choose(cases, None) == cases
     with pytest.raises(InputError, match="the sweep has 3 cases, numbered from 0"):
         load(path, case=3)
-    with pytest.raises(
-        JobError, match=r"job.yaml:7:3: sweep has 3 cases, numbered from 0; choose one"
-    ):
+    with pytest.raises(JobError, match=r"job.yaml:7:3: sweep has 3 cases, numbered from 0; choose one"):
         load(path)
     with pytest.raises(InputError, match="no sweep"):
         load(path, ["sweep=null"], case=0)
