@@ -55,6 +55,17 @@ def test_instants_are_those_of_the_run() -> None:
     assert sum(row.contact_area == 0.0 for row in found) == sum(row.pressure == 0.0 for row in found) == 3
 
 
+def test_time_before_the_first_touch_does_not_count() -> None:
+    """A body that is not touched remembers nothing: it rests or slides below the surface, and then begins."""
+    wait = {"pressure": 0.0, "velocity": 0.04, "duration": 2e-3, "time_step": 1e-3}
+    at_once, late = (predicted(job(history=[*before, *HISTORY[1:3]])) for before in ([], [wait]))
+    assert late[2].contact_area == 0.0
+    for name in ("friction", "contact_area"):
+        found, exact = ([getattr(row, name) for row in rows] for rows in (late[2:], at_once))
+        assert_allclose(found, exact, rtol=1e-12)
+    assert max(row.friction for row in late) > 0.0
+
+
 def test_full_contact_is_that_of_the_run() -> None:
     """In full contact the theory is exact: friction of every row, to what the run's short steps err by.
 

@@ -1,6 +1,8 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
 import csv
+import fcntl
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -115,6 +117,21 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         spread = sum((value - sum(values) / 3) ** 2 for value in values) / 2
         assert float(mean["mu_dyn_std"]) == pytest.approx(spread**0.5, rel=1e-9)
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
+
+
+def test_tables_are_written_by_one_program_at_a_time(cases: tuple[Case, ...]) -> None:
+    """Jobs of an array end together: the last one to write has read what all others left."""
+    directory = Path("out/job")
+    sweep_table.write(directory, cases)
+    with (directory / ".sweep.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        other = threading.Thread(target=sweep_table.write, args=(directory, cases))
+        other.start()
+        other.join(0.2)
+        assert other.is_alive()
+        fcntl.flock(lock, fcntl.LOCK_UN)
+        other.join(20.0)
+        assert not other.is_alive()
 
 
 def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:

@@ -27,9 +27,9 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
     with _alone(directory):
         rows = [_row(case) for case in cases]
         keys = list(cases[0].settings)
-        _save(directory / "sweep.csv", ["case", *keys, *COLUMNS], rows)
+        save(directory / "sweep.csv", ["case", *keys, *COLUMNS], rows)
         if any(key.split(".")[-1] == SEED for key in keys):
-            _save(directory / "sweep_mean.csv", *_means(rows, keys))
+            save(directory / "sweep_mean.csv", *_means(rows, keys))
 
 
 def read(path: Path) -> list[dict[str, Any]]:
@@ -98,7 +98,8 @@ def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[st
     return [*kept, "number", *(f"{name}_{what}" for name in names for what in ("mean", "std"))], table
 
 
-def _save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+    """Replace a table by these rows."""
     text = StringIO()
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
