@@ -25,7 +25,7 @@ grid: {{points: {points}, size: 1.0e-3}}
 surface: {{shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: {short!r}, rms_slope: 0.02, seed: 1}}
 material: {{include: synthetic_tyre}}
 history: [{{pressure: 1.0e5}}]
-numerics: {{tolerance: 1.0e-4}}
+numerics: {{tolerance: 5.0e-3}}
 """
 
 

@@ -84,7 +84,7 @@ def reversals(count: list[int]) -> int:
     return sum(first * second < 0 for first, second in pairwise(steps))
 
 
-def main(points: int = 512, tolerance: float = 1e-6) -> None:
+def main(points: int = 512, tolerance: float = 5e-6) -> None:
     surfaces = {"16 cells": rough(points, 16), "2 cells": rough(points, 2), "paraboloid": paraboloid(points)}
     for name, heights in surfaces.items():
         print(f"{name}: load/E*, contact, iterations")

@@ -85,7 +85,8 @@ def test_what_stalls_at_first_is_solved(tmp_path: Path, seed: int, stretch: floa
     }
     march, found = marched(data)
     assert found[-1].certificate.worst <= 1e-8
-    assert re.search(r"stalled: no better certificate than 0\.\d+ in .*; solved when retried with .*", found[-1].remark)
+    said = r"stalled: no better certificate than \d[.]\d+ in .*; solved when retried with .*"
+    assert re.search(said, found[-1].remark)
     assert march.scene.slab.tally["retry"] == 1 + found[-1].remark.count(", with ")
 
 
@@ -167,7 +168,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
 
 LIGHT = {**PRESS, "pressure": 2e4}
 HEAVY = {"name": "heavy", "pressure": 1e7}
-SINGLE = {"precision": "single", "tolerance": 1e-6}  # which rounding allows under the small load, not under the large
+SINGLE = {"precision": "single", "tolerance": 1.5e-6}  # which rounding allows under the small load, not under the large
 
 
 def failed(bench: Bench, history: list[dict[str, Any]], numerics: dict[str, Any]) -> tuple[dict[str, Any], Path, str]:

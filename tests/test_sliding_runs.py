@@ -464,7 +464,7 @@ def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", tmp_path: P
 # -- cost --------------------------------------------------------------------------------------------------------------
 
 
-def calls_per_step(points: int, history: list[Json], tolerance: float = 1e-4) -> tuple[float, float]:
+def calls_per_step(points: int, history: list[Json], tolerance: float = 5e-3) -> tuple[float, float]:
     """Operator applications per step after the tenth, and the last friction."""
     _, rows = marched(rough(points, history, numerics={"tolerance": tolerance}))
     return float(np.mean(column(rows[11:], "operator_calls"))), rows[-1].measures.friction
@@ -487,7 +487,7 @@ def test_warm_starts_save_work(most: float, change: Json) -> None:
 
 
 def test_tolerance_of_friction() -> None:
-    """At the tolerance of 1e-4 friction is good to 1e-3."""
+    """At the default tolerance, 5e-3, friction is good to 1e-3."""
     stages = [slide(256, 30)]
     assert calls_per_step(256, stages)[1] == pytest.approx(calls_per_step(256, stages, 1e-7)[1], rel=1e-3)
 

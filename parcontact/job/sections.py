@@ -57,7 +57,7 @@ class Numerics(Part):
     """How the equations are solved."""
 
     integrator: Literal["exponential", "backward-euler"] = "exponential"
-    tolerance: float = Field(default=1e-4, gt=0, lt=1, strict=True, description="a tolerance [-] above 0 and below 1")
+    tolerance: float = Field(default=5e-3, gt=0, lt=1, strict=True, description="a tolerance [-] above 0 and below 1")
     max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
     branch_error: float = Field(
         default=1e-3, ge=0, lt=1, strict=True, description="an error of friction [-] of zero or more and below 1"

@@ -13,7 +13,7 @@ from ..physics.measures import Measures
 from ..scene import Scene
 from ..solve.contact import Contact
 
-ROUNDINGS = 4.0  # of the largest length, over the surface's height: no certificate is sure to be better
+ROUNDINGS = 4.0  # of the largest length, over that of the certificate: none is sure to be better
 FINITE = "look for heights, loads or moduli that are not finite or too far apart"
 LONG = 1.5  # cells that a surface moves in a long step
 
@@ -75,7 +75,7 @@ def _reach(scene: Scene, last: Contact, h: Array) -> float:
     """
     sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
     sizes[2] *= scene.frame.half_space.largest_compliance
-    return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / scene.solver.height
+    return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / last.certificate.length
 
 
 def _sharp(scene: Scene, h: Array) -> float:

@@ -5,9 +5,9 @@ Were the displacement u kept from now on, the branches would after the time t la
     sum_k (1 - exp(-t/tau_k)) h_k     out of     A p = G_inf u + sum_k h_k.
 
 Over the modulus that is left then, `G(t) = G_inf + sum_k G_k exp(-t/tau_k)`, this is a displacement; it grows with t.
-Where it is below the tolerance, the contact of now also meets the conditions of every instant up to t, and neither
-displacements nor `A p/G` change by much more: in the norm of the elastic energy a contact follows its heights without
-enlarging their differences, of which the past weighs `1 - G(t)/alpha` at most.
+Where it is below SHARE of the tolerance, the contact of now also meets the conditions of every instant up to t, and
+neither displacements nor `A p/G` change by much more: in the norm of the elastic energy a contact follows its heights
+without enlarging their differences, of which the past weighs `1 - G(t)/alpha` at most.
 
 Only stages whose time steps grow are ended so: who gives one time step asks for a row at each.
 """
@@ -19,6 +19,8 @@ from ..job.timeline import Span, Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import ZenerBody
 from .step import March
+
+SHARE = 0.1  # of the largest displacement: about the length that certificates compare gaps with
 
 
 def steps_to_make(march: March, timeline: Timeline, until: float | None = None) -> Iterator[Step]:
@@ -51,7 +53,7 @@ def _at_rest(march: March, span: Span, number: int, target: int) -> bool:
     if index == 1:  # a jump of the load has just been: branches that have no map have not relaxed yet
         return False
     change = remaining(march, material, span.interval(span.count, since=index - 1))
-    return march.scene.slab.agree(change <= march.scene.job.numerics.tolerance)
+    return march.scene.slab.agree(change <= SHARE * march.scene.job.numerics.tolerance)
 
 
 def remaining(march: March, material: ZenerBody, seconds: float) -> float:

@@ -22,6 +22,7 @@ from ..scene import Scene, solver_on
 from ..solve import cold, retry
 from ..solve.contact import Approach, Contact, MeanPressure
 from . import failure, state
+from .errors import Errors
 from .failure import StepError
 from .state import State
 
@@ -41,6 +42,7 @@ class March:
         earlier = slab.zeros(dtype) if scene.lasts else None
         self.state = State(self._complete(Row()), slab.zeros(dtype), earlier)
         self._next_pressure = slab.zeros(dtype)
+        self._errors = Errors(scene)
         self._elastic_displacement: Array | None = None  # of the solver: until its next solve
 
     @property
@@ -60,6 +62,7 @@ class March:
         if not measures.finite:
             raise failure.not_finite(scene, step, measures)
         scene.material.commit(trial, contact.u)
+        errors = self._errors.of(step, trial, contact, measures)
         if scene.energy is not None:
             now, before = Pressed(contact.p, trial.alpha), Pressed(old.pressure, old.alpha)
             scene.energy.advance(step.dt, now, before, contact.u)
@@ -75,6 +78,7 @@ class March:
             tally["operator"] - calls,
             seconds=time.perf_counter() - began,
             remark=remark,
+            errors=errors,
         )
         earlier = None if old.earlier is None else old.pressure
         self.state = State(row, contact.p, earlier, trial.alpha, old.alpha, contact.d, step.position)

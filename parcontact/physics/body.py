@@ -119,7 +119,7 @@ class ZenerBody:
     """Relaxing branches: this rank's rows of one map per branch and of the last displacement.
 
     Branches are known by their number in `prony`. Those of `kept` have a map each, in that order in `branches`; the
-    `memoryless` and `frozen` ones have none.
+    `memoryless` and `frozen` ones have none. All but the frozen ones are `moving`.
 
     The advance of a committed step is pending until the next step begins: then one pass over the maps makes it and
     forms the effective heights. Meanwhile the increment of the displacement waits in the map of those heights.
@@ -137,7 +137,7 @@ class ZenerBody:
         self.prony, self.integrator = prony, integrator
         numbers = range(len(prony.moduli))
         self.kept = [k for k in numbers if k not in memoryless and k not in frozen]
-        self._moving = [k for k in numbers if k not in frozen]
+        self.moving = [k for k in numbers if k not in frozen]
         self._spring = prony.modulus_inf + float(prony.moduli[list(frozen)].sum())
         self.branches = allocate((len(self.kept), *slab.shape), dtype, slab.tally)
         self.branches.fill(0.0)
@@ -172,7 +172,7 @@ class ZenerBody:
 
     def _coefficients_of(self, dt: float) -> _Coefficients:
         decay, gain = self.coefficients(dt)
-        total = float(gain[self._moving].sum())
+        total = float(gain[self.moving].sum())
         alpha = self._spring + total
         decay, gain = decay[self.kept], gain[self.kept]
         return _Coefficients(dt, alpha, (decay, gain), (decay / alpha, total / alpha))
@@ -219,7 +219,7 @@ class ZenerBody:
     def memory(self, unit: float, symbol: str, branch_unit: float, branch_symbol: str) -> dict[str, Entry]:
         """The entries that change, with the units of the displacement and of the branch maps."""
         self.settle()
-        frozen = np.array([float(k not in self._moving) for k in range(len(self.prony.moduli))])
+        frozen = np.array([float(k not in self.moving) for k in range(len(self.prony.moduli))])
         maps = zip(self.kept, self.branches, strict=True)
         branches = {f"branch {k}": Entry(branch, branch_unit, branch_symbol, optional=True) for k, branch in maps}
         return {"displacement": Entry(self.u, unit, symbol), "frozen": Entry(frozen), **branches}

@@ -14,11 +14,9 @@ from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
 from .interface import InterfaceFriction, Vector
-from .measures import Measures
+from .measures import SIDE, Measures
 from .surface import Surface
 from .units import Units
-
-SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # cells counted too many per side of a cell on the edge of contact
 
 
 @dataclass(frozen=True)

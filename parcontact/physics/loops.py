@@ -89,6 +89,32 @@ def edges(p, above, cyclic):
 
 
 @loop
+def embedded(branches, decay, increment, gain, p, u, heights, offset, first, stride):
+    """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, and of p
+    times the squared difference of the heights on both sides, those of `heights(i - offset)`, cyclic.
+    """
+    count, ny, nx = branches.shape
+    load, apart, size, slope = 0.0, 0.0, 0.0, 0.0
+    start = offset % nx
+    here, e = np.empty(nx, heights.dtype), np.empty(nx, p.dtype)
+    for j in range(first, ny, stride):
+        here[start:] = heights[j, : nx - start]
+        here[:start] = heights[j, nx - start :]
+        for i in range(nx):
+            e[i] = gain * increment[j, i]
+        for k in range(count):
+            for i in range(nx):
+                e[i] += decay[k] * branches[k, j, i]
+        for i in range(nx):
+            rise = here[i + 1 if i + 1 < nx else 0] - here[i - 1]
+            load += p[j, i]
+            apart += p[j, i] * e[i] * e[i]
+            size += p[j, i] * u[j, i] * u[j, i]
+            slope += p[j, i] * rise * rise
+    return load, apart, size, slope
+
+
+@loop
 def dot(a, b):
     """Sum of a b."""
     total = 0.0

@@ -1,5 +1,6 @@
 """measures.csv: one row per step and one for the initial state, written by root."""
 
+import math
 import os
 import zlib
 from collections.abc import Iterator, Sequence
@@ -16,7 +17,8 @@ COLUMNS = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap"),
     *("max_pressure", *SOLVED, "work", "stored", "dissipated", "seconds"),
 )
-LAST = ("friction_x", "contact_area_corrected")  # columns that came later stand at the end: nothing before them shifts
+# columns that came later stand at the end: nothing before them shifts
+LAST = ("friction_x", "contact_area_corrected", "error_friction", "error_area")
 UNITS = {
     **dict.fromkeys(("time", "seconds"), "s"),
     **dict.fromkeys(("distance", "approach", "mean_gap"), "m"),
@@ -41,8 +43,16 @@ def numbers(row: Row, branches: int) -> list[float]:
     solve = (row.iterations, c.worst, c.penetration, row.operator_calls)
     energies = (row.work, row.stored, row.dissipated)
     shown = [row.step, row.time, row.distance, *forces, *lengths, *solve, *energies, round(row.seconds, 6)]
-    last = (m.friction_x, m.contact_area_corrected)
+    last = (m.friction_x, m.contact_area_corrected, *_errors(row))
     return [*shown, *row.branch_dissipation[:branches], *last, *row.added]
+
+
+def _errors(row: Row) -> tuple[float, float]:
+    """Of friction and area, relative; NaN where there is none."""
+    if row.errors is None:
+        return math.nan, math.nan
+    friction, area = row.errors.friction, row.errors.area
+    return friction.total if friction else math.nan, area.total
 
 
 def _text(value: float) -> str:

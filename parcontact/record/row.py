@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from ..physics.budget import ErrorBudget
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 
@@ -11,8 +12,8 @@ from ..solve.certificate import Certificate
 class Row:
     """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start.
 
-    `added` is what effects have for columns of their own. `remark` is a sentence for run.log, or '': what was unusual
-    about the step.
+    `errors` is the budget of the instant, None where nothing touches. `added` is what effects have for columns of their
+    own. `remark` is a sentence for run.log, or '': what was unusual about the step.
     """
 
     step: int = 0
@@ -28,4 +29,5 @@ class Row:
     branch_dissipation: tuple[float, ...] = ()
     seconds: float = 0.0
     remark: str = ""
+    errors: ErrorBudget | None = None
     added: tuple[float, ...] = ()

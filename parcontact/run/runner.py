@@ -14,6 +14,7 @@ from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
+from ..physics.budget import Summary
 from ..physics.entries import Entry
 from ..record import checkpoint, header, marker, wisdom
 from ..record.checkpoint import Contents, Facts, Table
@@ -21,6 +22,7 @@ from ..record.directory import Directory
 from ..record.marker import Claim
 from ..record.provenance import Link, Provenance, extended
 from ..record.recorder import Recorder
+from ..record.row import Row
 from ..scene import Scene
 from ..steady_sliding import start as steadystart
 from . import restart, watch
@@ -160,6 +162,7 @@ class _Journey:
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
         self.contacts = sanity.ContactWatch(self.job, timeline)
         self.stop = ""
+        self.errors, self._recorded = Summary(), marching.row.time
         self.began, self.saving = time.monotonic(), 0.0
 
     def go(self, origin: Origin | None) -> int:
@@ -213,6 +216,7 @@ class _Journey:
         if marching.row.remark:
             self.console.say(marching.row.remark)
         self.recorder.write(marching.row, marching.field)
+        self._weigh_errors(marching.row)
         try:
             doubts = self.contacts.judge(marching.row.step, marching.row.measures)
         except RunError as error:
@@ -228,6 +232,11 @@ class _Journey:
         provenance = replace(provenance, warnings=(*provenance.warnings, *texts))
         self.facts = replace(self.facts, provenance=provenance)
         self.recorder.renew(provenance)
+
+    def _weigh_errors(self, row: Row) -> None:
+        if row.errors is not None:
+            self.errors.add(row.errors, row.measures.friction, row.time - self._recorded)
+        self._recorded = row.time
 
     def decide(self, marching: March) -> bool:
         """Save if it is time to; True ends the march."""
@@ -287,6 +296,8 @@ class _Journey:
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
+        for line in self.errors.lines():
+            console.say(line)
         if self.stop:
             console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")
             return AGAIN

@@ -33,7 +33,7 @@ def solve(solver: ContactSolver, h: Array, control: MeanPressure | Approach, sta
     contact, iterations = solver.judge(h, control, start, ""), 0
     search.begin(contact)
     for count in range(1, SETS + 1):
-        iterations += search.solve_on_set(contact.u)
+        iterations += search.solve_on_set(contact.u, SHARE * solver.tolerance * contact.certificate.length)
         chosen = search.next_set(contact.u)
         np.maximum(start, 0.0, out=start)
         limit = BUDGET * solver.max_iterations
@@ -62,11 +62,12 @@ class _Search:
         if self.load is None and self._count() == self.slab.points:
             self.working[...] = self.h + self.d > 0.0
 
-    def solve_on_set(self, u: Array) -> int:
-        """Conjugate gradients on the set, from the last x, with `u = A x` in the end; returns their number."""
+    def solve_on_set(self, u: Array, goal: float) -> int:
+        """Conjugate gradients on the set, from the last x, to no gap larger than `goal`, with `u = A x` in the end;
+        returns their number."""
         solver, slab, x, working = self.solver, self.slab, self.x, self.working
         w, t, r = solver.lend()
-        goal, product = SHARE * solver.tolerance * solver.height, 0.0
+        product = 0.0
         self._restrict(u)
         t.fill(0.0)
         iterations = 0

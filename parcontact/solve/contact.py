@@ -21,6 +21,7 @@ where g < 0, only helps. Thus f falls for every step that is small enough (D. P.
 the number of iterations nearly independent of the grid. Everything here is dimensionless.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +35,8 @@ from .surround import Surround
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
+LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
+LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements that are only rounding
 NOT_FINITE = "met numbers that are not finite"
 
 
@@ -73,12 +76,13 @@ class Contact:
 
 @dataclass(frozen=True)
 class Iterate:
-    """An iterate in numbers, for an approach d: the sums of p and of p g, and `energy = <p, A p>/2`."""
+    """An iterate in numbers, for an approach d: the sums of p, of `p (A p)^2` and of p g, and `energy = <p, A p>/2`."""
 
     d: float
     load: float
     gaps: float
     energy: float
+    squares: float
 
     @property
     def f(self) -> float:
@@ -90,33 +94,42 @@ class Iterate:
         d = self.d + self.gaps / self.load
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load)
 
+    def length(self, height: float) -> float:
+        """What gaps are compared with (`Certificate`): at most the surface's height, at least LEAST_HEIGHT of it."""
+        least = LEAST_HEIGHT * height
+        if self.load <= 0.0:
+            return least
+        mean = 2.0 * self.energy / self.load
+        spread = math.sqrt(max(self.squares / self.load - mean**2, 0.0))
+        return max(min(max(spread, LEAST_SHARE * abs(mean)), height), least)
+
 
 def certify(
     slab: Slab, p: Array, u: Array, h: Array, iterate: Iterate, mean: float | None, height: float, working: Array
 ) -> tuple[float, float, Certificate]:
     """Mark the working set of a pressure and its image u; its size, its sum of gaps, and the certificate; collective.
 
-    `mean` is the mean pressure asked for, None with a given approach; `height` what gaps are compared with.
+    `mean` is the mean pressure asked for, None with a given approach; `height` is that of the surface.
     """
     *sums, deepest = kernels.certify(p, u, h, iterate.d, working)
     wrong, members, excess, deepest = slab.reduce(sums, [deepest])
-    complementarity = wrong / (iterate.load or 1.0) / height
+    length = iterate.length(height)
+    complementarity = wrong / (iterate.load or 1.0) / length
     load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
-    return members, excess, Certificate(complementarity, max(deepest / height, 0.0), load)
+    return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length)
 
 
 def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:
     """A pressure and its image u in numbers, for an approach d; collective."""
-    load, work, gaps = slab.sum(*kernels.weigh(p, u, h, d))
-    return Iterate(d, load, gaps, 0.5 * work)
+    load, work, gaps, squares = slab.sum(*kernels.weigh(p, u, h, d))
+    return Iterate(d, load, gaps, 0.5 * work, squares)
 
 
 class ContactSolver:
     """Loop for contacts on one grid, and the maps that it works in: four, and two bytes per point.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
-    lowest to its highest point, in the unit of h: what gaps are compared with; `tolerance` on the certificate;
-    `max_iterations`; `dtype` of maps.
+    lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `dtype` of maps.
     """
 
     def __init__(

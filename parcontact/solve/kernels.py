@@ -11,18 +11,21 @@ from ..compiled import loop
 
 @loop
 def weigh(p, u, h, d):
-    """Sums of p, p u and p g, with the gap `g = u - h - d`."""
-    load, work, gaps = 0.0, 0.0, 0.0
+    """Sums of p, p u, p g and p u^2, with the gap `g = u - h - d`."""
+    load, work, squares, gaps = 0.0, 0.0, 0.0, 0.0
     for j in range(p.shape[0]):
-        row_load, row_work, row_gaps = 0.0, 0.0, 0.0
+        row_load, row_work, row_squares, row_gaps = 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
+            pressed = p[j, i] * u[j, i]
             row_load += p[j, i]
-            row_work += p[j, i] * u[j, i]
+            row_work += pressed
+            row_squares += pressed * u[j, i]
             row_gaps += p[j, i] * (u[j, i] - h[j, i] - d)
         load += row_load
         work += row_work
+        squares += row_squares
         gaps += row_gaps
-    return load, work, gaps
+    return load, work, gaps, squares
 
 
 @loop

@@ -29,7 +29,7 @@ from .operator import Operator
 from .projected import Projected
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
-FAR, FEW = 0.01, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
+FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which a solve gives up
 
 
@@ -59,7 +59,7 @@ class SteadySolver:
     """Buffers and loop on one grid.
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `stiffness`, the pressure on a point over the
-    displacement it causes there; `height` of the surface, which gaps are compared with; `tolerance` on the certificate;
+    displacement it causes there; `height` of the surface; `tolerance` on the certificate;
     `max_steps` of the linear solves in all; `directions` kept in each, and the `reduction` of the residual they aim at.
     """
 
@@ -83,6 +83,7 @@ class SteadySolver:
         lent = (linear.t, linear.w, linear.r, linear.z)
         self._projected = Projected(slab, operator, preconditioner, lent, dtype)
         self._u = slab.zeros(dtype)
+        self._length = height  # of the last certificate
         self._working = np.zeros(slab.shape, dtype=np.bool_)
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
@@ -158,7 +159,7 @@ class SteadySolver:
         positive, negative, wrong, members, deepest = self.slab.reduce(sums, [deepest])
         if members == 0.0 or positive <= 0.0:
             return np.inf
-        return max(wrong / positive / self.height, deepest / self.height, negative / positive)
+        return max(wrong / positive / self._length, deepest / self._length, negative / positive)
 
     def _admit(self, x: Array, mean: float) -> None:
         """Make x admissible: not negative, under the load; and u its image."""
@@ -170,6 +171,7 @@ class SteadySolver:
         """The approach and the certificate of an admissible pressure, whose set is marked."""
         iterate = weigh(self.slab, p, self._u, h, 0.0).settled()
         *_, certificate = certify(self.slab, p, self._u, h, iterate, mean, self.height, self._working)
+        self._length = certificate.length
         return iterate.d, certificate
 
 

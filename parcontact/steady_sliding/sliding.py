@@ -21,7 +21,7 @@ from ..solve import nested
 from ..solve.certificate import Certificate
 from ..solve.steady import SteadyContact, SteadySolver
 
-COARSE_TOLERANCE = 7e-4  # of the certificate on all grids but the finest
+COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
 NEAR = 1.1  # a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 

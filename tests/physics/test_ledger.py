@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.ledger import SIDE, Ledger
-from parcontact.physics.measures import Measures
+from parcontact.physics.ledger import Ledger
+from parcontact.physics.measures import SIDE, Measures
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface, single_wave
 from parcontact.physics.units import Units

@@ -51,10 +51,14 @@ def test_agrees_with_polonsky_and_keer(load: float) -> None:
 @pytest.mark.parametrize("points", [256, 512, 1024])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_iterations_from_a_cold_start(points: int, seed: int) -> None:
-    """The promise: at most 32 to 1e-6 on every grid, for 5 to 75 % of contact; at most 14 where contact is 99.8 %."""
+    """The promise: at most 32 to 5e-6 on every grid, for 5 to 75 % of contact; at most 14 where contact is 99.8 %.
+
+    That is a gap of 1e-6 of the surface's height, of which the length of the certificate is less than a fifth.
+    """
     h = rough(points, seed)
     for load, limit in ((0.02, 32), (0.1, 32), (0.5, 32), (1.5, 14)):
-        found = solve(h, load * MODULUS, tolerance=1e-6)
+        found = solve(h, load * MODULUS, tolerance=5e-6)
+        assert found.certificate.length < 0.2 * np.ptp(h)
         area = np.count_nonzero(found.p) / found.p.size
         print(f"{points} points, seed {seed}, p/(E* slope) = {load}: {found.iterations} iterations, {area:.1%} contact")
         assert found.iterations <= limit
@@ -94,17 +98,32 @@ def test_certificate_follows_from_the_returned_fields(tolerance: float, control:
     found = solve(h, 0.4, tolerance=tolerance)
     if control == "approach":
         found = keep(solver(h, tolerance=tolerance).solve(h, Approach(found.d), np.zeros_like(h)))
-    gap = polonsky_keer.displacement(found.p, (1.0, 1.0)) - h - found.d
-    height = np.ptp(h)
+    u, weights = polonsky_keer.displacement(found.p, (1.0, 1.0)), found.p / found.p.sum()
+    gap = u - h - found.d
+    length = np.sqrt(np.sum(weights * (u - np.sum(weights * u)) ** 2))
     certificate = found.certificate
-    complementarity = np.sum(found.p * np.abs(gap)) / np.sum(found.p) / height
+    assert_allclose(certificate.length, length, rtol=1e-9)
+    complementarity = np.sum(weights * np.abs(gap)) / length
     assert_allclose(certificate.complementarity, complementarity, rtol=1e-3, atol=1e-13)
-    assert_allclose(certificate.penetration, max(-gap.min(), 0.0) / height, rtol=1e-3, atol=1e-13)
+    assert_allclose(certificate.penetration, max(-gap.min(), 0.0) / length, rtol=1e-3, atol=1e-13)
     assert certificate.load <= ROUNDING
     assert certificate.worst <= tolerance
     assert found.p.min() >= 0.0
     if control == "load":
         assert_allclose(found.p.mean(), 0.4, rtol=ROUNDING)
+
+
+def test_length_of_a_sphere_and_of_a_wave() -> None:
+    """Under a sphere `u = delta (1 - r^2/(2 a^2))` and `p ~ sqrt(1 - r^2/a^2)`: `L = delta sqrt(3/175)`, whatever the
+    box; in full contact of waves L is their rms height as the pressure becomes uniform. Grids: 1 % and 1e-3."""
+    x = (np.arange(64) - 31.7) / 64
+    for side in (1.0, 2.0):  # of the box over 64 cells: twice the box at the same cell, four times the height
+        x = (np.arange(round(64 * side)) - 31.7 * side) / 64
+        h = -0.5 * (x[:, None] ** 2 + x**2)
+        found = solve(h, 0.05 / side**2, tolerance=1e-6, size=(side, side), boundary="free", kernel="love")
+        assert_allclose(found.certificate.length, found.d * np.sqrt(3 / 175), rtol=0.01)
+    h = rough(64)
+    assert_allclose(solve(h, 1e4, tolerance=1e-6).certificate.length, h.std(), rtol=1e-3)
 
 
 @settings(max_examples=60)
@@ -181,10 +200,13 @@ def test_periodic_approach_beyond_full_contact_fails() -> None:
 
 @pytest.mark.parametrize("load", [0.05, 1.0])
 def test_height_offset(load: float) -> None:
-    """An offset of 1e6 times the roughness leaves its heights 1e-10 of themselves: the contact to 1e-8."""
+    """An offset of 1e6 times the roughness leaves its heights 1e-10 of themselves: the contact to 1e-8.
+
+    The tolerance is some 1e-9 of the roughness, of which the length of the certificate is a sixth.
+    """
     h = rough(64)
     offset = 1e6 * np.ptp(h)
-    found, shifted = (solve(heights, load, tolerance=1e-9) for heights in (h, h + offset))
+    found, shifted = (solve(heights, load, tolerance=6e-9) for heights in (h, h + offset))
     assert_allclose(shifted.p, found.p, atol=1e-7 * found.p.max())
     assert_allclose(shifted.d + offset, found.d, atol=1e-8 * np.ptp(h))
     assert abs(shifted.iterations - found.iterations) <= 2
@@ -200,7 +222,8 @@ def test_scaling_by_powers_of_two_is_exact(factor: float) -> None:
     scaled = keep(body.solve(factor * h, MeanPressure(factor * 0.4), np.zeros_like(h)))
     assert np.array_equal(scaled.p, factor * found.p)
     assert scaled.d == factor * found.d
-    assert scaled.certificate == found.certificate
+    length = factor * found.certificate.length
+    assert scaled.certificate == dataclasses.replace(found.certificate, length=length)
 
 
 def test_scaling_of_lengths() -> None:

@@ -39,10 +39,11 @@ class Maps:
 @SHAPES
 def test_weigh(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
-    load, work, gaps = kernels.weigh(maps.p, maps.u, maps.h, 0.25)
+    load, work, gaps, squares = kernels.weigh(maps.p, maps.u, maps.h, 0.25)
     p, u, h = maps.wide("p"), maps.wide("u"), maps.wide("h")
     assert maps.close(load, p)
     assert maps.close(work, p * u)
+    assert maps.close(squares, p * u * u)
     assert maps.close(gaps, np.stack([p * u, -p * h, -0.25 * p]))
 
 

@@ -144,7 +144,7 @@ def sketch(dice: Random, stages: int = 6) -> Sketch:
     controls = ("pressure", "force") if own else ("pressure", "pressure", "force", "approach")
     history = Storyteller(dice, surface, size, boundary == "periodic", body, controls).history(stages)
     numerics = {
-        "tolerance": dice.choice([1e-4, 1e-4, 1e-6, 1e-8]),
+        "tolerance": dice.choice([2e-3, 2e-3, 2e-5, 2e-7]),  # 1e-4, 1e-6 and 1e-8 of the surface's height
         "integrator": dice.choice(["exponential", "exponential", "backward-euler"]),
         "kernel": "love" if boundary == "free" else dice.choice(["spectral", "spectral", "love"]),
         "precision": dice.choice(["double"] * 9 + ["mixed"]),

@@ -15,6 +15,7 @@ from parcontact.parallel.slab import Array
 from parcontact.record.row import Row
 
 EPS = float(np.finfo(float).eps)
+SHALLOW = 0.05  # of the surface's height: less than this the length of a certificate rarely is
 ROUNDINGS = 64  # that a number may be off by, of the largest it is a difference of
 DIGITS = 4  # roundings of the displacement, of the size of the strain times the box, below which no gap is certain
 LOAD = 1e-12  # relative, of the sum over all points
@@ -27,6 +28,7 @@ class Scales:
     [N], with the rounding of heights felt by the stiffest modulus and not by that of the step."""
 
     length: float = 0.0
+    certified: float = 0.0  # the length of a certificate [m]: what a step got wrong is remembered by the next
     energy: float = 0.0
     force: float = 0.0
 
@@ -94,7 +96,7 @@ class Witness:
             [*(float(a.max(initial=0.0)) for a in (-p, -gap, np.abs(u), np.abs(heights))), float(not finite)],
         )
         self.scales.length = max(self.scales.length, *sizes)
-        allowed = numerics.tolerance * march.scene.frame.height * (1 + 1e-6) + ROUNDINGS * EPS * self.scales.length
+        allowed = numerics.tolerance * self._length() * (1 + 1e-6) + ROUNDINGS * EPS * self.scales.length
         mean = {"pressure": step.load, "force": step.load / (grid.lx * grid.ly)}.get(step.control)
         found = load / slab.points
         yield infinite > 0.0, "a map is not finite"
@@ -138,9 +140,15 @@ class Witness:
 
     # -- how exact it can be -------------------------------------------------------------------------------------------
 
+    def _length(self) -> float:
+        """What the certificate compares gaps with [m]; without contact the surface's height."""
+        length, scene = self.march.row.certificate.length, self.march.scene
+        return scene.frame.height if math.isnan(length) else length * scene.units.height
+
     def _blur(self) -> tuple[float, float]:
         scene, modulus = self.march.scene, self.march.state.alpha * self.march.scene.units.modulus
-        return 2.0 * scene.job.numerics.tolerance * scene.frame.height * modulus, 2.0 * self.scales.length * modulus
+        self.scales.certified = max(self.scales.certified, self._length())
+        return 2.0 * scene.job.numerics.tolerance * self.scales.certified * modulus, 2.0 * self.scales.length * modulus
 
     def _beyond(self, step: Step) -> bool:
         """Whether the last digits of the pressure move the body by more than the certificate allows."""
@@ -150,14 +158,15 @@ class Witness:
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
         alpha = scene.material.begin(step.dt, scene.motion.at(step.position)).alpha
         strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
-        return DIGITS * EPS * strain * max(grid.lx, grid.ly) > scene.job.numerics.tolerance * scene.frame.height
+        allowed = scene.job.numerics.tolerance * SHALLOW * scene.frame.height
+        return DIGITS * EPS * strain * max(grid.lx, grid.ly) > allowed
 
 
 def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> float:
     """How far apart the pressures of two witnesses are, the largest of all steps, over what certificates allow.
 
     Two pressures p of the same load or approach with gaps g that meet the certificate (complementarity and penetration
-    below c H, H the surface's height) obey, for a body of modulus alpha and the operator A of modulus 1,
+    below c H, H the length of the certificates) obey, for a body of modulus alpha and the operator A of modulus 1,
 
         <p1 - p2, A (p1 - p2)> = alpha <p1 - p2, g1 - g2> <= 2 c H alpha (sum p1 + sum p2).
 

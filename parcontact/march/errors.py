@@ -1,0 +1,44 @@
+"""The error budget of a step: what the step shows, with what is known of the run."""
+
+from ..job import Rough
+from ..job.timeline import Step
+from ..physics.body import Trial, ZenerBody
+from ..physics.budget import ErrorBudget, Known, Seen, estimate
+from ..physics.embedded import Embedded, Look
+from ..physics.measures import Measures
+from ..scene import Scene
+from ..solve.contact import Contact
+
+
+class Errors:
+    """Estimates of the steps of one scene; allocates nothing."""
+
+    def __init__(self, scene: Scene) -> None:
+        grid, material, self.slab = scene.job.grid, scene.material, scene.slab
+        waves = [shape.short_wavelength for shape in scene.job.surface if isinstance(shape, Rough)]
+        self.known = Known(
+            min(waves) / max(grid.dx, grid.dy) if waves else None,
+            1 in grid.points,
+            scene.folded.bound,
+            scene.job.numerics.integrator == "exponential",
+        )
+        self._slope_unit = scene.units.height / scene.units.length
+        cell = grid.dx / scene.units.length
+        self._pair = Embedded(self.slab, material, cell) if isinstance(material, ZenerBody) else None
+
+    def of(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> ErrorBudget | None:
+        """That of a step just committed; None where nothing touches; collective."""
+        look = Look(0.0, 0.0)
+        if self._pair is not None:
+            look = self._pair.look(step.dt, trial, contact.p, contact.u)
+        if measures.contact_area == 0.0:
+            return None
+        seen = Seen(
+            contact.certificate.complementarity,
+            look.difference,
+            look.slope * self._slope_unit,
+            measures.friction,
+            measures.contact_area,
+            measures.contact_area_corrected,
+        )
+        return estimate(self.known, seen, self.slab.points)

@@ -1,0 +1,156 @@
+"""How wrong friction and contact area are at most, part by part, from numbers that a step has anyway.
+
+Each part is an estimate of a relative error (1 is all of it), found by experiment: spheres, cylinders and rough
+surfaces from 0.4 % to full contact, bodies of one to twelve branches, starts and jumps of velocity, against runs with
+finer steps, meshes and tolerances. Where nothing else is said they hold to a factor of three or so.
+
+solver: from the `complementarity` of the certificate (see `solve.contact.Certificate`).
+time: from the embedded pair (see `embedded`). Over one step the pair differs in the second order of the step, as does
+    the error that all steps of the exponential integrator leave in the end; that of backward Euler is of the first
+    order and goes with the root.
+folded: the bound of the branches without a map.
+mesh: of friction from the cells per shortest wave of a rough surface, or per radius of a contact spot; of the corrected
+    area from the correction itself.
+
+Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
+wrong with pressures then counts more, by about the root of the ratio.
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+from .measures import SIDE
+
+SOLVER_FRICTION, SOLVER_AREA = 0.5, 1.0  # times the complementarity
+EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 1.2, 0.4  # times the difference of the pair
+EULER_FRICTION, EULER_AREA = 0.7, 0.4  # times its root
+WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
+SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
+EDGES, STRAIGHT_EDGES = 0.25, 2.0  # of the correction of the area; along edges that follow the grid
+ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Relative errors by what makes them."""
+
+    solver: float
+    time: float
+    folded: float
+    mesh: float
+
+    @property
+    def total(self) -> float:
+        """All together."""
+        return self.solver + self.time + self.folded + self.mesh
+
+
+NAMES = tuple(field.name for field in fields(Parts))
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """Of one instant. Friction is None where there is none."""
+
+    friction: Parts | None
+    area: Parts
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a run before it begins.
+
+    `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
+    column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator.
+    """
+
+    cells_per_wave: float | None
+    straight: bool
+    folded: float
+    exponential: bool
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a step has shown: the certificate's complementarity; by how much the embedded pair differs; the rms slope
+    of the surface under the pressure; friction; contact area, counted and corrected, as shares."""
+
+    complementarity: float
+    difference: float
+    slope: float
+    friction: float
+    area: float
+    corrected: float
+
+
+def estimate(known: Known, seen: Seen, points: int) -> ErrorBudget:
+    """The budget of a step on a grid of so many points."""
+    return ErrorBudget(_friction(known, seen, points) if seen.friction > 0.0 else None, _area(known, seen))
+
+
+def _friction(known: Known, seen: Seen, points: int) -> Parts:
+    more = math.sqrt(max(1.0, seen.slope / seen.friction))
+    spread = EXPONENTIAL_FRICTION * seen.difference if known.exponential else EULER_FRICTION * seen.difference**0.5
+    return Parts(SOLVER_FRICTION * seen.complementarity * more, spread * more, known.folded, _mesh(known, seen, points))
+
+
+def _mesh(known: Known, seen: Seen, points: int) -> float:
+    if known.cells_per_wave is not None:
+        return WAVES_FRICTION * (4.0 / known.cells_per_wave) ** WAVES_ORDER
+    radius = spot_radius(seen, points)
+    return min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
+
+
+def spot_radius(seen: Seen, points: int) -> float:
+    """Of round spots of contact, or of the gaps between them where these are the smaller, in cells; infinite where
+    there are no edges."""
+    sides = (seen.area - seen.corrected) * points / SIDE
+    return ROUND * min(seen.area, 1.0 - seen.area) * points / sides if sides > 0.0 else math.inf
+
+
+def _area(known: Known, seen: Seen) -> Parts:
+    open_share = 1.0 - seen.area
+    spread = EXPONENTIAL_AREA * seen.difference if known.exponential else EULER_AREA * seen.difference**0.5
+    edges = STRAIGHT_EDGES if known.straight else EDGES
+    mesh = edges * (seen.area - seen.corrected) / seen.corrected if seen.corrected > 0.0 else 0.0
+    return Parts(SOLVER_AREA * seen.complementarity, spread * open_share, known.folded * open_share, mesh)
+
+
+class Summary:
+    """Budgets of many steps, each for as long as it lasted; friction also in proportion to it."""
+
+    def __init__(self) -> None:
+        self._friction, self._area = [0.0] * len(NAMES), [0.0] * len(NAMES)
+        self._weights = [0.0, 0.0]
+
+    def add(self, budget: ErrorBudget, friction: float, seconds: float) -> None:
+        """One step."""
+        for parts, sums, index, weight in (
+            (budget.friction, self._friction, 0, friction * seconds),
+            (budget.area, self._area, 1, seconds),
+        ):
+            if parts is not None:
+                for k, name in enumerate(NAMES):
+                    sums[k] += weight * getattr(parts, name)
+                self._weights[index] += weight
+
+    @property
+    def friction(self) -> Parts | None:
+        """The mean over time, None where nothing has slid."""
+        return Parts(*(value / self._weights[0] for value in self._friction)) if self._weights[0] > 0.0 else None
+
+    @property
+    def area(self) -> Parts | None:
+        """The mean over time, None where no step has lasted."""
+        return Parts(*(value / self._weights[1] for value in self._area)) if self._weights[1] > 0.0 else None
+
+    def lines(self) -> list[str]:
+        """Sentences for run.log."""
+        found = (("friction", self.friction), ("contact area, corrected,", self.area))
+        return [f"{name} is wrong by about {describe(parts)}" for name, parts in found if parts is not None]
+
+
+def describe(parts: Parts) -> str:
+    """The total in per cent, and what it is made of."""
+    shares = ", ".join(f"{name} {100 * getattr(parts, name):.2g} %" for name in NAMES)
+    return f"{100 * parts.total:.2g} % ({shares})"

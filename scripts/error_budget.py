@@ -1,0 +1,121 @@
+"""How honest the error budget is: estimated over true errors of friction and area, for solver and time steps.
+
+    .venv/bin/python scripts/error_budget.py [points]
+
+Each scene is marched with its own settings, with a tolerance 1e-4 of that, and with a sixteenth of its time steps (and
+the small tolerance). The first two differ by the solver's error, the last two by that of the time steps. Errors are
+those of the mean friction and area over the last two thirds of the history: of the solver, whose errors change their
+sign from step to step, as rms, of the time steps, whose errors do not, of the mean.
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact import job as jobs
+from parcontact import scene
+from parcontact.march import loop
+from parcontact.march.step import March
+from parcontact.parallel.slab import Slab
+from parcontact.physics.budget import Parts
+from parcontact.record.row import Row
+
+Json = dict[str, Any]
+FINE, SMALL = 16, 1e-4
+BRANCHES = [{"modulus": 2e6 * 3.0**-k, "relaxation_time": 1e-6 * 10.0**k} for k in range(5)]
+RUBBER = {"model": "zener", "modulus_inf": 1e5, "branches": BRANCHES}
+SOLID = {"model": "zener", "modulus_inf": 0.275e6, "branches": [{"modulus": 2.475e6, "relaxation_time": 1e-3}]}
+
+
+def rough(points: int, pressure: float, velocity: float, material: Json = RUBBER) -> Json:
+    wave = 16.0 / points * 1e-3
+    surface = {"shape": "rough", "hurst": 0.9, "long_wavelength": 2.5e-4, "short_wavelength": wave, "rms_slope": 0.02}
+    stage = {"pressure": pressure, "velocity": velocity, "distance": 32e-3 / points, "cells_per_step": 1}
+    return {"grid": {"points": points, "size": 1e-3}, "surface": surface, "material": material, "history": [stage]}
+
+
+def sphere(points: int, velocity: float) -> Json:
+    ball = {"shape": "sphere", "radius": 1e-2, "center": [2e-3, 3e-3]}
+    stage = {"force": 0.15, "velocity": velocity, "distance": 32 * 6e-3 / points, "cells_per_step": 1}
+    grid = {"points": points, "size": 6e-3, "boundary": "free"}
+    return {"grid": grid, "surface": ball, "material": SOLID, "history": [stage]}
+
+
+def scenes(points: int) -> dict[str, Json]:
+    cylinder = {"shape": "cylinder", "radius": 1e-2, "center": [1.5e-3, 0.0]}
+    stage = {"pressure": 2e4, "velocity": 0.1, "distance": 32 * 4e-3 / (4 * points), "cells_per_step": 1}
+    line = {"grid": {"points": [4 * points, 1], "size": [4e-3, 1e-3]}, "surface": cylinder, "history": [stage]}
+    slow = rough(points, 1e4, 0.1)
+    slow["history"].insert(0, {"pressure": 1e4, "duration": 1e-2, "time_step": {"first": 1e-6, "growth": 1.5}})
+    return {
+        "sphere": sphere(points, 0.046765),
+        "cylinder": {**line, "material": SOLID},
+        "rough, light": rough(points, 2e3, 1.0),
+        "rough": rough(points, 2e4, 1.0),
+        "rough, heavy": rough(points, 1e5, 1.0),
+        "rough, nearly full contact": rough(points, 2.5e5, 1.0),
+        "rough, one branch": rough(points, 2e4, 0.1, SOLID),
+        "rough, dwell and slide": slow,
+    }
+
+
+def march(data: Json, tolerance: float | None, fine: int, integrator: str) -> list[Row]:
+    numerics = {"integrator": integrator, "branch_error": 0.0, **({"tolerance": tolerance} if tolerance else {})}
+    history = [_finer(stage, fine) for stage in data["history"]]
+    job = jobs.Job.model_validate({**data, "history": history, "numerics": numerics})
+    rows: list[Row] = []
+    loop.run(March(scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points))), [lambda now: rows.append(now.row)])
+    return rows
+
+
+def _finer(stage: Json, fine: int) -> Json:
+    if "cells_per_step" in stage:
+        return {**stage, "cells_per_step": stage["cells_per_step"] / fine}
+    step = stage["time_step"]
+    return {**stage, "time_step": {"first": step["first"] / fine, "growth": step["growth"] ** (1.0 / fine)}}
+
+
+def series(rows: list[Row], times: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """Of a measure, at some instants."""
+    return np.interp(times, [row.time for row in rows], [getattr(row.measures, name) for row in rows])
+
+
+def compare(data: Json, integrator: str = "exponential") -> dict[str, tuple[float, float]]:
+    """Estimated and true relative error by part and measure."""
+    tolerance = jobs.Numerics().tolerance
+    own, exact, finest = (
+        march(data, tolerance * share, fine, integrator) for share, fine in ((1.0, 1), (SMALL, 1), (SMALL, FINE))
+    )
+    late = [row for row in own if row.time > 0.35 * own[-1].time and row.measures.friction > 0.0]
+    times = np.array([row.time for row in late])
+    found = {}
+    for measure, name in (("friction", "friction"), ("area", "contact_area_corrected")):
+        a, b, c = (series(rows, times, name) for rows in (own, exact, finest))
+        size = np.sqrt(np.mean(c**2))
+        true = {"solver": np.sqrt(np.mean((a - b) ** 2)) / size, "time": abs(np.mean(b - c)) / size}
+        for part, error in true.items():
+            parts: list[Parts] = [getattr(row.errors, measure) for row in late if row.errors]
+            estimate = np.mean([getattr(one, part) * v for one, v in zip(parts, a, strict=True)]) / np.mean(a)
+            found[f"{part} {measure}"] = float(estimate), float(error)
+    return found
+
+
+def main(points: int = 64) -> None:
+    print(f"{'estimated/true':28}" + "".join(f"{name:>24}" for name in ("solver friction", "time friction")), end="")
+    print("".join(f"{name:>24}" for name in ("solver area", "time area")))
+    for integrator in ("exponential", "backward-euler"):
+        for name, data in scenes(points).items():
+            found = compare(data, integrator)
+            print(f"{name + ', ' + integrator[:3]:28}", end="")
+            for part in ("solver friction", "time friction", "solver area", "time area"):
+                estimate, true = found[part]
+                ratio = f"{estimate / true:6.2g}" if true > 0.0 else "     -"
+                print(f"{estimate:9.1e}/{true:7.1e} {ratio}", end="")
+            print(flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

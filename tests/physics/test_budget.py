@@ -1,0 +1,66 @@
+"""The arithmetic of the error budget; what it says of real runs is in scripts/error_budget.py and its test."""
+
+import math
+from dataclasses import astuple
+
+import pytest
+
+from parcontact.physics.budget import Known, Seen, Summary, estimate, spot_radius
+from parcontact.physics.measures import SIDE
+
+KNOWN = Known(8.0, False, 1e-4, True)
+SEEN = Seen(1e-3, 4e-4, 0.02, 0.02, 0.1, 0.095)
+
+
+def test_parts_add_up() -> None:
+    """A surface whose slope is its friction: the numbers of the module, at 8 cells per shortest wave."""
+    budget = estimate(KNOWN, SEEN, 10_000)
+    assert budget.friction is not None
+    assert astuple(budget.friction) == pytest.approx((0.5e-3, 4.8e-4, 1e-4, 0.05 * 2**-2.5))
+    assert astuple(budget.area) == pytest.approx((1e-3, 0.4 * 4e-4 * 0.9, 0.9e-4, 0.25 / 19))
+    assert budget.area.total == pytest.approx(1e-3 + 1.44e-4 + 0.9e-4 + 0.25 / 19)
+
+
+def test_backward_euler_is_of_the_first_order() -> None:
+    budget = estimate(Known(8.0, False, 0.0, False), SEEN, 10_000)
+    assert budget.friction is not None
+    assert budget.friction.time == pytest.approx(0.7 * 0.02)
+    assert budget.area.time == pytest.approx(0.4 * 0.02 * 0.9)
+
+
+def test_little_friction_counts_more() -> None:
+    """A quarter of the slope's friction: twice the relative error; none at all: no budget."""
+    one = estimate(KNOWN, SEEN, 10_000).friction
+    other = estimate(KNOWN, Seen(1e-3, 4e-4, 0.08, 0.02, 0.1, 0.095), 10_000).friction
+    assert one is not None
+    assert other is not None
+    assert (other.solver, other.time) == (2 * one.solver, 2 * one.time)
+    assert (other.folded, other.mesh) == (one.folded, one.mesh)
+    assert estimate(KNOWN, Seen(1e-3, 4e-4, 0.08, 0.0, 0.1, 0.095), 10_000).friction is None
+
+
+def test_radius_of_a_spot() -> None:
+    """Of a circle of ten cells: pi r^2 cells and 8 r sides; of one hole in full contact the same."""
+    points, cells, sides = 10_000, 100 * math.pi, 80
+    spot = Seen(0.0, 0.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
+    hole = Seen(0.0, 0.0, 0.0, 0.1, 1 - cells / points, 1 - (cells + SIDE * sides) / points)
+    assert spot_radius(spot, points) == pytest.approx(10.0)
+    assert spot_radius(hole, points) == pytest.approx(10.0)
+    assert spot_radius(Seen(0.0, 0.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
+
+
+def test_summary() -> None:
+    """Means over time, of friction in proportion to it; in sentences."""
+    summary = Summary()
+    summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
+    summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
+    summary.add(estimate(KNOWN, Seen(5e-3, 0.0, 0.02, 0.0, 0.1, 0.1), 10_000), 0.0, 1.0)
+    assert summary.friction is not None
+    assert summary.area is not None
+    assert summary.friction.solver == pytest.approx((0.06 * 0.5e-3 + 0.02 * 1.5e-3) / 0.08)
+    assert summary.area.solver == pytest.approx((3 * 1e-3 + 2 * 3e-3 + 1 * 5e-3) / 6)
+    friction, area = summary.lines()
+    assert friction.startswith("friction is wrong by about ")
+    assert "solver 0.075 %" in friction
+    assert area.startswith("contact area, corrected, is wrong by about ")
+    assert Summary().lines() == []

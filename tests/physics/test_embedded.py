@@ -1,0 +1,105 @@
+"""The embedded pair: what the other integrator would have made of a step, and what a look at it costs."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.slab import Slab
+from parcontact.physics.body import Heights, ZenerBody
+from parcontact.physics.embedded import SAMPLED_ROWS, Embedded
+from parcontact.physics.prony import Prony
+
+PRONY = Prony(0.5, np.array([2.0, 1.0, 4.0]), np.array([1e-3, 1e-1, 3.0]))
+DX = 0.25
+
+
+def march(comm: MPI.Intracomm, name: str, nx: int, ny: int, dt: float) -> tuple[Embedded, list[np.ndarray], float]:
+    """Two steps of a body under displacements that are given; the look at the second, and its maps on all rows."""
+    slab = Slab(comm, nx, ny)
+    body = ZenerBody(slab, PRONY, name)
+    dice = np.random.default_rng(3)
+    heights, first, second, p = (dice.normal(size=(ny, nx))[slab.rows] for _ in range(4))
+    pair = Embedded(slab, body, DX)
+    for u, step in ((first, 2e-3), (second, dt)):
+        trial = body.begin(step, Heights(heights, 2))
+        displacement = u + trial.effective - np.roll(heights, 2, axis=1)  # so that u is the new displacement
+        body.commit(trial, displacement)
+    pressure = np.maximum(p, 0.0)
+    look = pair.look(dt, trial, pressure, displacement)
+    found = [body.u.copy(), pressure, displacement * trial.alpha, np.roll(heights, 2, axis=1)]
+    return pair, [*found, np.array([look.difference, look.slope])], trial.alpha
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["exponential", "backward-euler"])
+@pytest.mark.parametrize("dt", [1e-5, 1e-2, 10.0])
+def test_difference_of_the_integrators(comm: MPI.Intracomm, name: str, dt: float) -> None:
+    """Two bodies that differ in the integrator of their last step only: `A p` at its end, on every row; rounding."""
+    nx, ny = 12, 9
+    _, (u, p, ap, h, look), _ = march(comm, name, nx, ny, dt)
+    slab = Slab(comm, nx, ny)
+    dice = np.random.default_rng(3)
+    _, first, second, _ = (dice.normal(size=(ny, nx))[slab.rows] for _ in range(4))
+    assert_allclose(u, second, atol=1e-12)
+    ends = []
+    for last in ("exponential", "backward-euler"):
+        total = PRONY.modulus_inf * second
+        for modulus, tau in zip(PRONY.moduli, PRONY.relaxation_times, strict=True):
+            branch = 0.0
+            for change, step, kind in ((first, 2e-3, name), (second - first, dt, last)):
+                z = step / tau
+                if kind == "exponential":
+                    branch = np.exp(-z) * branch + modulus * -np.expm1(-z) / z * change
+                else:
+                    branch = (branch + modulus * change) / (1.0 + z)
+            total = total + branch
+        ends.append(total)
+    wrong, size, load, slopes = slab.sum(
+        float(np.sum(p * (ends[0] - ends[1]) ** 2)),
+        float(np.sum(p * ap**2)),
+        float(p.sum()),
+        float(np.sum(p * ((np.roll(h, -1, axis=1) - np.roll(h, 1, axis=1)) / (2 * DX)) ** 2)),
+    )
+    assert_allclose(look, [np.sqrt(wrong / size), np.sqrt(slopes / load)], rtol=1e-9)
+
+
+@pytest.mark.mpi
+def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
+    """Every so many rows of the whole map, the same on any number of ranks; between 32 and 64 of them, which of twelve
+    branch maps of 1024 rows is 3 % of one pass, where a step makes a hundred over a map."""
+    whole = march(MPI.COMM_SELF, "exponential", 8, 200, 1e-2)[1][4]
+    assert whole[0] > 0.0
+    for comm in communicators:
+        assert_allclose(march(comm, "exponential", 8, 200, 1e-2)[1][4], whole, rtol=1e-12)
+    for ny in (1, 31, 64, 200, 1024, 4096):
+        stride = Embedded(
+            Slab(MPI.COMM_SELF, 4, ny), ZenerBody(Slab(MPI.COMM_SELF, 1, 1), PRONY, "exponential"), DX
+        ).stride
+        assert len(range(0, ny, stride)) <= 2 * SAMPLED_ROWS
+        assert len(range(0, ny, stride)) >= min(ny, SAMPLED_ROWS)
+
+
+def test_nothing_pressed_and_jumps() -> None:
+    """No pressure: no difference. A jump relaxes nothing, in either integrator."""
+    slab = Slab(MPI.COMM_SELF, 4, 4)
+    body = ZenerBody(slab, PRONY, "exponential")
+    pair = Embedded(slab, body, DX)
+    trial = body.begin(0.0, Heights(slab.zeros()))
+    body.commit(trial, np.ones((4, 4)))
+    assert pair.look(0.0, trial, np.ones((4, 4)), np.ones((4, 4))).difference == 0.0
+    assert pair.look(1.0, trial, np.zeros((4, 4)), np.ones((4, 4))).difference == 0.0
+
+
+def test_second_order_of_a_step() -> None:
+    """Smooth motion: half the step, a quarter of the difference."""
+    slab = Slab(MPI.COMM_SELF, 4, 1)
+    found = []
+    for count in (64, 128):
+        body = ZenerBody(slab, PRONY, "exponential")
+        pair, dt = Embedded(slab, body, DX), 1e-3 / count
+        for step in range(1, count + 1):
+            trial = body.begin(dt, Heights(slab.zeros()))
+            body.commit(trial, np.sin(3e3 * step * dt) + trial.effective)
+        found.append(pair.look(dt, trial, np.ones((1, 4)), np.ones((1, 4))).difference)
+    assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
