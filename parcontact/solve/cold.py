@@ -1,8 +1,8 @@
 """A start from nothing: the contact is found loosely on coarser grids first.
 
 Their pressure is the same in all fine cells of a coarse one, so that no point far from contact gets any. On the finest
-grid that saves a third of the iterations to a tolerance of 5e-3, and all coarser grids together cost less than three
-applications of the operator there.
+grid that saves a third of the iterations to a gap of 1e-4 of the height, and all coarser grids together cost less than
+three applications of the operator there.
 """
 
 from collections.abc import Callable
