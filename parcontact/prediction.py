@@ -66,9 +66,14 @@ class SteadyInstant(NamedTuple):
 
 def has_spectrum(job: Job) -> bool:
     """Whether the theory knows the surface of a job without its heights: a periodic one with one rough surface."""
-    rough = [part for part in job.surface if isinstance(part, jobs.Rough)]
-    known = all(isinstance(part, jobs.Rough | jobs.Flat) for part in job.surface)
-    return job.grid.boundary == "periodic" and len(rough) == 1 and known
+    return job.grid.boundary == "periodic" and _only_rough(job) is not None
+
+
+def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
+    """The one rough surface of a job that has nothing else."""
+    parts = [part for part in job.surface if not isinstance(part, jobs.Flat)]
+    part = parts[0] if len(parts) == 1 else None
+    return part if isinstance(part, jobs.Rough | jobs.RoughSpectrum) else None
 
 
 def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> Iterator[SteadyInstant]:
@@ -138,10 +143,11 @@ def _lattice(job: Job, slab: Slab) -> Rings:
 
 def _continuum(job: Job, slide: float) -> Rings:
     """The spectrum between the limits of the job, of which the box holds nothing longer than its longer side."""
-    rough = [part for part in job.surface if isinstance(part, jobs.Rough)]
-    if len(rough) != 1 or any(not isinstance(part, jobs.Rough | jobs.Flat) for part in job.surface):
+    part = _only_rough(job)
+    if part is None:
         raise InputError("surface: the theory needs one rough surface and nothing else; --waves lattice takes any")
-    (part,) = rough
+    if isinstance(part, jobs.RoughSpectrum):
+        return rings_of_measured(job, part, slide)
     longest = min(part.long_wavelength, max(job.grid.size))
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
     if k_long >= EDGE * k_short:
@@ -158,6 +164,19 @@ def _continuum(job: Job, slide: float) -> Rings:
     else:
         factor = math.sqrt(part.psd_constant or 0.0)
     return unit.scaled(factor)
+
+
+def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
+    """Of a measured spectrum; the box holds nothing longer than its longer side, the grid no waves below two cells."""
+    from .road import spectrum
+
+    found, (long, short) = spectrum.of(part)
+    cell = max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
+    ends = 2 * np.pi / min(long, max(job.grid.size)), 2 * np.pi / max(short, 2 * cell)
+    if ends[0] >= EDGE * ends[1]:
+        raise InputError("surface: the theory needs waves that fit the box and the grid, the spectrum has none")
+    kinks = found.q[(found.q > ends[0]) & (found.q < ends[1])].tolist()
+    return persson_rings.rings_of_spectrum(lambda k: np.asarray(found(k), float), *ends, slide, kinks)
 
 
 def _longest_slide(timeline: Timeline) -> float:

@@ -1,16 +1,20 @@
 """The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from . import job as jobs
 from .job import Grid, Job
 from .parallel.fft import FFT, Spectrum
+from .parallel.root import on_root
 from .parallel.slab import Array
 from .physics import heightfile
 from .physics.roughness import Roughness
 from .physics.shapes import Round, Shape
 from .physics.surface import Surface, single_wave
 
+ROUNDING = 1e-8  # relative, of the shortest wavelength of a table
 FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
 
@@ -47,6 +51,8 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
         rows, done = road.rows_of(part, grid, fft.slab)
         told += done
         return _transform(rows, fft)
+    if isinstance(part, jobs.RoughSpectrum):
+        return _of_spectrum(part, grid, fft, told)
     if isinstance(part, jobs.HeightFile):
         rows = heightfile.read(part.path, part.dataset, fft.slab)
         return _transform(part.scale * rows, fft)
@@ -61,6 +67,26 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
         part.rms_height,
         part.psd_constant,
     ).spectrum(fft, grid.size)
+
+
+def _of_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, told: list[str]) -> Spectrum:
+    from .road import spectrum
+
+    found, (long, short) = on_root(fft.slab.comm, lambda: spectrum.of(part))
+    told += _told(part, grid, long, short) if fft.slab.root else []
+    random = part.amplitudes == "random"
+    limits = (long, long, short * (1.0 - ROUNDING))  # the last point of a table is among its waves
+    return Roughness(1.0, *limits, part.seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
+
+
+def _told(part: jobs.RoughSpectrum, grid: Grid, long: float, short: float) -> Iterator[str]:
+    """Which waves of a measured spectrum there are."""
+    yield f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}"
+    cell = max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
+    if short < 2 * cell:
+        yield f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m"
+    if long > max(grid.size):
+        yield f"spectrum: the box has no waves longer than {max(grid.size):.4g} m"
 
 
 def _transform(heights: Array, fft: FFT) -> Spectrum:

@@ -8,7 +8,7 @@ from .reading import Case, choose, load, load_cases
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
 from .surface import Cylinder, Flat, HeightFile, Rough, Spectral, Sphere, Wave
-from .topography import Topography
+from .topography import RoughSpectrum, Topography
 from .values import log_range
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "PronyBranch",
     "Ramp",
     "Rough",
+    "RoughSpectrum",
     "Spectral",
     "Sphere",
     "Stage",

@@ -14,6 +14,7 @@ from .history import Initial, Stage, Steady
 from .material import Elastic, PronyBranch, Zener
 from .sections import Grid
 from .surface import HeightFile, Rough, Sphere, Wave
+from .topography import RoughSpectrum, Topography
 
 STEEPEST = 1.0  # rms slope, and radius of a contact over that of its sphere: beyond, slopes are not small
 SOFTEST, HARDEST = 1e3, 1e12  # Pa; shear moduli go from 1e3 (gels) to 5e11 (diamond)
@@ -49,9 +50,12 @@ def steep(slope: float) -> str:
     )
 
 
+READ = HeightFile, RoughSpectrum, Topography  # shapes that come from files
+
+
 def says_all(surface: tuple[Any, ...]) -> bool:
     """Whether the slopes of a surface follow from the job, without its heights."""
-    return not any(isinstance(shape, HeightFile) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
+    return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
 def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:

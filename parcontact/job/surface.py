@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from .fault import Fault, refuse
 from .part import Context, Part, Rule, chosen
-from .topography import Topography
+from .topography import RoughSpectrum, Topography
 from .values import Positive, Real, Seed, Whole, from_home
 
 Profile = Literal["paraboloid", "exact"]
@@ -122,7 +122,8 @@ class Flat(Part):
     shape: Literal["flat"] = "flat"
 
 
-Spectral = Rough | Wave | HeightFile | Topography  # given by their waves; the others are closed forms at every point
+# Given by their waves; the others are closed forms at every point.
+Spectral = Rough | RoughSpectrum | Wave | HeightFile | Topography
 KINDS: dict[str, type[Part]] = {
     "rough": Rough,
     "sphere": Sphere,
@@ -132,6 +133,16 @@ KINDS: dict[str, type[Part]] = {
     "topography": Topography,
     "flat": Flat,
 }
+CHOSEN = chosen("shape", KINDS)
+
+
+def _shape(data: Any, info: ValidationInfo) -> Any:
+    """A rough surface is measured, or follows from a few numbers: its keys tell which."""
+    if isinstance(data, dict) and data.get("shape") == "rough" and data.get("spectrum") is not None:
+        return RoughSpectrum.model_validate(data, context=info.context)
+    return data if isinstance(data, RoughSpectrum) else CHOSEN(data, info)
+
+
 Shape = Annotated[
-    Rough | Sphere | Cylinder | Wave | HeightFile | Topography | Flat, PlainValidator(chosen("shape", KINDS))
+    Rough | RoughSpectrum | Sphere | Cylinder | Wave | HeightFile | Topography | Flat, PlainValidator(_shape)
 ]

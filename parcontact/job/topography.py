@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, ValidationInfo
 
 from .fault import Fault, refuse
 from .part import Part
-from .values import Flag, Positive, from_home
+from .values import Flag, Positive, Seed, from_home
 
 
 def _map_file(path: Path, info: ValidationInfo) -> Path:
@@ -20,6 +20,25 @@ def _map_file(path: Path, info: ValidationInfo) -> Path:
     if not found.is_file():
         refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
     return found
+
+
+class RoughSpectrum(Part):
+    """A random surface with a measured isotropic spectrum, in a table whose columns say which: `q[1/m] C2D[m^4]`, or
+    `q[1/m] C1D[m^3]` of profiles. With `hurst` it goes on beyond its shortest wave as q^(-2 (1 + hurst)).
+
+    Wavelengths are those of the data unless they are given.
+    """
+
+    label: ClassVar[str] = "shape rough with a spectrum"
+    shape: Literal["rough"] = "rough"
+    spectrum: Annotated[Path, AfterValidator(_map_file), Field(description="the path of a table of a spectrum")]
+    hurst: float | None = Field(
+        default=None, gt=0, le=1, strict=True, description="a Hurst exponent above 0 and up to 1"
+    )
+    long_wavelength: Annotated[Positive | None, Field(description="a positive wavelength [m]")] = None
+    short_wavelength: Annotated[Positive | None, Field(description="a positive wavelength [m]")] = None
+    seed: Annotated[Seed, Field(description="a whole number of zero or more")] = 0
+    amplitudes: Literal["random", "fixed"] = "random"
 
 
 class Topography(Part):

@@ -7,6 +7,7 @@ with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. Each wave has its own random numbers, 
 x-wavenumber: the same seed gives the same waves on every grid and every number of ranks, and no rank holds the whole.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,7 @@ class Roughness:
     rms_slope: float | None = None
     rms_height: float | None = None
     psd_constant: float | None = None
+    measured: Callable[[Array], Array] | None = None  # Phi/C at k instead of the power law
 
     def density(self, k: Array) -> Array:
         """Phi(k)/C at wavenumbers k [rad/m]."""
@@ -39,6 +41,8 @@ class Roughness:
             2 * np.pi / length for length in (self.long_wavelength, self.rolloff_wavelength, self.short_wavelength)
         )
         inside = (k >= EDGE * k_long) & (k < EDGE * k_short)
+        if self.measured is not None:
+            return np.where(inside, self.measured(np.where(inside, k, k_long)), 0.0)
         return np.where(inside, np.maximum(k / k_rolloff, 1.0) ** (-2.0 * (1.0 + self.hurst)), 0.0)
 
     def spectrum(self, fft: FFT, size: tuple[float, float]) -> Spectrum:

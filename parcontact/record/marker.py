@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..job import Dma, HeightFile, Job, Topography
+from ..job import Dma, HeightFile, Job, RoughSpectrum, Topography
 from ..job.table import plain
 from . import files
 
@@ -41,8 +41,15 @@ def plain_job(job: Job) -> dict[str, Any]:
     for part, given in pairs:
         if isinstance(given, HeightFile | Dma | Topography):
             del part["path"]
-            part["content"] = f"{zlib.crc32(given.path.read_bytes()):08x}"
+            part["content"] = _checksum(given.path)
+        elif isinstance(given, RoughSpectrum):
+            del part["spectrum"]
+            part["content"] = _checksum(given.spectrum)
     return data
+
+
+def _checksum(path: Path) -> str:
+    return f"{zlib.crc32(path.read_bytes()):08x}"
 
 
 def kept(data: Mapping[str, Any]) -> dict[str, Any]:

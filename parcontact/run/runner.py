@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from .. import sanity, scene
 from ..effects import decisions
 from ..errors import InputError, RunError
-from ..job import Job, Rough
+from ..job import Job, Rough, RoughSpectrum
 from ..job.timeline import Timeline, reached
 from ..march import loop
 from ..march.failure import StepError
@@ -113,7 +113,7 @@ def _nothing_to_do(origin: Origin, timeline: Timeline, until: float | None) -> s
 def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:
     """Where the files of a run come from that begins, or goes on from a checkpoint."""
     link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
-    seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough))
+    seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extended(saved.chain if saved else (), link)
     return Provenance(chain, seeds, str(job.included) if job.included else "", doubts)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -137,7 +138,11 @@ def shown_job(path: Path) -> Job:
     try:
         data = yamltext.parse(path.read_bytes(), str(path)).data
         data = {name: data[name] for name in SHOWN if name in data}
-        data["surface"] = [{"shape": "flat"} if shape["shape"] in FILES else shape for shape in data["surface"]]
+        data["surface"] = [{"shape": "flat"} if _comes_from_a_file(shape) else shape for shape in data["surface"]]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:
         raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
+
+
+def _comes_from_a_file(shape: dict[str, Any]) -> bool:
+    return shape["shape"] in FILES or "spectrum" in shape

@@ -1,0 +1,147 @@
+"""Measured isotropic spectra: a table of C1D or C2D over wavenumbers, and the density of waves that follows from it.
+
+The names of the columns say which spectrum it is, and their units: `q[1/m] C2D[m^4]` or `q[1/m] C1D[m^3]`, and the same
+in mm, um or nm. As in `road.statistics`, q = 2 pi/wavelength, and C1D is that of profiles, one-sided:
+
+    <h^2> = int C2D d2q = int_0^inf C1D dq,        Phi = 4 pi^2 C2D, the density of `physics.roughness`,
+    C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq       (Abel's equation, with q = k cosh t)
+
+Between its points a spectrum is a power law. For Abel's integral, C1D goes on beyond its last point: with the given
+Hurst exponent, as q^-(1 + 2 hurst), or else as the power law of its last decade.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..job import RoughSpectrum
+from ..parallel.slab import Array
+
+LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
+POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
+FEWEST = 3  # rows of numbers
+LARGEST_FILE = 50_000_000  # bytes
+ABEL_NODES = 12  # of Gauss' rule, in each piece of Abel's integral
+ABEL_DECADES = 4.0  # beyond the last point, where C1D' has fallen by more than 8
+EDGE = 1e-9  # relative: wavelengths that differ by this are the same
+COLUMN = re.compile(r"^(q|C1D|C2D)\[([^\]]+)\]$")
+FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An isotropic spectrum: Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond them as q^-`fall`, or
+    nothing where that is 0."""
+
+    q: Array
+    phi: Array
+    fall: float
+
+    def __call__(self, k: Array) -> Array:
+        """Phi [m^4] at wavenumbers [rad/m]."""
+        inside = (k >= self.q[0] * (1 - EDGE)) & ((k <= self.q[-1] * (1 + EDGE)) | (self.fall > 0.0))
+        with np.errstate(divide="ignore"):
+            log = np.interp(np.log(k), np.log(self.q), np.log(self.phi))
+            log -= self.fall * np.maximum(np.log(k / self.q[-1]), 0.0)
+        return np.where(inside, np.exp(log), 0.0)
+
+
+def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
+    """The spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
+    q, values, power = _read(part.spectrum)
+    if power == POWERS["C1D"]:
+        q, values = _over_directions(part.spectrum, q, values, part.hurst)
+    fall = 2.0 * (1.0 + part.hurst) if part.hurst is not None else 0.0
+    longest, shortest = 2 * np.pi / q[0], 2 * np.pi / q[-1]
+    wanted = part.long_wavelength or longest, part.short_wavelength or shortest
+    if wanted[0] > longest * (1 + EDGE):
+        raise InputError(f"{part.spectrum}: long_wavelength is {wanted[0]:.6g} m, the data end at {longest:.6g} m")
+    if wanted[1] < shortest * (1 - EDGE) and part.hurst is None:
+        raise InputError(
+            f"{part.spectrum}: short_wavelength is {wanted[1]:.6g} m, the data end at {shortest:.6g} m; give hurst to "
+            "continue them by a power law"
+        )
+    return Measured(q, 4 * np.pi**2 * values, fall), wanted
+
+
+def _read(path: Path) -> tuple[Array, Array, int]:
+    """Wavenumbers [rad/m], the spectrum in SI units, and the power of m in its unit."""
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path} has more than {LARGEST_FILE / 1e6:g} MB; a table of a spectrum was expected")
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as text: {error}") from error
+    lines = [
+        (number, re.split(r"[,;\s]+", line.strip()))
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise InputError(f"{path} is empty; {FORMS} were expected")
+    factors, power = _header(path, *lines[0])
+    rows = np.array([_numbers(path, number, cells) for number, cells in lines[1:]])
+    if len(rows) < FEWEST:
+        raise InputError(f"{path} has {len(rows)} rows of numbers; at least {FEWEST} were expected")
+    wrong = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
+    if wrong.size:
+        raise InputError(f"{path}, line {lines[wrong[0] + 2][0]}: q must rise from line to line")
+    return rows[:, 0] * factors[0], rows[:, 1] * factors[1], power
+
+
+def _header(path: Path, number: int, cells: list[str]) -> tuple[tuple[float, float], int]:
+    found = [COLUMN.match(cell) for cell in cells]
+    if len(cells) != 2 or not (found[0] and found[1]) or found[0][1] != "q" or found[1][1] == "q":
+        raise InputError(f"{path}, line {number}: {FORMS} were expected, got {' '.join(cells)[:60]!r}")
+    (_, rate), (name, unit) = found[0].groups(), found[1].groups()
+    power = POWERS[name]
+    length, raised = rate.removeprefix("1/"), unit.partition("^")[0]
+    if not rate.startswith("1/") or length not in LENGTHS or raised not in LENGTHS or unit != f"{raised}^{power}":
+        raise InputError(f"{path}, line {number}: units of {FORMS} were expected, got [{rate}] and [{unit}]")
+    return (1.0 / LENGTHS[length], LENGTHS[raised] ** power), power
+
+
+def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:
+    try:
+        q, value = map(float, cells)
+    except ValueError:
+        raise InputError(f"{path}, line {number}: two numbers were expected, got {' '.join(cells)[:60]!r}") from None
+    if not (0.0 < q < np.inf and 0.0 < value < np.inf):
+        raise InputError(f"{path}, line {number}: positive numbers were expected, got {' '.join(cells)[:60]!r}")
+    return q, value
+
+
+def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tuple[Array, Array]:
+    """C2D at the wavenumbers of C1D, without those where noise makes it negative."""
+    log_q, log_c = np.log(q), np.log(c1)
+    last = log_q >= log_q[-1] - np.log(10.0)
+    last[-2:] = True
+    fall = 1.0 + 2.0 * hurst if hurst is not None else -float(np.polyfit(log_q[last], log_c[last], 1)[0])
+    if fall <= 0.0:
+        raise InputError(f"{path}: C1D rises in its last decade; such profiles are not those of an isotropic surface")
+    slopes = np.append(np.diff(log_c) / np.diff(log_q), -fall)
+    end = log_q[-1] + ABEL_DECADES * np.log(10.0)
+    c2 = np.array([_abel(k, np.append(log_q[i:], end), log_c[i:], slopes[i:]) for i, k in enumerate(q)])
+    good = c2 > 0.0
+    if good.sum() < FEWEST:
+        raise InputError(f"{path}: C1D does not fall with q; such profiles are not those of an isotropic surface")
+    return q[good], c2[good]
+
+
+def _abel(k: float, edges: Array, logs: Array, slopes: Array) -> float:
+    """-1/(2 pi) int C1D'(k cosh t) dt from k on, for power laws between the edges (of log q); Gauss' rule in each."""
+    nodes, weights = np.polynomial.legendre.leggauss(ABEL_NODES)
+    total = 0.0
+    t = np.arccosh(np.exp(np.maximum(edges - np.log(k), 0.0)))
+    for piece in range(len(slopes)):
+        parts = max(1, int(np.ceil(t[piece + 1] - t[piece])))
+        ends = np.linspace(t[piece], t[piece + 1], parts + 1)
+        half = np.diff(ends)[:, None] / 2
+        at = (ends[:-1, None] + half * (1 + nodes)).ravel()
+        log = np.log(k) + np.log(np.cosh(at))
+        derivative = slopes[piece] * np.exp(logs[piece] + slopes[piece] * (log - edges[piece]) - log)
+        total += float((half * weights).ravel() @ derivative)
+    return -total / (2 * np.pi)

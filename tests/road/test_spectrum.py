@@ -1,0 +1,176 @@
+"""Surfaces with a measured spectrum: that of the surface made is the one in the table."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.special import gamma
+
+from parcontact import job as jobs
+from parcontact import prediction, rigid_surface
+from parcontact.errors import InputError
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Array, Slab
+from parcontact.road import spectrum, statistics
+from parcontact.theory import persson_rings
+
+L, N = 1.0e-3, 128
+ROLL, POWER = 2e4, 3.6  # of C2 = A (1 + (q/ROLL)^2)^(-POWER/2), whose profiles are known in closed form
+A = 1e-24
+JOB = """\
+grid: {{points: 128, size: 1.0e-3}}
+surface: {{shape: rough, spectrum: psd.csv, amplitudes: fixed{more}}}
+material: {{model: zener, modulus_inf: 1.0e+6, branches: [{{modulus: 1.0e+7, relaxation_time: 1.0e-4}}]}}
+steady: {{velocities: [0.1], pressures: [1.0e5]}}
+"""
+
+
+def c2(q: Array) -> Array:
+    return np.asarray(A * (1 + (q / ROLL) ** 2) ** (-POWER / 2))
+
+
+def c1(q: Array) -> Array:
+    """2 int C2(sqrt(q^2 + y^2)) dy, in closed form."""
+    factor = np.sqrt(np.pi) * gamma((POWER - 1) / 2) / gamma(POWER / 2)
+    return np.asarray(2 * A * ROLL * factor * (1 + (q / ROLL) ** 2) ** ((1 - POWER) / 2))
+
+
+def load(tmp_path: Path, table: str, more: str = "") -> jobs.Job:
+    (tmp_path / "psd.csv").write_text(table)
+    (tmp_path / "job.yaml").write_text(JOB.format(more=more))
+    return jobs.load(tmp_path / "job.yaml")
+
+
+def table(head: str, q: Array, values: Array) -> str:
+    return (
+        "# made up\n"
+        + head
+        + "\n"
+        + "\n".join(f"{a!r},{b!r}" for a, b in zip(q.tolist(), values.tolist(), strict=True))
+    )
+
+
+def heights_of(job: jobs.Job, comm: MPI.Intracomm = MPI.COMM_SELF) -> tuple[Array, Slab, list[str]]:
+    slab = Slab(comm, *job.grid.points)
+    made, told = rigid_surface.make_surface(job, FFT(slab))
+    return made.heights((0.0, 0.0), slab.empty()), slab, told
+
+
+def waves(heights: Array) -> tuple[Array, Array]:
+    """Wavenumbers, and what each wave says of C2."""
+    q = 2 * np.pi * np.fft.fftfreq(N, L / N)
+    return np.hypot(q, q[:, None]), np.abs(np.fft.fft2(heights) / N**2) ** 2 * L**2 / (4 * np.pi**2)
+
+
+Q = np.geomspace(1.2e4, 3e5, 40)
+
+
+def test_each_wave_has_the_asked_density(tmp_path: Path) -> None:
+    """C2D in a table: exact at each wave with fixed amplitudes, as a power law between points, nothing elsewhere."""
+    heights, _, _ = heights_of(load(tmp_path, table("q[1/m],C2D[m^4]", Q, c2(Q))))
+    q, found = waves(heights)
+    inside = (q >= Q[0]) & (q <= Q[-1])
+    expected = np.exp(np.interp(np.log(q[inside]), np.log(Q), np.log(c2(Q))))
+    assert found[inside] == pytest.approx(expected, rel=1e-9)
+    assert found[~inside].max() < 1e-20 * expected.max()
+    own = statistics.describe(heights, (L, L))
+    assert own.rms_height**2 == pytest.approx(found.sum() * (2 * np.pi / L) ** 2, rel=1e-12)
+
+
+def test_profiles_become_directions(tmp_path: Path) -> None:
+    """Abel's integral of 60 points of C1D gives the C2D that they are the profiles of, to 1 %."""
+    q = np.geomspace(2e3, 1e6, 60)
+    part = load(tmp_path, table("q[1/m],C1D[m^3]", q, c1(q))).surface[0]
+    assert isinstance(part, jobs.RoughSpectrum)
+    found, ends = spectrum.of(part)
+    assert found(q) / (4 * np.pi**2) == pytest.approx(c2(q), rel=0.01)
+    assert ends == pytest.approx((2 * np.pi / 2e3, 2 * np.pi / 1e6))
+
+
+def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
+    """Along x, with the same convention as the statistics of a road; the grid ends far above the fall of the spectrum.
+
+    The sum over discrete waves stands for the integral over the other direction, to 5 % where q is a few waves of it.
+    """
+    q = np.geomspace(5e3, 4.0e5, 80)
+    heights, _, _ = heights_of(load(tmp_path, table("q[1/m] C1D[m^3]", q, c1(q))))
+    own = statistics.describe(heights, (L, L))
+    chosen = (own.qx > 1.5e4) & (own.qx < 1.0e5)
+    assert chosen.sum() > 8
+    assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05)
+
+
+def test_units_are_those_of_the_columns(tmp_path: Path) -> None:
+    plain = load(tmp_path, table("q[1/m] C2D[m^4]", Q, c2(Q))).surface[0]
+    (tmp_path / "other").mkdir()
+    other = load(tmp_path / "other", table("q[1/um];C2D[nm^4]", 1e-6 * Q, 1e36 * c2(Q))).surface[0]
+    assert isinstance(plain, jobs.RoughSpectrum)
+    assert isinstance(other, jobs.RoughSpectrum)
+    assert spectrum.of(other)[0](Q) == pytest.approx(spectrum.of(plain)[0](Q), rel=1e-12)
+
+
+def test_continued_by_a_power_law(tmp_path: Path) -> None:
+    """Beyond the data as q^(-2 (1 + hurst)), down to the wavelength that is asked for."""
+    short = Q <= 1e5
+    job = load(tmp_path, table("q[1/m],C2D[m^4]", Q[short], c2(Q[short])), ", hurst: 0.7, short_wavelength: 2.5e-5")
+    q, found = waves(heights_of(job)[0])
+    last = Q[short][-1]
+    beyond = (q > last) & (q < 2 * np.pi / 2.5e-5)
+    assert found[beyond] == pytest.approx(c2(last) * (q[beyond] / last) ** -3.4, rel=1e-9)
+    assert found[q > 2 * np.pi / 2.5e-5 * (1 + 1e-6)].max() < 1e-20 * A
+
+
+@pytest.mark.mpi
+def test_any_number_of_ranks(shared_path: Path, comm: MPI.Intracomm) -> None:
+    text = table("q[1/m],C2D[m^4]", Q, c2(Q))
+    job = load(shared_path, text) if comm.rank == 0 else None
+    comm.barrier()
+    job = job or jobs.load(shared_path / "job.yaml")
+    rows, slab, told = heights_of(job, comm)
+    whole, _, _ = heights_of(job)
+    assert rows == pytest.approx(whole[slab.rows], abs=1e-14 * np.abs(whole).max())
+    assert bool(told) == (comm.rank == 0)
+
+
+def test_theory_of_a_measured_spectrum(tmp_path: Path) -> None:
+    """Persson's sums have the rms height and slope of the spectrum between the box and its shortest wave, to 1e-3."""
+    job = load(tmp_path, table("q[1/m],C2D[m^4]", Q, c2(Q)))
+    part = job.surface[0]
+    assert isinstance(part, jobs.RoughSpectrum)
+    assert prediction.has_spectrum(job)
+    rings = prediction.rings_of_measured(job, part, 0.0)
+    amplitude, kx, ky = rings.waves
+    power = np.abs(amplitude) ** 2 / 2
+    q = np.geomspace(Q[0], Q[-1], 20001)
+    density = spectrum.of(part)[0](q) / (4 * np.pi**2)
+    for weight, own in ((1.0, power), (q**2, power * (kx**2 + ky**2))):
+        assert own.sum() == pytest.approx(np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3)
+    assert isinstance(rings, persson_rings.Rings)
+
+
+MISTAKES = [
+    ("", "", "is empty"),
+    ("q,C2D\n1,2\n", "", r"line 1: the columns q\[1/m\] C1D"),
+    ("q[1/m] C2D[m^3]\n1 2\n", "", "line 1: units of"),
+    ("q[m] C2D[m^4]\n1 2\n", "", "line 1: units of"),
+    ("q[1/m] C2D[m^4]\n1 2\n2 1\n", "", "2 rows of numbers"),
+    ("q[1/m] C2D[m^4]\n1 2\n3 1\n2 1\n", "", "line 4: q must rise"),
+    ("q[1/m] C2D[m^4]\n1 2\n3 -1\n4 1\n", "", "line 3: positive numbers"),
+    ("q[1/m] C2D[m^4]\n1 2\n3 x\n4 1\n", "", "line 3: two numbers"),
+    ("q[1/m] C1D[m^3]\n1 1\n2 2\n4 4\n", "", "C1D rises"),
+    (table("q[1/m],C2D[m^4]", Q, c2(Q)), ", short_wavelength: 1.0e-6", "give hurst"),
+    (table("q[1/m],C2D[m^4]", Q, c2(Q)), ", long_wavelength: 1.0e-3", "the data end at"),
+]
+
+
+@pytest.mark.parametrize(("text", "more", "told"), MISTAKES)
+def test_mistakes_of_a_table(tmp_path: Path, text: str, more: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        heights_of(load(tmp_path, text, more))
+
+
+def test_a_table_that_is_not_there(tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text(JOB.format(more=""))
+    with pytest.raises(InputError, match="must be an existing file"):
+        jobs.load(tmp_path / "job.yaml")
