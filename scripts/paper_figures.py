@@ -138,7 +138,7 @@ def fig05(out: Path) -> Figure:
     bottom.loglog(k[inside], asked, "--", color=style.RED, label=f"asked, C = {constant:.3g} m⁴")
     bottom.set(xlabel="wave number k [rad/m]", ylabel="Φ [m⁴]")
     bottom.xaxis.set_minor_formatter(NullFormatter())
-    bottom.legend()
+    bottom.legend(loc="lower left")
     return figure
 
 
