@@ -25,6 +25,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"steady_sliding"},
     {"run", "plan", "prediction"},
     {"doctor", "study", "report"},
+    {"manual"},
     {"python"},
     {"__init__"},  # the front door, which names what the room python has
     {"command"},

@@ -11,9 +11,12 @@ from typing import Any, NoReturn
 
 from .. import __version__
 from ..errors import InputError
-from . import ranks, verbs
+from . import guides, ranks, verbs
 
-VERBS = ("run", "steady", "check", "plan", "theory", "fit", "surface", "study", "info", "plot", "report", "doctor")
+VERBS = (
+    *("run", "steady", "check", "plan", "theory", "fit", "surface", "study", "info", "plot", "report", "doctor"),
+    *("manual", "schema", "cite", "completion"),
+)
 FIRST = """\
 a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
 
@@ -22,7 +25,7 @@ a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml 
   parcontact job.yaml                   run it, or go on with it (on two cores: mpirun -n 2 parcontact job.yaml)
   parcontact plot out/job               draw what came out
 
-parcontact --help lists all verbs, parcontact VERB --help the options of one"""
+parcontact --help lists all verbs, parcontact VERB --help the options of one, parcontact manual the manual"""
 CODES = """\
 exit codes: 0 as asked; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
 checkpoint, run again"""
@@ -164,6 +167,8 @@ def _parser() -> argparse.ArgumentParser:
     doctor = found.add_parser("doctor", help="run small hard cases on this machine, and say what came out of each")
     doctor.add_argument("--precision", choices=("double", "single", "mixed"), default="double")
     doctor.set_defaults(act=verbs.doctor)
+
+    guides.add_verbs(found, parser)
     return parser
 
 

@@ -161,7 +161,7 @@ class Initial(Part):
     rules = (Rule(("state", "velocity", "pressure"), _steady_start),)
 
 
-def _numbers(value: Any) -> Any:
+def numbers(value: Any) -> Any:
     if not isinstance(value, str):
         return listed(value)
     try:
@@ -186,10 +186,10 @@ def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
 class Steady(Part):
     """Steady sliding solved directly, for each speed under each pressure, at each temperature."""
 
-    velocities: Annotated[tuple[Positive, ...], BeforeValidator(_numbers)] = Field(
+    velocities: Annotated[tuple[Positive, ...], BeforeValidator(numbers)] = Field(
         description="positive speeds [m/s]: a list, or first:last:count"
     )
-    pressures: Annotated[tuple[Positive, ...] | None, BeforeValidator(_numbers)] = Field(
+    pressures: Annotated[tuple[Positive, ...] | None, BeforeValidator(numbers)] = Field(
         default=None, description="positive pressures [Pa]: a list, or first:last:count"
     )
     temperatures: Annotated[tuple[Celsius, ...] | None, BeforeValidator(listed)] = Field(

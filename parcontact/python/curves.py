@@ -66,9 +66,11 @@ def steady(
     spaced in the logarithm (default: those of the job's `steady` section, and the pressure of its first loaded stage).
     Raises JobError, and InputError where velocities or pressures lack. Nothing is written.
     """
-    found = read(job, set, comm)
+    asked = {"velocities": _numbers(velocities), "pressures": _numbers(pressures)}
+    keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # a job needs no history then
+    found = read(job, {**(set or {}), **keys}, comm)
     slab = Slab(comm or MPI.COMM_WORLD, *found.grid.points)
-    wanted = curve.request(found, _numbers(velocities), _numbers(pressures))
+    wanted = curve.request(found, *asked.values())
     sliding = SteadySliding(frame(found, slab))
     points: list[tuple[float, float, Point | None]] = []
     failures: list[str] = []

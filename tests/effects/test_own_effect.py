@@ -1,4 +1,4 @@
-"""An effect of a user's own, with a section of the job, a map, memory and a column: the one that the README shows.
+"""An effect of a user's own, with a section of the job, a map, memory and a column: the one that the manual shows.
 
 It is installed as a package would install it: a module on the path and an entry point, nothing of ours being touched.
 """
@@ -14,13 +14,14 @@ from typing import Any
 import h5py
 import pytest
 import yaml
-from marching import ROOT, begun, marched
+from marching import begun, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact import __main__, job, scene
 from parcontact.effects.effect import effects_that_follow
 from parcontact.job import Job, JobError, extension, model
+from parcontact.manual import texts
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import runner
@@ -49,11 +50,11 @@ def forget() -> None:
 
 @pytest.fixture
 def installed(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The directory in which the README's effect is installed."""
+    """The directory in which the manual's effect is installed."""
     if comm.rank == 0:
-        readme = (ROOT / "README.md").read_text()
-        (shared_path / "tread_wear.py").write_text(re.findall(r"```python\n(# tread_wear.py\n.*?)```", readme, re.S)[0])
-        entry = re.findall(r'```toml\n\[project.entry-points."parcontact.effects"\]\n(.*?)\n```', readme, re.S)[0]
+        shown = texts.page("effects")
+        (shared_path / "tread_wear.py").write_text(re.findall(r"```python\n(# tread_wear.py\n.*?)```", shown, re.S)[0])
+        entry = re.findall(r'```toml\n\[project.entry-points."parcontact.effects"\]\n(.*?)\n```', shown, re.S)[0]
         package = shared_path / "tread_wear-1.0.dist-info"
         package.mkdir()
         (package / "METADATA").write_text("Metadata-Version: 2.1\nName: tread-wear\nVersion: 1.0\n")

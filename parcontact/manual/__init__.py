@@ -1,0 +1,1 @@
+"""The manual: pages as text in pages/, which `parcontact manual` prints and scripts/manual makes into a web site."""

@@ -1,0 +1,75 @@
+"""The pages of the manual as text: which there are, and what is written into them of the program itself.
+
+A line `% written here: NAME` in a page is replaced by what the program says of NAME, so that it cannot grow old: the
+keys of a job (`reference.keys`), and what the caller adds, such as the options of the verbs.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from ..errors import InputError
+from . import reference
+
+PAGES = Path(__file__).parent / "pages"
+SITE = Path(__file__).parents[2] / "out" / "manual" / "html"  # of a clone, by scripts/manual
+MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
+FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
+Writers = Mapping[str, Callable[[], str]]
+OURS: Writers = {"keys": reference.keys}
+
+
+def names() -> list[str]:
+    """The names of the pages, in the order of the table of contents."""
+    listed = re.findall(r"^([a-z_]+)$", (PAGES / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
+    return ["index", *listed]
+
+
+def title(name: str) -> str:
+    """The heading of a page."""
+    found = re.search(r"^# (.+)$", (PAGES / f"{name}.md").read_text(encoding="utf-8"), re.MULTILINE)
+    return found.group(1) if found else name
+
+
+def page(name: str, writers: Writers | None = None) -> str:
+    """A page in full, as MyST Markdown. Raises InputError for a name that no page has."""
+    if name not in names():
+        close = difflib.get_close_matches(name, names(), n=1)
+        hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(names())}"
+        raise InputError(f"the manual has no page {name!r}{hint}")
+    known = {**OURS, **(writers or {})}
+    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    return MARK.sub(lambda found: known[found.group(1)](), text)
+
+
+def plain(name: str, writers: Writers | None = None) -> str:
+    """A page to be read in a terminal: without the marks of the web site."""
+    text = FENCE.sub("", page(name, writers))
+    text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
+    text = re.sub(r"^\(.+\)=\n", "", text, flags=re.MULTILINE)
+    return re.sub(r"\n{3,}", "\n\n", re.sub(r"^```\{(\w+)\}", r"```\1", text, flags=re.MULTILINE))
+
+
+def _reference(found: re.Match[str]) -> str:
+    words, target, alone = found.groups()
+    return f"{words} (parcontact manual {target})" if target else f"`parcontact manual {alone}`"
+
+
+def built(name: str) -> Path:
+    """Where the page of the web site is. Raises InputError where scripts/manual has not made it."""
+    page = SITE / f"{name}.html"
+    if not page.is_file():
+        raise InputError(
+            f"there is no {page}: scripts/manual of a clone makes it; parcontact manual {name} prints the page"
+        )
+    return page
+
+
+def contents() -> str:
+    """The list of pages."""
+    width = max(map(len, names()))
+    lines = [f"  {name:<{width}}  {title(name)}" for name in names()]
+    return "\n".join(["parcontact manual PAGE prints a page:", "", *lines])

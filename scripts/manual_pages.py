@@ -1,0 +1,92 @@
+"""Writes the pages of the manual, as Sphinx reads them, into a directory: with what the program says of itself,
+notebooks run, and pictures.
+
+    .venv/bin/python scripts/manual_pages.py --to out/manual/source [--no-notebooks]
+"""
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+from parcontact.command import words
+from parcontact.command.completion import reference
+from parcontact.manual import texts
+
+ROOT = Path(__file__).resolve().parents[1]
+NOTEBOOKS = texts.PAGES.parent / "notebooks"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--to", type=Path, required=True, help="the directory to write")
+    parser.add_argument("--no-notebooks", action="store_true", help="write the notebooks without running them")
+    options = parser.parse_args()
+    target: Path = options.to
+    target.mkdir(parents=True, exist_ok=True)
+    for name in texts.names():
+        (target / f"{name}.md").write_text(texts.page(name, {"verbs": lambda: reference(words._parser())}))
+    shutil.copy(texts.PAGES.parent / "conf.py", target)
+    shutil.copytree(ROOT / "jobs" / "pictures", target / "pictures", dirs_exist_ok=True)
+    for notebook in sorted(NOTEBOOKS.glob("*.ipynb")):
+        text = "\n\n".join(pieces(notebook, target, not options.no_notebooks))
+        (target / f"notebook_{notebook.stem}.md").write_text(text + "\n")
+        shutil.copy(notebook, target)
+    print(f"{len(list(target.glob('*.md')))} pages in {target}")
+    return 0
+
+
+def pieces(notebook: Path, target: Path, run: bool) -> Iterator[str]:
+    """A notebook as Markdown: its texts, its cells, and what each prints and draws."""
+    space: dict[str, Any] = {"__name__": "__main__"}
+    for number, cell in enumerate(json.loads(notebook.read_text())["cells"]):
+        source = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            yield source
+            continue
+        yield f"```python\n{source}\n```"
+        if run:
+            yield from outcome(source, space, target, f"{notebook.stem}_{number}")
+    yield f"This page is a notebook: {{download}}`{notebook.name}`."
+
+
+def outcome(source: str, space: dict[str, Any], target: Path, name: str) -> Iterator[str]:
+    """Run a cell where it can leave files; what it has printed, and its figures."""
+    from matplotlib import pyplot
+
+    printed = io.StringIO()
+    with tempfile.TemporaryDirectory() as directory, working_in(directory), contextlib.redirect_stdout(printed):
+        exec(compile(source, name, "exec"), space)
+    if printed.getvalue().strip():
+        yield f"```text\n{re.sub(r' +$', '', printed.getvalue().rstrip(), flags=re.MULTILINE)}\n```"
+    for figure in map(pyplot.figure, pyplot.get_fignums()):
+        (target / "pictures").mkdir(exist_ok=True)
+        figure.savefig(target / "pictures" / f"{name}.png", dpi=200, bbox_inches="tight")
+        yield f"![What the cell above draws](pictures/{name}.png)"
+    pyplot.close("all")
+
+
+@contextlib.contextmanager
+def working_in(directory: str) -> Iterator[None]:
+    before = Path.cwd()
+    os.chdir(directory)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,252 @@
+"""The manual says what the program does: keys and columns are those of the code, and every block of code in it runs."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import matplotlib
+import numpy as np
+import pytest
+import yaml
+from marching import ROOT
+from pydantic import TypeAdapter
+
+from parcontact import __main__, job, prediction
+from parcontact.command import words
+from parcontact.command.completion import bash, verbs_of
+from parcontact.effects.interface import InterfaceColumns
+from parcontact.errors import InputError
+from parcontact.job import keys, yamltext
+from parcontact.manual import reference, texts
+from parcontact.record import citations, fields, measures, sweep_table
+from parcontact.steady_sliding import table as steady_table
+from parcontact.study import table as study_table
+
+PAGES = texts.names()
+NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
+WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put into
+    "grid": {"points": 64, "size": 1.0e-3},
+    "surface": {"shape": "flat"},
+    "material": {"include": "synthetic_tyre"},
+    "history": [{"pressure": 1.0e5, "velocity": 1.0, "distance": 1.0e-4, "cells_per_step": 1}],
+}
+OTHER_PROGRAMS = {  # in shell blocks; what is parcontact's is parsed
+    *("apptainer", "cp", "docker", "env", "env/bin/pip", "eval", "module", "python3", "sbatch"),
+    *("scripts/manual", "scripts/setup", "scripts/test", "."),
+}
+
+
+def blocks(language: str, name: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", texts.page(name, WRITERS), re.MULTILINE | re.DOTALL)
+
+
+WRITERS = {"verbs": lambda: ""}
+BLOCKS = [
+    (language, name, index)
+    for language in ("yaml", "sh", "toml")
+    for name in PAGES
+    for index in range(len(blocks(language, name)))
+]
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory with the files that examples name."""
+    np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(64, 64)))
+    (tmp_path / "materials").mkdir()
+    shift = {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}
+    compound = {"model": "zener", "modulus_inf": 1e6, "shift": shift}
+    (tmp_path / "materials" / "compound.yaml").write_text(yaml.safe_dump(compound))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_table_of_contents_has_every_page() -> None:
+    assert sorted(PAGES) == sorted({path.stem for path in texts.PAGES.glob("*.md")})
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_refer_to_pages(name: str) -> None:
+    assert set(re.findall(r"\{doc\}`(\w+)`", texts.page(name, WRITERS))) <= set(PAGES)
+    assert "{doc}" not in texts.plain(name, WRITERS)
+
+
+def test_only_languages_that_are_run_or_output() -> None:
+    known = {"python", "yaml", "sh", "toml", "text", "{eval-rst}"}
+    assert {word for name in PAGES for word in re.findall(r"^```(\S+)$", texts.page(name, WRITERS), re.M)} <= known
+
+
+# -- keys ------------------------------------------------------------------------------------------------------------
+
+
+def test_every_key_has_its_meaning() -> None:
+    """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
+    written = {part: set(known) for part, known in reference.meanings().items()}
+    assert written == {section.part.__name__: {key.word for key in section.keys} for section in keys.sections()}
+
+
+def examples() -> Iterator[Any]:
+    for section in keys.sections():
+        for key in section.keys:
+            yield pytest.param(section.part, key.word, id=f"{section.part.__name__}.{key.word}")
+
+
+@pytest.mark.parametrize(("part", "word"), list(examples()))
+def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) -> None:
+    """As the manual prints it, for the type of the key; a section as a whole is read by the tests of blocks."""
+    if word in ("path", "material") or (part.__name__, word) == ("Job", "surface"):
+        return  # files, and sections that tests of whole jobs read
+    meaning, example = reference.meanings()[part.__name__][word]
+    assert meaning.endswith(".")
+    value = yamltext.parse(f"{word}: {example}", "example").data[word]
+    field = part.field(word)
+    annotation: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+    TypeAdapter(annotation).validate_python(value)
+
+
+def test_the_page_has_range_unit_and_default() -> None:
+    text = texts.page("job")
+    (hurst,) = re.findall(r"`hurst`\n: .*", text)
+    assert "range: above 0 and at most 1; required" in hurst
+    (tolerance,) = re.findall(r"`tolerance`\n: Of the cert.*", text)
+    assert "default: `0.0001`" in tolerance
+    assert re.search(r"`duration`\n: .*unit: s; optional", text)
+
+
+# -- columns ---------------------------------------------------------------------------------------------------------
+
+COLUMNS = {
+    "measures.csv": [*measures.columns(0, InterfaceColumns.columns), "dissipated_K"],
+    "steady.csv": [*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST],
+    "steady_waves.csv": steady_table.WAVES,
+    "theory.csv": prediction.COLUMNS,
+    "sweep.csv": ["case", *sweep_table.COLUMNS],
+    "study.csv": study_table.COLUMNS,
+    "fields.h5": [*fields.UNITS, "t", "y", "x", "step"],
+}
+
+
+@pytest.mark.parametrize("file", COLUMNS)
+def test_every_column_is_documented(file: str) -> None:
+    """A column that was added needs a line in parcontact/manual/pages/outputs.md."""
+    (section,) = re.findall(rf"^## {re.escape(file)}\n(.*?)(?=^## |\Z)", texts.page("outputs"), re.M | re.S)
+    rows = re.findall(r"^\| `(\w+)` \| *([^|]*?) *\| ", section, re.M)
+    assert sorted(name for name, _ in rows) == sorted(COLUMNS[file])
+    known = {"measures.csv": measures.UNITS, "fields.h5": fields.UNITS}.get(file, {})
+    assert {name: unit for name, unit in rows if name in known} == known
+
+
+# -- blocks ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("language", "name", "index"), BLOCKS)
+def test_a_block(language: str, name: str, index: int, elsewhere: Path) -> None:
+    text = blocks(language, name)[index]
+    if language == "yaml":
+        load_job(text, elsewhere)
+    elif language == "toml":
+        tomllib.loads(text)
+    else:
+        for line in text.replace("\\\n", " ").splitlines():
+            parse_command(line)
+
+
+def load_job(text: str, where: Path) -> None:
+    """A whole job, or sections of one."""
+    data = yamltext.parse(text, "block").data
+    needed = {key: value for key, value in WHOLE.items() if key != "history" or "steady" not in data}
+    (where / "job.yaml").write_text(yaml.safe_dump({**needed, **data}))
+    assert job.load_cases(where / "job.yaml")
+
+
+def parse_command(line: str) -> None:
+    """A command of this program is one that its parser takes."""
+    asked = shlex.split(line)
+    if asked[0] in ("mpirun", "srun"):
+        asked = asked[3:]
+    if asked[0] == "apptainer" or asked[0] in OTHER_PROGRAMS:
+        return
+    assert asked[0] in ("parcontact", "env/bin/parcontact"), line
+    if asked[1] != "--version":
+        words.understand(asked[1:])
+
+
+@pytest.mark.parametrize("name", [name for name in PAGES if blocks("python", name) and name != "effects"])
+def test_the_python_of_a_page(name: str, elsewhere: Path) -> None:
+    """All blocks of a page, one after the other."""
+    run_code(blocks("python", name))
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook(notebook: Path, elsewhere: Path) -> None:
+    """Coarser than it stands."""
+    cells = json.loads(notebook.read_text())["cells"]
+    assert not any(cell.get("outputs") for cell in cells)
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    run_code([re.sub(r"POINTS = 128", "POINTS = 64", cell) for cell in code])
+
+
+def run_code(pieces: list[str]) -> None:
+    matplotlib.use("Agg")
+    space: dict[str, Any] = {"__name__": "__main__"}
+    for piece in pieces:
+        exec(compile(piece, "block", "exec"), space)
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+
+
+# -- verbs -----------------------------------------------------------------------------------------------------------
+
+
+def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
+    assert __main__.main(["manual"]) == 0
+    assert "outputs" in capsys.readouterr().out
+    assert __main__.main(["manual", "command"]) == 0
+    assert "--velocities" in capsys.readouterr().out
+    assert __main__.main(["manual", "output"]) == 2
+    assert "did you mean outputs?" in capsys.readouterr().err
+
+
+def test_what_to_cite(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no run"):
+        citations.describe(tmp_path)
+    data = {**WHOLE, "grid": {**WHOLE["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
+    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    elastic = citations.describe(tmp_path)
+    assert "Love" in elastic
+    assert "Bugnicourt" not in elastic
+    assert "Persson" not in elastic
+    (tmp_path / "theory.csv").touch()
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(WHOLE))
+    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    rubber = citations.describe(tmp_path)
+    assert "Love" not in rubber
+    assert "Bugnicourt" in rubber
+    assert "Persson" in rubber
+    assert "Taylor" in rubber
+
+
+def test_completion(tmp_path: Path) -> None:
+    script = bash(words._parser())
+    assert set(verbs_of(words._parser())) == set(words.VERBS)
+    ask = 'COMP_WORDS=(parcontact {}); COMP_CWORD=$((${{#COMP_WORDS[@]}}-1)); _parcontact; echo "${{COMPREPLY[@]}}"\n'
+    lines = "".join(map(ask.format, ("st", "plan job.yaml --ra", 'doctor --precision ""', "job.yaml --un")))
+    done = subprocess.run(
+        ["bash", "-c", script + "\n" + lines], capture_output=True, text=True, cwd=tmp_path, timeout=20
+    )
+    assert done.stdout.splitlines() == ["steady study", "--ranks", "double single mixed", "--until"]
+
+
+def test_the_version_of_the_citation() -> None:
+    from parcontact import __version__
+
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == __version__
+    assert sys.version_info >= (3, 11)
