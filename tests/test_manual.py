@@ -114,8 +114,8 @@ def test_the_page_has_range_unit_and_default() -> None:
     text = texts.page("job")
     (hurst,) = re.findall(r"`hurst`\n: .*", text)
     assert "range: above 0 and at most 1; required" in hurst
-    (tolerance,) = re.findall(r"`tolerance`\n: Of the cert.*", text)
-    assert "default: `0.0001`" in tolerance
+    (keep,) = re.findall(r"`keep`\n: .*", text)
+    assert "range: 0 or more; default: `2`" in keep
     assert re.search(r"`duration`\n: .*unit: s; optional", text)
 
 
@@ -123,7 +123,10 @@ def test_the_page_has_range_unit_and_default() -> None:
 
 COLUMNS = {
     "measures.csv": [*measures.columns(0, InterfaceColumns.columns), "dissipated_K"],
-    "steady.csv": [*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST],
+    "steady.csv": [
+        *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
+        *(*steady_table.HEATED, *InterfaceColumns.columns),
+    ],
     "steady_waves.csv": steady_table.WAVES,
     "theory.csv": prediction.COLUMNS,
     "sweep.csv": ["case", *sweep_table.COLUMNS],
