@@ -18,6 +18,7 @@ from parcontact.job import (
     load,
     log_range,
 )
+from parcontact.job.advice import cells_per_wave
 
 CONTRACT = """
 title: Rubber pressed on a road, then sliding      # free text
@@ -144,6 +145,17 @@ def test_whole_numbers_may_have_an_exponent(tmp_path: Path) -> None:
     points = job_of(tmp_path, SMALL, "grid.points=[1e2, 1.0]").grid.points
     assert points == (100, 1)
     assert all(type(n) is int for n in points)
+
+
+def test_accuracy_chooses_what_is_not_given(tmp_path: Path) -> None:
+    """Half of it for the solver, a tenth for folded branches, a mesh of the order 2.5; a key that is given wins."""
+    job = job_of(tmp_path, replaced(SMALL, numerics="{accuracy: 1.0e-3}"))
+    assert (job.numerics.tolerance, job.numerics.branch_error) == (5e-4, 1e-4)
+    job = job_of(tmp_path, replaced(SMALL, numerics="{accuracy: 0.1, tolerance: 1.0e-6, branch_error: 0.0}"))
+    assert (job.numerics.tolerance, job.numerics.branch_error) == (1e-6, 0.0)
+    default = job_of(tmp_path, SMALL).numerics
+    assert default == job_of(tmp_path, replaced(SMALL, numerics="{accuracy: 1.0e-2}")).numerics
+    assert [cells_per_wave(accuracy) for accuracy in (0.05, 1e-2, 3e-3)] == [5, 8, 13]
 
 
 def test_an_empty_value_is_an_absent_key(tmp_path: Path) -> None:

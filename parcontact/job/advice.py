@@ -15,7 +15,8 @@ from .sections import Grid, Numerics
 from .surface import Rough
 
 LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter of luck (paper, end of section 3)
-CELLS_PER_WAVE = 8  # fewer under-resolve the contact of the shortest waves (paper, end of section 3)
+CELLS_PER_WAVE = 8  # for an error of 1 %: fewer under-resolve the contact of the shortest waves
+MESH_ORDER = 2.5  # in which the error of friction falls with them
 STEPS_PER_WAVE = 4  # fewer skip over the shortest waves while sliding
 ROUNDINGS = 4.0  # of a number in a certificate
 SAME_LENGTH = 1e-9  # relative: lengths this close are the same
@@ -25,7 +26,7 @@ def resolution(
     grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...], numerics: Numerics
 ) -> Iterator[str]:
     """Sentences, in the order of the sections."""
-    yield from _surface(grid, surface)
+    yield from _surface(grid, surface, numerics.accuracy)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
     for index, stage in enumerate(history):
         yield from _stage(index, stage, grid, material, numerics, short)
@@ -40,8 +41,13 @@ def _directions(grid: Grid) -> Iterator[tuple[str, float, float]]:
         yield "y", grid.ly, grid.dy
 
 
-def _surface(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
-    directions = list(_directions(grid))
+def cells_per_wave(accuracy: float) -> int:
+    """How many cells the shortest wave of a rough surface needs."""
+    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / MESH_ORDER) * (1 - SAME_LENGTH)))
+
+
+def _surface(grid: Grid, surface: tuple[Any, ...], accuracy: float) -> Iterator[str]:
+    directions, needed = list(_directions(grid)), cells_per_wave(accuracy)
     for index, shape in enumerate(surface):
         if not isinstance(shape, Rough) or not directions:
             continue
@@ -53,12 +59,12 @@ def _surface(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
                 f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
             )
         name, length, cell = max(directions, key=lambda direction: direction[2])
-        if shape.short_wavelength < CELLS_PER_WAVE * cell * (1 - SAME_LENGTH):
+        if shape.short_wavelength < needed * cell * (1 - SAME_LENGTH):
             yield (
                 f"surface.{index}: only {shape.short_wavelength / cell:.3g} cells per shortest wave along {name}; "
-                f"for a resolved contact use at least {CELLS_PER_WAVE}: "
-                f"{math.ceil((1 - SAME_LENGTH) * CELLS_PER_WAVE * length / shape.short_wavelength)} points or a "
-                f"short_wavelength of {CELLS_PER_WAVE * cell:.4g} m"
+                f"for a resolved contact use at least {needed}: "
+                f"{math.ceil((1 - SAME_LENGTH) * needed * length / shape.short_wavelength)} points or a "
+                f"short_wavelength of {needed * cell:.4g} m"
             )
 
 

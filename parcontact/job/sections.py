@@ -53,9 +53,16 @@ class Grid(Part):
         return self.ly / self.ny
 
 
-class Numerics(Part):
-    """How the equations are solved."""
+TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # of numerics.accuracy
 
+
+class Numerics(Part):
+    """How the equations are solved; `accuracy` chooses the tolerance and what branches may be folded, where these are
+    not given, and says how fine the mesh should be."""
+
+    accuracy: float = Field(
+        default=1e-2, gt=0, lt=1, strict=True, description="an error of friction and area [-] above 0 and below 1"
+    )
     integrator: Literal["exponential", "backward-euler"] = "exponential"
     tolerance: float = Field(default=5e-3, gt=0, lt=1, strict=True, description="a tolerance [-] above 0 and below 1")
     max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
@@ -67,6 +74,14 @@ class Numerics(Part):
     slope: Literal["spectral", "finite-difference"] = "spectral"
     accept_unconverged: Flag = Field(default=False, description="true or false")
     strict: Flag = Field(default=False, description="true or false")
+
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+        """The tolerance and the error of folded branches are shares of the accuracy."""
+        accuracy = data.get("accuracy")
+        if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
+            return data
+        return {"tolerance": TOLERANCE_SHARE * accuracy, "branch_error": BRANCH_SHARE * accuracy, **data}
 
     @property
     def map_type(self) -> str:

@@ -46,6 +46,12 @@ class Parts:
 
 
 NAMES = tuple(field.name for field in fields(Parts))
+REMEDIES = {
+    "solver": "a smaller numerics.tolerance",
+    "time": "shorter time steps",
+    "folded": "a smaller numerics.branch_error",
+    "mesh": "a finer grid",
+}
 
 
 @dataclass(frozen=True)
@@ -144,10 +150,21 @@ class Summary:
         """The mean over time, None where no step has lasted."""
         return Parts(*(value / self._weights[1] for value in self._area)) if self._weights[1] > 0.0 else None
 
-    def lines(self) -> list[str]:
-        """Sentences for run.log."""
+    def lines(self, accuracy: float) -> list[str]:
+        """Sentences for run.log, with what to change where more is wrong than `accuracy` allows."""
         found = (("friction", self.friction), ("contact area, corrected,", self.area))
-        return [f"{name} is wrong by about {describe(parts)}" for name, parts in found if parts is not None]
+        return [
+            f"{name} is wrong by about {describe(parts)}{_advice(parts, accuracy)}"
+            for name, parts in found
+            if parts is not None
+        ]
+
+
+def _advice(parts: Parts, accuracy: float) -> str:
+    if parts.total <= accuracy:
+        return ""
+    worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
+    return f", more than numerics.accuracy = {accuracy:g}: try {REMEDIES[worst]}"
 
 
 def describe(parts: Parts) -> str:

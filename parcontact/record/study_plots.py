@@ -16,6 +16,7 @@ TITLES = {
 }
 MARKS = {"mesh and time together": "o-", "mesh alone": "s--", "time alone": "^:"}
 COLOURS = {"exponential": "C0", "backward-euler": "C1"}
+BAND = 5.0  # times the upper edge of the grey band over its lower one
 LEAST = 1e-7  # smaller errors are drawn here
 FALL = 0.7  # of the error from one corner of the front to the next that is named
 
@@ -43,16 +44,21 @@ class Point:
     best: bool
 
 
-def plot(directory: Path, curves: Sequence[Curve], points: Mapping[str, Sequence[Point]]) -> list[Path]:
-    """Draw `convergence.png`, if anything is refined, and `work_precision.png`; returns their paths."""
+def plot(
+    directory: Path, curves: Sequence[Curve], points: Mapping[str, Sequence[Point]], doubts: Mapping[str, float]
+) -> list[Path]:
+    """Draw `convergence.png`, if anything is refined, and `work_precision.png`; returns their paths.
+
+    `doubts` are the relative uncertainties of the references, shown as grey bands: what lies in them is not known.
+    """
     pictures = []
     if drawn := [curve for curve in curves if any(error > 0.0 for error in curve.errors)]:
-        pictures.append(_convergence(directory / "convergence.png", drawn))
+        pictures.append(_convergence(directory / "convergence.png", drawn, doubts))
     pictures.append(_work_precision(directory / "work_precision.png", points))
     return pictures
 
 
-def _convergence(path: Path, curves: Sequence[Curve]) -> Path:
+def _convergence(path: Path, curves: Sequence[Curve], doubts: Mapping[str, float]) -> Path:
     from matplotlib.figure import Figure  # slow to import, and for pictures only
 
     quantities = list(dict.fromkeys(curve.quantity for curve in curves))
@@ -66,6 +72,7 @@ def _convergence(path: Path, curves: Sequence[Curve]) -> Path:
             axes.plot(x, y, style, color=colour, ms=4, label=f"{curve.ladder}, {curve.integrator}")
         axes.set(xscale="log", yscale="log", title=TITLES[quantity], xlabel="refinement, coarsest = 1")
         axes.grid(alpha=0.3)
+        _shade(axes, doubts[quantity])
         _plain_ticks(axes)
     first = figure.axes[0]
     first.set_ylabel("error [%]")
@@ -73,6 +80,15 @@ def _convergence(path: Path, curves: Sequence[Curve]) -> Path:
     with files.replaced(path) as file:
         figure.savefig(file, dpi=150, format="png")
     return path
+
+
+def _shade(axes: Any, doubt: float) -> None:
+    """Grey from below up to what is not known of the reference."""
+    if doubt > 0.0:
+        low, high = axes.get_ylim()
+        low = min(max(low, 100 * doubt / BAND), 100 * doubt)
+        axes.axhspan(low, 100 * doubt, color="0.92", zorder=0)
+        axes.set_ylim(low, max(high, 200 * doubt))
 
 
 def _plain_ticks(axes: Any) -> None:

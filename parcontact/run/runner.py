@@ -296,7 +296,7 @@ class _Journey:
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
-        for line in self.errors.lines():
+        for line in self.errors.lines(self.job.numerics.accuracy):
             console.say(line)
         if self.stop:
             console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")

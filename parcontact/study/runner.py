@@ -94,7 +94,10 @@ class _Study:
         lines = [str(found) for found in verdict.limits(self.refined, ordered)]
         lines += verdict.sentences(ordered, reference, self.slab.comm.size)
         files.write(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
-        pictures = study_plots.plot(self.path.parent, self._curves(ordered, errors), self._points(ordered, errors))
+        proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
+        doubts = {name: abs(one.uncertainty / one.value) if one.value else 0.0 for name, one in reference.items()}
+        curves, points = self._curves(ordered, errors), self._points(ordered, proven)
+        pictures = study_plots.plot(self.path.parent, curves, points, doubts)
         for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
             self.say(line)
 

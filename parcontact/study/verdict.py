@@ -94,6 +94,12 @@ def errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]
     }
 
 
+def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
+    """Errors, but none smaller than what is not known of its reference."""
+    doubt = {name: abs(one.uncertainty / one.value) if one.value else 0.0 for name, one in reference.items()}
+    return {name: doubt[name] if value < doubt[name] else value for name, value in error.items()}
+
+
 def worst(error: Mapping[str, float]) -> float:
     """The largest of the errors that settings are held to; NaN if there is none."""
     values = [error[name] for name in NEEDED if not math.isnan(error[name])]
@@ -112,7 +118,7 @@ def front(outcomes: Outcomes, error: Mapping[Case, float]) -> list[Case]:
 
 def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
     """For each target: the cheapest settings that reach it in all quantities, and how long they take."""
-    error = {case: worst(errors(outcome, reference)) for case, outcome in outcomes.items()}
+    error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
     doubt = max((abs(one.uncertainty / one.value) for name, one in reference.items() if name in NEEDED and one.value))
     lines = []

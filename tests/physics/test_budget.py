@@ -59,8 +59,10 @@ def test_summary() -> None:
     assert summary.area is not None
     assert summary.friction.solver == pytest.approx((0.06 * 0.5e-3 + 0.02 * 1.5e-3) / 0.08)
     assert summary.area.solver == pytest.approx((3 * 1e-3 + 2 * 3e-3 + 1 * 5e-3) / 6)
-    friction, area = summary.lines()
+    friction, area = summary.lines(0.012)
     assert friction.startswith("friction is wrong by about ")
     assert "solver 0.075 %" in friction
+    assert "try" not in friction
     assert area.startswith("contact area, corrected, is wrong by about ")
-    assert Summary().lines() == []
+    assert area.endswith(", more than numerics.accuracy = 0.012: try a finer grid")
+    assert Summary().lines(0.012) == []

@@ -87,6 +87,7 @@ def test_front_and_sentences() -> None:
     lines = verdict.sentences(cases, reference, 2)
     assert lines[0] == f"for 5 %: {second}; 0.2 s of CPU time on 2 ranks"
     assert lines[2] == f"for 1 %: {last}; 0.4 s of CPU time on 2 ranks"
+    assert lines[3].startswith(f"for 0.3 %: none of these settings; the best, {last}, are at 0.4 %")
     assert lines[3].endswith("(the reference itself is only known to 0.4 %)")
 
 
