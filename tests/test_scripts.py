@@ -28,8 +28,10 @@ TIMED = (0, 1)  # 1 where a limit was not kept, on time or one that is meant for
 SMALL = {
     "ablation": Small(["--points", "128", "--rounds", "1", "--picture", "PICTURE"], r"at equal iterations", TIMED),
     "bench_checkpoint": Small(["--points", "64", "--rounds", "1", "--branches", "2"], r"ratio \d", TIMED),
-    "bench_fft": Small(["--points", "64", "--rounds", "2"], r"2 ranks .* of the line above", TIMED),
-    "bench_steady": Small(["--points", "128"], r"(?s)cold: .*: yes.*curve: .*: yes"),
+    "bench": Small(
+        ["--points", "64", "--rounds", "2", "--json", "bench.json"],
+        r"(?s)double: operator calls +[34]\d .*curve: the most of them +[12]\d\d.*2 ranks over .*planned",
+    ),
     "check_plan": Small(
         ["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED
     ),
