@@ -240,6 +240,14 @@ def test_info_and_check(main: Main, tmp_path: Path) -> None:
     assert main("check", path)[0] == 0
 
 
+def test_check_reads_a_measured_road(main: Main, tmp_path: Path) -> None:
+    np.save(tmp_path / "road.npy", np.zeros((8, 8)))
+    path = job(tmp_path / "job.yaml", surface={"shape": "topography", "path": "road.npy", "size": [1e-3, 1e-3]})
+    code, _, said = main("check", path)
+    assert code == 2
+    assert said.endswith("says no unit of its heights: give unit: m | mm | um | nm\n")
+
+
 def test_help(main: Main) -> None:
     code, said, _ = main("--help")
     assert code == 0

@@ -152,7 +152,7 @@ def test_finished_run_without_its_checkpoints(main: Main, tmp_path: Path) -> Non
     code, said = main("job.yaml", "--out", "out")
     assert code == BAD_INPUT
     assert "out holds measures.csv, fields.h5 of a run that has finished at t = " in said
-    assert "but its checkpoints are missing; --restart never starts afresh" in said
+    assert "but its checkpoints are missing; give --restart never to start afresh" in said
     assert contents(out) == before
     assert main("job.yaml", "--out", "out", "--restart", "never")[0] == DONE
 

@@ -1,5 +1,6 @@
 """`parcontact plot`: a picture with the panels that a job has."""
 
+import csv
 from pathlib import Path
 
 import h5py
@@ -54,6 +55,18 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
         assert np.allclose(np.array(found["theory"].get_xdata())[0], 0.0)
         assert "simulation" in found
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
+
+
+def test_theory_beside_a_run_with_an_interface(tmp_path: Path, drawn: list[Figure]) -> None:
+    """The friction that the theory is of, without that of the interface, has a line of its own."""
+    out = ran(tmp_path, WAVE + ZENER + SLIDE + "interface: {shear_stress: 1.0e3}\n")
+    (out / "theory.csv").write_text("time,distance,pressure,friction,contact_area\n0.0,0.0,1e3,0.0,0.5\n")
+    plots.plot([out])
+    lines = {str(line.get_label()): np.array(line.get_ydata()) for line in drawn[0].axes[0].get_lines()}
+    assert np.all(lines["simulation"][1:] > lines["without interface"][1:])
+    with (out / "measures.csv").open(newline="") as file:
+        saved = [float(row["friction_viscous"]) for row in csv.DictReader(file)]
+    assert np.allclose(lines["without interface"], saved[-len(lines["without interface"]) :])
 
 
 def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:

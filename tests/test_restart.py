@@ -206,7 +206,7 @@ def test_refused(bench: Bench, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as raised:
         bench.run(bench.job("viscoelastic", **changes), out)
     assert message in str(raised.value)
-    assert "--restart never starts afresh" in str(raised.value)
+    assert "give --restart never to start afresh" in str(raised.value)
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from parcontact import sanity, scene
 from parcontact.errors import InputError, RunError
-from parcontact.job import Job, JobError, load
+from parcontact.job import Job, JobError, load, load_cases
 from parcontact.job import size as size_advice
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
@@ -124,6 +124,16 @@ def test_heights_in_micrometres(tmp_path: Path) -> None:
     assert "rms slope is 1" in text
     assert "e+05, and the theory is one of small slopes" in text
     assert "scale: 1.0e-6" in text
+
+
+def test_a_measured_road_is_looked_at_before_it_runs(tmp_path: Path) -> None:
+    """Of a topography the job alone does not tell slopes: its file is read by `check` and `plan`."""
+    np.save(tmp_path / "road.npy", 1e6 * rough_heights(64, 16.0))
+    road = {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "m", "size": [1e-3, 1e-3]}
+    job = job_of(road, [{"pressure": 1e4}], grid={"points": 64, "size": 1e-3})
+    assert sanity.is_quickly_made(job)
+    (text,) = sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, 64, 64)))
+    assert "unit: um in a topography" in text
 
 
 def test_a_seam_across_the_periodic_edge(tmp_path: Path) -> None:
@@ -248,7 +258,7 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("path", sorted(HERE.rglob("*.yaml")), ids=lambda path: path.stem)
 def test_no_job_of_ours_is_told(path: Path) -> None:
-    job = load(path)
+    job = load_cases(path)[0].job
     assert job.warnings == ()
     if sanity.is_quickly_made(job):
         assert sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []

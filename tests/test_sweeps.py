@@ -106,6 +106,9 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
     assert (done.returncode, done.stderr) == (0, "")
     assert "case 5: history.1.velocity = 0.1, surface.seed = 3 (of 6)" in done.stdout
     assert "out/job/cases/004: finished before" in done.stdout
+    assert done.stdout.splitlines()[-1] == "results of all cases: out/job/sweep.csv"
+    told = run_parcontact(["info", "out/job"], ranks=0)
+    assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "  sweep of 6 cases: 6 done")
     assert (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns == before
     rows, means = table(directory=here), table("sweep_mean.csv", here)
     assert [row["state"] for row in rows] == ["done"] * 6

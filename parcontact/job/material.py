@@ -131,7 +131,7 @@ class Zener(Part):
     modulus_inf: Modulus = 0.0
     branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
     shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
-    temperature: Celsius | None = None  # default: that of the reference
+    temperature: Celsius | None = Field(default=None, description="a temperature [deg C]")  # that of the reference
     band: Band = None
 
     rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
@@ -171,7 +171,7 @@ class Dma(Part):
     poisson: Poisson = 0.5
     reference: Celsius | None = None  # default: the middle one of the measured temperatures
     shift: Literal["wlf", "arrhenius", "free"] = "wlf"
-    temperature: Celsius | None = None  # default: that of the reference
+    temperature: Celsius | None = Field(default=None, description="a temperature [deg C]")  # that of the reference
     error: Positive = Field(default=0.02, description="a positive rms error of the logarithms of the moduli [-]")
 
     _fitted: Zener = PrivateAttr()

@@ -20,7 +20,7 @@ STEEPEST = 1.0  # rms slope, and radius of a contact over that of its sphere: be
 SOFTEST, HARDEST = 1e3, 1e12  # Pa; shear moduli go from 1e3 (gels) to 5e11 (diamond)
 STRAIN = 1.0  # mean pressure over 2 G/(1 - nu): beyond, strains are not small
 BEYOND = 100.0  # times slower or faster than all branches: nothing relaxes
-MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6"
+MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6, or unit: um in a topography"
 
 
 def warnings(

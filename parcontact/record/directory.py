@@ -36,7 +36,7 @@ LOCK, STOP = ".lock", "stop"
 BESIDE = (STOP, "theory.csv")  # may be there before the first run
 SHOWN = 4  # names of files that a message lists
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
-ADVICE = "--restart never starts afresh, --out chooses another directory"
+ADVICE = "give --restart never to start afresh, or --out for another directory"
 
 
 class Directory:
@@ -81,13 +81,13 @@ class Directory:
             if foreign and not self.claims and not afresh and not self._proven():
                 names = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
                 return (
-                    f"the output directory {self.path} is not empty and not of this program: it holds {names}; --out "
-                    "chooses another directory, --restart never writes here and puts files of the same names aside"
+                    f"the output directory {self.path} is not empty and not of this program: it holds {names}; give "
+                    "--out for another directory, or --restart never to write here and put files of these names aside"
                 )
             for verb, claim in self.claims.items():
                 if verb != self.verb and (found := "; ".join(marker.differences(claim.job, data, SCENE))):
                     return (
-                        f"the output directory {self.path} holds {VERBS[verb]} of another job: {found}; --out chooses "
+                        f"the output directory {self.path} holds {VERBS[verb]} of another job: {found}; give --out for "
                         "another directory"
                     )
             return ""

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from . import checkpoint, hdf5, marker, measures
+from . import checkpoint, hdf5, marker, measures, sweep_table
 from .marker import Claim
 
 MEAN_OF = ("friction", "contact_area")
@@ -21,10 +22,10 @@ def describe(directory: Path) -> tuple[str, bool]:
         claims = marker.read(directory)
     except (OSError, ValueError) as error:
         return f"{directory}: {hdf5.reason(error)}", False
-    if not claims and not (directory / "measures.csv").exists():
-        raise InputError(f"{directory} holds no run: it has neither a marker nor measures.csv")
+    if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
+        raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
     lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
-    for part in (_run, _curve, _checkpoints, _fields):
+    for part in (_run, _curve, _checkpoints, _fields, _sweep, _study):
         try:
             lines += part(directory, claims)
         except InputError as error:
@@ -36,7 +37,9 @@ def describe(directory: Path) -> tuple[str, bool]:
 
 def _title(directory: Path) -> str:
     """The title of the job, from the first of its copies that there is."""
-    for name in ("job.resolved.yaml", "steady.resolved.yaml"):
+    cases = sorted(path.name for path in directory.glob("cases/*"))
+    of_a_case = [f"cases/{name}/job.resolved.yaml" for name in cases[:1]]
+    for name in ("job.resolved.yaml", "steady.resolved.yaml", "study.resolved.yaml", *of_a_case):
         if (directory / name).is_file():
             found = re.search(r"^title: (.+)$", (directory / name).read_text(errors="replace"), re.MULTILINE)
             return found.group(1).strip("'\"") if found else "without a title"
@@ -83,3 +86,16 @@ def _fields(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
             times = file["t"][...]
             names = [name for name in file if isinstance(file[name], h5py.Dataset) and file[name].ndim == 3]
         yield f"  fields: {', '.join(names)} at {int(np.isfinite(times).sum())} of {times.size} instants"
+
+
+def _sweep(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    path = directory / sweep_table.TABLE
+    if path.exists():
+        states = Counter(str(row["state"]) for row in sweep_table.read(path))
+        told = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
+        yield f"  sweep of {states.total()} cases: {told}"
+
+
+def _study(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    if (directory / "study.txt").exists():
+        yield "  study: what settings cost is in study.txt"

@@ -13,6 +13,7 @@ from typing import Any
 from ..job import Case
 from . import files, measures, slide
 
+TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
 COLUMNS = ("state", *RESULTS, "residual", "error_friction", "error_area", "seconds", *(f"theory_{n}" for n in RESULTS))
 SEED = "seed"  # the last word of keys over whose values means are taken
@@ -27,7 +28,7 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
     with _alone(directory):
         rows = [_row(case) for case in cases]
         keys = list(cases[0].settings)
-        save(directory / "sweep.csv", ["case", *keys, *COLUMNS], rows)
+        save(directory / TABLE, ["case", *keys, *COLUMNS], rows)
         if any(key.split(".")[-1] == SEED for key in keys):
             save(directory / "sweep_mean.csv", *_means(rows, keys))
 

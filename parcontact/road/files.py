@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..parallel.slab import Array
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
+TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may say the others too
 PLAIN = (".npy", ".txt", ".xyz")  # formats without units
 LARGEST_FILE = 4_000_000_000  # bytes
 IRREGULAR = 1e-3  # of a step: positions of a .xyz file further from a grid than this are on none
@@ -49,7 +50,7 @@ def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel
 
 def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Map:
     if unit is None:
-        raise InputError(f"{path} says no unit of its heights: give unit: {' | '.join(UNITS)}")
+        raise InputError(f"{path} says no unit of its heights: give unit: {TO_GIVE}")
     if path.suffix == ".xyz":
         if size is not None:
             raise InputError(f"{path} has positions of its own: give no size")
@@ -107,7 +108,7 @@ def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | Non
     _refuse_twice(path, unit is not None and own_unit is not None, "a unit", "unit")
     _refuse_twice(path, size is not None and own_size is not None, "a size", "size")
     if own_unit is None and unit is None:
-        raise InputError(f"{path} says no unit of its heights: give unit: {' | '.join(UNITS)}")
+        raise InputError(f"{path} says no unit of its heights: give unit: {TO_GIVE}")
     topography = chosen.topography(**({"physical_sizes": size} if own_size is None and size is not None else {}))
     if len(topography.nb_grid_pts) != 2:
         raise InputError(f"{path} is a line scan; a map was expected")

@@ -18,7 +18,7 @@ from ..parallel.slab import Array
 BINS = 12  # per decade of wavenumbers
 FEWEST = 5  # bins that a Hurst exponent is fitted to
 STEADY = 0.3  # rms of the logarithm around a power law above which a range is not self-affine
-FLAT = -1.0  # slope above which a range is the plateau of long waves
+FLAT, STEEP = -2.0, -4.2  # slopes of a Hurst exponent of 0, and of 1 with some scatter: beyond, nothing is self-affine
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,6 @@ def _hurst(q: Array, psd: Array) -> float:
             part = slice(first, last)
             slope, offset = np.polyfit(x[part], y[part], 1)
             steady = float(np.sqrt(np.mean((y[part] - slope * x[part] - offset) ** 2))) < STEADY
-            if steady and slope < FLAT and x[last - 1] - x[first] > best:
+            if steady and STEEP < slope < FLAT and x[last - 1] - x[first] > best:
                 best, found = float(x[last - 1] - x[first]), float(-slope / 2.0 - 1.0)
     return found

@@ -84,7 +84,7 @@ def finished_before(
         same = not any(marker.differences(claim.job, plain, (*SAME, *SAME_NUMERICS)))
         if not same or claim.finished[0] != steps or not (directory.path / "measures.csv").exists():
             return ""
-        return f"finished before, at t = {claim.finished[1]:g} s, without a checkpoint (--restart never runs it afresh)"
+        return f"finished before, at t = {claim.finished[1]:g} s, without a checkpoint (--restart never: run it afresh)"
 
     return slab.agree(look() if slab.root else "")
 

@@ -104,7 +104,7 @@ def _refuse_no_end(timeline: Timeline, until: float | None) -> None:
 def _nothing_to_do(origin: Origin, timeline: Timeline, until: float | None) -> str:
     contents = origin.contents
     if contents.step >= len(timeline):
-        return f"finished before, at t = {contents.time:g} s (--restart never runs it afresh, --until goes on)"
+        return f"finished before, at t = {contents.time:g} s (--restart never: run it afresh; --until T: go on)"
     if until is not None and reached(contents.time, until):
         return f"is at t = {contents.time:g} s, not before --until {until:g}"
     return ""

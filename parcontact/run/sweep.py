@@ -46,6 +46,8 @@ def run(
         if ended == AGAIN:
             return AGAIN
         code = max(code, ended)
+    if slab.root and not quiet:
+        print(f"results of all cases: {directory / sweep_table.TABLE}", flush=True)
     return code
 
 

@@ -33,7 +33,15 @@ def test_a_self_affine_road() -> None:
     assert one == pytest.approx(np.mean((heights - heights.mean(axis=0)) ** 2), rel=1e-6)
 
 
+@pytest.mark.parametrize("hurst", [-0.4, 1.6])
+def test_a_steeper_or_flatter_spectrum_is_not_self_affine(hurst: float) -> None:
+    """Exponents of a power law that no self-affine surface has, 0 to 1, are not told."""
+    q = np.geomspace(1.0, 1e2, 24)
+    assert np.isnan(statistics._hurst(q, q ** (-2.0 * (1.0 + hurst))))
+    assert statistics._hurst(q, q ** (-2.0 * (1.0 + 0.7))) == pytest.approx(0.7, rel=1e-9)
+
+
 def test_white_noise_has_no_hurst_exponent() -> None:
     found = statistics.describe(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
-    assert found.hurst < 0.0 or np.isnan(found.hurst)
+    assert np.isnan(found.hurst)
     assert found.nayak > 1.5  # of an isotropic random surface at least 1.5

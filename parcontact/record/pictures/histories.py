@@ -55,8 +55,10 @@ def _beside_theory(chart: Chart, run: Run) -> Chart:
     theory = {name: np.array(values) for name, values in measures.read(table).items()}
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
-    beside = Series("theory", theory[over], theory[column], style.line(1))
-    return replace(chart, series=[replace(own, name="simulation"), beside])
+    lines = [replace(own, name="simulation"), Series("theory", theory[over], theory[column], style.line(1))]
+    if chart.key == "friction" and run.viscous is not None:  # the theory knows of no interface
+        lines.append(Series("without interface", own.x, run.viscous, style.line(2)))
+    return replace(chart, series=lines)
 
 
 def _charts(run: Run, along: Abscissa) -> Iterator[Chart]:

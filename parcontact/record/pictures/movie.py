@@ -25,7 +25,7 @@ def make(directory: Path, name: str, target: Path) -> Path:
             fields = Fields(file)
             there = [key for key in ("pressure", "displacement", "gap", "height") if key in file]
             if name not in there or not fields.saved:
-                raise InputError(f"{path} holds no map of {name}: {', '.join(there) or 'nothing'} was saved")
+                raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
             _make(fields, name, target)
     except hdf5.FAILURES as error:
         raise InputError(f"no movie from {path}: {hdf5.reason(error)}") from error

@@ -27,6 +27,7 @@ MEASURED = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
     *("mean_gap", "max_pressure", "work", "stored", "dissipated"),
 )
+VISCOUS = "friction_viscous"  # what an interface is not part of; in the table of a run with one
 
 
 class Run:
@@ -41,6 +42,11 @@ class Run:
 
     def column(self, name: str) -> Array:
         return self._columns[name][self._first :]
+
+    @property
+    def viscous(self) -> Array | None:
+        """Friction without that of the interface, of a run with one."""
+        return self.column(VISCOUS) if VISCOUS in self._columns else None
 
     @property
     def area(self) -> float:

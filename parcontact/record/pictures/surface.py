@@ -58,7 +58,7 @@ def _distribution(axes: Axes, sketch: Sketch) -> None:
         axes.plot(x, np.exp(-0.5 * (x / rms) ** 2) / (rms * np.sqrt(2 * np.pi)), color=style.RED, label="normal")
     axes.set(xlabel=labelled("height over mean", unit), ylabel=f"density [1/{unit}]")
     axes.margins(y=0.45)
-    axes.legend(loc="upper center", ncols=2)
+    axes.legend(loc="upper right")
 
 
 def _limits(axes: Axes, sketch: Sketch) -> None:
@@ -73,7 +73,7 @@ def _profiles(axes: Axes, sketch: Sketch) -> None:
         axes.plot(q[psd > 0.0], psd[psd > 0.0], label=f"along {name}", **style.line(number))
     _limits(axes, sketch)
     axes.set(xscale="log", yscale="log", xlabel="wavenumber [1/m]", ylabel="PSD of profiles [m³]")
-    axes.legend()
+    axes.legend(loc="lower left", fontsize=8)
 
 
 def _over_directions(axes: Axes, sketch: Sketch) -> None:
@@ -84,7 +84,7 @@ def _over_directions(axes: Axes, sketch: Sketch) -> None:
     axes.plot(sketch.found.q[seen], sketch.found.psd_2d[seen], label="on the grid", **style.line(0))
     _limits(axes, sketch)
     axes.set(xscale="log", yscale="log", xlabel="wavenumber [1/m]", ylabel="PSD over directions [m⁴]")
-    axes.legend()
+    axes.legend(loc="lower left", fontsize=8)
 
 
 PANELS = {

@@ -15,7 +15,7 @@ from ..sweep_table import SEED
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 
-TABLE = "sweep.csv"
+TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "force": "N", "size": "m", "distance": "m", "duration": "s"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "shear_modulus": "Pa"}
 MAX_LINES = 3  # of a second key
@@ -41,7 +41,7 @@ def charts(directory: Path) -> list[Chart]:
         series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.COLORS[k % MAX_COLORS])]
         if series:
             values = np.concatenate([one.x for one in series])
-            wide = values.min() > 0.0 and values.max() > WIDE * values.min()
+            wide = values.min() > 0.0 and values.max() >= WIDE * values.min()
             word = key.split(".")[-1]
             x = Axis(word.replace("_", " "), UNITS.get(word, ""))
             found.append(Chart(panel, x, Axis(title), series, log_x=wide))
