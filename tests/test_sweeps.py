@@ -137,6 +137,18 @@ def test_tables_are_written_by_one_program_at_a_time(cases: tuple[Case, ...]) ->
         assert not other.is_alive()
 
 
+def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:
+    """Errors are not known in the first row."""
+    directory = cases[0].job.output.directory
+    directory.mkdir(parents=True)
+    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction"
+    (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,\n1,1,0,0.1,0.2,1e-5,0.25,3e-3\n")
+    sweep_table.write(Path("out/job"), cases)
+    row = table()[0]
+    assert [row[name] for name in ("residual", "error_friction", "error_area")] == ["2e-05", "0.003", ""]
+    assert (row["state"], row["seconds"], row["mu_max"], row["contact_area"]) == ("begun", "0.75", "", "0.2")
+
+
 def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:
     for case in cases[:2]:
         directory = case.job.output.directory

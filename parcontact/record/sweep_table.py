@@ -15,7 +15,8 @@ from . import files, measures, slide
 
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
-COLUMNS = ("state", *RESULTS, "residual", "error_friction", "error_area", "seconds", *(f"theory_{n}" for n in RESULTS))
+WORST = ("residual", "error_friction", "error_area")  # the largest in any row
+COLUMNS = ("state", *RESULTS, *WORST, "seconds", *(f"theory_{name}" for name in RESULTS))
 SEED = "seed"  # the last word of keys over whose values means are taken
 FAILURE = ".failure"  # why a case has failed
 
@@ -61,10 +62,13 @@ def _row(case: Case) -> dict[str, Any]:
             row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
         if columns["time"] and not prefix:
             row["seconds"] = math.fsum(columns["seconds"])
-            row |= {
-                name: max(columns[name]) for name in ("residual", "error_friction", "error_area") if name in columns
-            }
+            row |= {name: _largest(columns[name]) for name in WORST if name in columns}
     return row
+
+
+def _largest(values: Sequence[float]) -> float:
+    """Of those that are known."""
+    return max((value for value in values if value == value), default=math.nan)
 
 
 def _state(case: Case) -> str:
