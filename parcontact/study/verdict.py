@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .cases import Case, Ladders
 from .extrapolation import Limit, extrapolate
@@ -71,12 +71,15 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
-    """The best limit of each quantity: along mesh and time together where both are refined, the least uncertain one.
+    """The best limit of each quantity: along mesh and time together, with any of the cells per step, the least
+    uncertain one; without a ladder of meshes along time alone.
 
-    Without a ladder of mesh or of time it is the most expensive case, and nothing is known of its error.
+    Without a ladder of either it is the most expensive case, and nothing is known of its error.
     """
-    whole = "mesh and time together" if len(ladders.meshes) > 1 else "time alone"
-    found = [one for one in limits(ladders, outcomes) if one.ladder == whole]
+    found = [one for one in limits(ladders, outcomes) if one.ladder == "time alone"]
+    if len(ladders.meshes) > 1:
+        each = [replace(ladders, cells=(cells,)) for cells in ladders.cells]
+        found = [one for part in each for one in limits(part, outcomes) if one.ladder == "mesh and time together"]
     dearest = max(outcomes, key=lambda case: (case.effort, -case.tolerance, case.precision == "double"))
     best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in QUANTITIES}
     for quantity in QUANTITIES:
