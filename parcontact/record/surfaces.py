@@ -24,6 +24,7 @@ def describe(job: Job, heights: Array, told: list[str], picture: Path) -> Iterat
     found = statistics.describe(heights, job.grid.size)
     sketch = pictures.Sketch(heights, job.grid.size, found, _measured(job))
     try:
+        picture.parent.mkdir(parents=True, exist_ok=True)
         with files.replaced(picture) as file:
             pictures.draw(sketch, file, picture.suffix[1:])
     except OSError as error:
