@@ -62,7 +62,11 @@ def cost(error: float) -> tuple[int, float, float]:
         times.append(time.process_time())
         if len(times) > STEPS + 10:
             break
-    return len(found["branches"]), float(np.sqrt(np.mean(np.abs(own / true - 1) ** 2))), float(np.median(np.diff(times)))
+    return (
+        len(found["branches"]),
+        float(np.sqrt(np.mean(np.abs(own / true - 1) ** 2))),
+        float(np.median(np.diff(times))),
+    )
 
 
 if __name__ == "__main__":

@@ -81,4 +81,9 @@ def _instants(file: h5py.File) -> Labels:
 def _states(file: h5py.File) -> Labels:
     speeds, loads = file["velocity"][...], file["load"][...]
     known = np.flatnonzero(~np.isnan(speeds))
-    return {int(k): f"{units.text(float(speeds[k]), 'm/s')}, {units.text(float(loads[k]), 'Pa')}" for k in known}
+    warm = (
+        [f", {degrees:g} °C" for degrees in file["temperature"][...]] if "temperature" in file else [""] * len(speeds)
+    )
+    return {
+        int(k): f"{units.text(float(speeds[k]), 'm/s')}, {units.text(float(loads[k]), 'Pa')}{warm[k]}" for k in known
+    }

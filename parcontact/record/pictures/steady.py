@@ -17,7 +17,7 @@ from .run import box, table
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 SAME = 1e-6  # relative: values that are the same but for rounding
-REDUCED = Axis("shift factor times sliding velocity", "m/s")
+REDUCED = Axis("shift factor × velocity", "m/s")
 
 
 def charts(directory: Path, over: str = "") -> list[Chart]:
