@@ -256,7 +256,10 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
 # -- sound scenes -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("path", sorted(HERE.rglob("*.yaml")), ids=lambda path: path.stem)
+OURS = sorted(path for path in HERE.rglob("*.yaml") if "road" not in path.parts)  # that one: tests/road/test_chain.py
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda path: path.stem)
 def test_no_job_of_ours_is_told(path: Path) -> None:
     job = load_cases(path)[0].job
     assert job.warnings == ()

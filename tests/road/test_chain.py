@@ -56,6 +56,7 @@ def test_more_branches_err_less(compare: ModuleType, monkeypatch: pytest.MonkeyP
 
 def test_the_job_asks_for_what_the_readme_says(compare: ModuleType) -> None:
     job = jobs.load(compare.HERE / "road.yaml")
+    assert job.warnings == ()
     assert job.steady is not None
     assert job.steady.temperatures == (0.0, 20.0, 40.0)
     assert isinstance(job.surface[0], jobs.Topography)
