@@ -92,6 +92,8 @@ BAD: list[tuple[Sequence[str], str]] = [
     (["job.yaml", "--wall", "soon"], "must be a wall time HH:MM:SS, got 'soon'"),
     (["job.yaml", "--sett", "grid.points=8"], "unrecognized arguments"),
     (["info", "absent.h5"], "absent.h5 does not exist"),
+    (["info", "job.yaml"], "job.yaml is neither a checkpoint nor a file of fields: it is no HDF5 file"),
+    (["plot", "job.yaml"], "it has no measures.csv and no steady.csv; give the output directory of a run, as out/job"),
     ([], "parcontact: a job is needed"),
     (["plt", "out/job"], "'plt' is neither a verb nor a job file; did you mean plot?"),
     (["hlep"], "did you mean help?"),

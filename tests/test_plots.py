@@ -57,6 +57,12 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
 
 
+def test_a_directory_above_that_of_a_run(tmp_path: Path) -> None:
+    out = ran(tmp_path, KINDS["creep"][0])
+    with pytest.raises(InputError, match=rf"holds no run and no friction curve: .*; did you mean {out}\?$"):
+        plots.plot([out.parent])
+
+
 def test_theory_beside_a_run_with_an_interface(tmp_path: Path, drawn: list[Figure]) -> None:
     """The friction that the theory is of, without that of the interface, has a line of its own."""
     out = ran(tmp_path, WAVE + ZENER + SLIDE + "interface: {shear_stress: 1.0e3}\n")

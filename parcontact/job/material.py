@@ -214,4 +214,5 @@ def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
 
 
 KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}
-Material = Annotated[Elastic | Zener | Dma, PlainValidator(chosen("model", KINDS))]
+CALLED = dict.fromkeys(("prony", "maxwell", "viscoelastic", "sls"), "zener")  # what others name it
+Material = Annotated[Elastic | Zener | Dma, PlainValidator(chosen("model", KINDS, CALLED))]

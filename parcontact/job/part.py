@@ -186,8 +186,14 @@ def literal_words(annotation: Any) -> tuple[str, ...]:
     return tuple(words)
 
 
-def chosen(key: str, kinds: Mapping[str, type[Part]]) -> Callable[[Any, ValidationInfo], Any]:
-    """A validator that takes the kind of a part from its `key`."""
+def chosen(
+    key: str, kinds: Mapping[str, type[Part]], called: Mapping[str, str] | None = None
+) -> Callable[[Any, ValidationInfo], Any]:
+    """A validator that takes the kind of a part from its `key`; `called` are other names of kinds, to advise on."""
+
+    def advice(word: Any) -> str:
+        other = (called or {}).get(str(word).lower())
+        return f"; did you mean {other}?" if other else did_you_mean(word, kinds)
 
     def choose(data: Any, info: ValidationInfo) -> Any:
         if isinstance(data, tuple(kinds.values())):
@@ -198,7 +204,7 @@ def chosen(key: str, kinds: Mapping[str, type[Part]]) -> Callable[[Any, Validati
         if word is None:
             refuse(Fault(f"is missing; it must be {choices(kinds)}", (key,)))
         if not isinstance(word, str) or word not in kinds:
-            refuse(Fault(f"must be {choices(kinds)}, got {quote(word)}{did_you_mean(word, kinds)}", (key,)))
+            refuse(Fault(f"must be {choices(kinds)}, got {quote(word)}{advice(word)}", (key,)))
         return kinds[word].model_validate(data, context=info.context)
 
     return choose

@@ -16,6 +16,7 @@ from . import checkpoint, fields, hdf5
 from .provenance import Link, read_chain
 
 SHOWN = 20  # numbers of one name at most
+NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
 
 
 def describe(path: Path) -> tuple[str, bool]:
@@ -33,6 +34,8 @@ def describe(path: Path) -> tuple[str, bool]:
     except FileNotFoundError:
         raise InputError(f"{path} does not exist") from None
     except hdf5.FAILURES as error:
+        if NOT_HDF5 in str(error):
+            raise InputError(f"{path} is neither a checkpoint nor a file of fields: it is no HDF5 file") from None
         return f"{path} cannot be read: {hdf5.reason(error)}", False
     raise InputError(f"{path} is neither a checkpoint nor a file of fields")
 

@@ -103,10 +103,20 @@ def _picture(directory: Path, options: Options) -> Figure:
     elif not groups:
         raise InputError(
             f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"
+            f"{_instead(directory)}"
         )
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
     return _figure(title, groups)
+
+
+def _instead(path: Path) -> str:
+    """Which directory may have been meant: the first below it that holds something, or that of a job file."""
+    if path.is_file():
+        return "; give the output directory of a run, as out/job"
+    tables = ("measures.csv", steady.TABLE, sweep.TABLE)
+    found = next((table.parent for name in tables for table in sorted(path.glob(f"*/{name}"))), None)
+    return f"; did you mean {found}?" if found else ""
 
 
 def _comparison(directories: Sequence[Path], options: Options) -> Figure:
