@@ -39,6 +39,8 @@ def main() -> int:
     for name in texts.names():
         (target / f"{name}.md").write_text(texts.page(name, {"verbs": lambda: reference(words._parser())}))
     shutil.copy(texts.PAGES.parent / "conf.py", target)
+    (target / "static").mkdir(exist_ok=True)
+    shutil.copy(texts.PAGES.parent / "manual.css", target / "static")
     shutil.copytree(ROOT / "jobs" / "pictures", target / "pictures", dirs_exist_ok=True)
     for notebook in sorted(NOTEBOOKS.glob("*.ipynb")):
         text = "\n\n".join(pieces(notebook, target, not options.no_notebooks))

@@ -129,6 +129,7 @@ COLUMNS = {
     ],
     "steady_waves.csv": steady_table.WAVES,
     "theory.csv": prediction.COLUMNS,
+    "steady_theory.csv": prediction.SteadyInstant._fields,
     "sweep.csv": ["case", *sweep_table.COLUMNS],
     "study.csv": study_table.COLUMNS,
     "fields.h5": [*fields.UNITS, "t", "y", "x", "step"],

@@ -50,7 +50,7 @@ def _shape(name: str) -> Callable[[Job, Path], bool]:
 
 
 def _theory(job: Job, directory: Path) -> bool:
-    return (directory / "theory.csv").is_file()
+    return any((directory / name).is_file() for name in ("theory.csv", "steady_theory.csv"))
 
 
 CITATIONS = (
@@ -97,15 +97,15 @@ CITATIONS = (
         "friction of the contact area itself, as a bell over the velocity",
         lambda job, directory: "velocity" in (job.get("interface") or {}),
     ),
-    Citation("B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840", "the theory in theory.csv", _theory),
+    Citation("B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840", "the theory beside the run", _theory),
     Citation(
         "B. N. J. Persson, A. I. Volokitin, Phys. Rev. B 65 (2002) 134106",
-        "the theory in theory.csv with time",
+        "the theory with time",
         _theory,
     ),
     Citation(
         "M. Scaraggi, B. N. J. Persson, J. Phys.: Condens. Matter 27 (2015) 105102",
-        "the factor gamma of the theory in theory.csv",
+        "the factor gamma of the theory",
         _theory,
     ),
 )
