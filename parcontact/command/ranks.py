@@ -51,6 +51,7 @@ def start() -> MPI.Intracomm:
     if world.size == 1 and count > 1:
         raise InputError(
             f"{count} ranks were started but each finds itself alone: the launcher belongs to another MPI than "
-            f"mpi4py ({MPI.Get_library_version().splitlines()[0].strip(BLANK)}). Use the mpirun beside this parcontact."
+            f"mpi4py ({MPI.Get_library_version().splitlines()[0].strip(BLANK)}). Use the mpirun beside this parcontact "
+            "(see parcontact manual install)."
         )
     return world

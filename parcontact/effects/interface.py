@@ -33,7 +33,7 @@ def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
     if interface is not None and material.poisson < LEAST_POISSON:
         yield Fault(
             f"needs material.poisson of at least {LEAST_POISSON:g}, got {material.poisson:g}: shear on a compressible "
-            "body moves its surface, which is not solved for",
+            "body moves its surface, which is not solved for (see parcontact manual limits)",
             ("interface",),
         )
 

@@ -15,7 +15,7 @@ from ..record import fields, hdf5, measures
 if TYPE_CHECKING:
     import xarray
 
-NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install xarray"
+NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install xarray (see parcontact manual install)"
 
 
 def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
