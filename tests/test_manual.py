@@ -100,7 +100,7 @@ def examples() -> Iterator[Any]:
 @pytest.mark.parametrize(("part", "word"), list(examples()))
 def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) -> None:
     """As the manual prints it, for the type of the key; a section as a whole is read by the tests of blocks."""
-    if word in ("path", "material") or (part.__name__, word) == ("Job", "surface"):
+    if word in ("path", "material", "spectrum") or (part.__name__, word) == ("Job", "surface"):
         return  # files, and sections that tests of whole jobs read
     meaning, example = reference.meanings()[part.__name__][word]
     assert meaning.endswith(".")

@@ -30,10 +30,11 @@ def keys() -> str:
 def heading(section: Section) -> str:
     """What a section is called: its place in a job, and its kind where there are several."""
     kind = job_keys.kind_key(section.part)
-    label = f", `{kind}: {section.part.model_fields[kind].default}`" if kind else ""
-    own = getattr(section.part, "label", "").removeprefix(f"{kind} ") if not kind else ""
-    detail = f": {own}" if own and own != section.place else ""
-    return f"`{section.place}`{label}{detail}" if section.place else "The sections of a job"
+    named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
+    more = section.part.label.removeprefix(named.replace(":", "")).strip()
+    detail = f" {more}" if named and more else f": {more}" if more not in ("", section.place) else ""
+    place = f"`{section.place}`, `{named}`" if named else f"`{section.place}`"
+    return f"{place}{detail}" if section.place else "The sections of a job"
 
 
 def _section(section: Section) -> Iterator[str]:
