@@ -52,7 +52,7 @@ Map = NDArray[np.float64]
 LOAD = 0.05  # mean pressure over E*, for 11 % of contact at a slope of 1
 MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
 ERROR = 1e-7  # of pressures
-TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.5)]
+TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.25)]
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 SLIDING = """\
 grid: {{points: {points}, size: 1.0e-3}}

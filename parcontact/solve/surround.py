@@ -27,7 +27,7 @@ from .operator import Operator
 REACH = 4  # cells to each side
 SIDE = 2 * REACH + 1
 FLOOR = 0.1 * SIDE * SIDE  # so many cells of a square count as residual 0
-BLOCK = 64  # points of a row that are left out together where there is nothing to do
+BLOCK = 256  # points of a row that are left out together where there is nothing to do
 
 
 class Surround:
