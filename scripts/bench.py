@@ -68,10 +68,10 @@ import tamaas as tm
 heights, reference = np.load(sys.argv[1]), np.load(sys.argv[2])
 tm.initialize(1)
 tm.set_log_level(tm.LogLevel.error)
-for exponent in range(3, 16):
+for half_decades in range(6, 30):
     model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
     model.E, model.nu = 1.0, 0.0
-    solver = tm.PolonskyKeerRey(model, heights, 10.0**-exponent)
+    solver = tm.PolonskyKeerRey(model, heights, 10.0 ** (-0.5 * half_decades))
     solver.max_iter = 20000
     began = time.process_time()
     solver.solve(float(sys.argv[3]))
