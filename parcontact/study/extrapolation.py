@@ -6,7 +6,8 @@ For values `f(h) = f* + c h^p` at three sizes the order p follows from the ratio
 
 with f1 at the finest size (paper, Eq. 14, where p = 1.4 was assumed; I. B. Celik et al., J. Fluids Eng. 130 (2008)
 078001 for sizes whose ratios differ). The order is taken as known to a half, and with four sizes the limit from the
-finest three is compared with that from the three before: the larger of what these do to the limit is its uncertainty.
+finest three is compared with that from the three before: the larger of what these do to the limit is its uncertainty,
+at least a quarter of the last difference.
 """
 
 import math
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 
 LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # orders outside tell of values that do not converge yet
 DOUBT = 0.5  # of the order
+LEAST_DOUBT = 0.25  # of the last difference
 BISECTIONS = 80
 
 
@@ -31,14 +33,16 @@ def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
     """The limit for size 0 of values at decreasing sizes; at least two of them.
 
     Two values, or values that do not come nearer to each other from one side, have the finest one as their limit and
-    the last difference as its uncertainty.
+    the larger of the last two differences as its uncertainty.
     """
     last = abs(values[-1] - values[-2])
     order = _order(sizes[-3:], values[-3:]) if len(values) > 2 else math.nan
     if math.isnan(order):
-        return Limit(values[-1], math.nan, last)
+        before = abs(values[-2] - values[-3]) if len(values) > 2 else last
+        return Limit(values[-1], math.nan, max(last, before))
     value = _limit(sizes, values, order)
     doubts = [abs(_limit(sizes, values, max(order + more, LEAST_ORDER)) - value) for more in (-DOUBT, DOUBT)]
+    doubts.append(LEAST_DOUBT * last)
     if len(values) > 3:
         doubts.append(abs(extrapolate(sizes[:-1], values[:-1]).value - value))
     return Limit(value, order, max(doubts))

@@ -72,7 +72,7 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
     """The best limit of each quantity: along mesh and time together, with any of the cells per step, the least
-    uncertain one; without a ladder of meshes along time alone.
+    uncertain one that has an order; without a ladder of meshes along time alone.
 
     Without a ladder of either it is the most expensive case, and nothing is known of its error.
     """
@@ -85,7 +85,7 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
     for quantity in QUANTITIES:
         choices = [one for one in found if one.quantity == quantity and one.limit.value]
         if choices:
-            best[quantity] = min(choices, key=lambda one: one.relative).limit
+            best[quantity] = min(choices, key=lambda one: (math.isnan(one.limit.order), one.relative)).limit
     return best
 
 
