@@ -112,7 +112,7 @@ def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) ->
 
 def test_the_page_has_range_unit_and_default() -> None:
     text = texts.page("job")
-    (hurst,) = re.findall(r"`hurst`\n: .*", text)
+    (hurst, *_) = re.findall(r"`hurst`\n: .*", text)
     assert "range: above 0 and at most 1; required" in hurst
     (keep,) = re.findall(r"`keep`\n: .*", text)
     assert "range: 0 or more; default: `2`" in keep
