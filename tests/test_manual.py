@@ -1,5 +1,6 @@
 """The manual says what the program does: keys and columns are those of the code, and every block of code in it runs."""
 
+import hashlib
 import json
 import re
 import shlex
@@ -247,6 +248,17 @@ def test_completion(tmp_path: Path) -> None:
         ["bash", "-c", script + "\n" + lines], capture_output=True, text=True, cwd=tmp_path, timeout=20
     )
     assert done.stdout.splitlines() == ["steady study", "--ranks", "double single mixed", "--until"]
+
+
+# -- gallery ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
+def test_the_picture_of_a_job_is_of_this_job(path: Path) -> None:
+    """If not: scripts/gallery JOB."""
+    recorded = (ROOT / "jobs" / "pictures" / "gallery" / f"{path.stem}.sha256").read_text().split()[0]
+    assert recorded == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert f"gallery/{path.stem}.png" in texts.page("gallery")
 
 
 def test_the_version_of_the_citation() -> None:
