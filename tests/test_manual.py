@@ -256,8 +256,9 @@ def test_completion(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_picture_of_a_job_is_of_this_job(path: Path) -> None:
     """If not: scripts/gallery JOB."""
-    recorded = (ROOT / "jobs" / "pictures" / "gallery" / f"{path.stem}.sha256").read_text().split()[0]
-    assert recorded == hashlib.sha256(path.read_bytes()).hexdigest()
+    recorded = (ROOT / "jobs" / "pictures" / "gallery" / f"{path.stem}.sha256").read_text().strip()
+    data = json.dumps(yaml.safe_load(path.read_text()))
+    assert recorded == hashlib.sha256(data.encode()).hexdigest()
     assert f"gallery/{path.stem}.png" in texts.page("gallery")
 
 
