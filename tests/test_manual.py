@@ -267,3 +267,10 @@ def test_the_version_of_the_citation() -> None:
 
     assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == __version__
     assert sys.version_info >= (3, 11)
+
+
+def test_messages_name_pages_that_there_are() -> None:
+    sources = [path.read_text() for path in (ROOT / "parcontact").rglob("*.py")]
+    named = {page for text in sources for page in re.findall(r"\(see parcontact manual (\w+)\)", text)}
+    assert named
+    assert named <= set(PAGES)
