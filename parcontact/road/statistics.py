@@ -17,6 +17,8 @@ from ..parallel.slab import Array
 
 BINS = 12  # per decade of wavenumbers
 FEWEST = 5  # bins that a Hurst exponent is fitted to
+WHOLE = 0.99  # share of the square slope up to which waves belong to a surface
+NARROWEST = math.log(3.0)  # of a range of wavenumbers
 STEADY = 0.3  # rms of the logarithm around a power law above which a range is not self-affine
 FLAT, STEEP = -2.0, -4.2  # slopes of a Hurst exponent of 0, and of 1 with some scatter: beyond, nothing is self-affine
 
@@ -77,14 +79,19 @@ def _along(power: Array, length: float) -> tuple[Array, Array]:
 
 
 def _hurst(q: Array, psd: Array) -> float:
-    """From the slope of log C2 over log q, -2 (1 + H), in the widest range that is a power law."""
-    x, y = np.log(q[psd > 0.0]), np.log(psd[psd > 0.0])
+    """From the slope of log C2 over log q, -2 (1 + H), in the widest range that is a power law.
+
+    Waves beyond those that make up the slopes are what an instrument, a filter or an edge has left.
+    """
+    slopes = np.cumsum(psd * q**4)  # of rings as wide as their wavenumbers, as these are spaced
+    used = (psd > 0.0) & (slopes <= WHOLE * slopes[-1])
+    x, y = np.log(q[used]), np.log(psd[used])
     best, found = 0.0, math.nan
     for first in range(x.size - FEWEST):
         for last in range(first + FEWEST, x.size + 1):
             part = slice(first, last)
             slope, offset = np.polyfit(x[part], y[part], 1)
             steady = float(np.sqrt(np.mean((y[part] - slope * x[part] - offset) ** 2))) < STEADY
-            if steady and STEEP < slope < FLAT and x[last - 1] - x[first] > best:
+            if steady and STEEP < slope < FLAT and x[last - 1] - x[first] > max(best, NARROWEST):
                 best, found = float(x[last - 1] - x[first]), float(-slope / 2.0 - 1.0)
     return found

@@ -59,7 +59,7 @@ def test_partial_contact_adds_the_stress_on_the_area(speed: float) -> None:
 
 def test_rest_has_none() -> None:
     rows = marched(job(history=[{"pressure": PRESSURE}, SLIDE], interface=CONSTANT))[1]
-    assert rows[1].measures.friction == 0.0
+    assert rows[1].measures.friction < 1e-12  # sums of a pressure solved to 1e-10
     assert rows[-1].measures.friction > 0.5
 
 
