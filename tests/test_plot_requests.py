@@ -206,7 +206,7 @@ def test_movie(tmp_path: Path, kind: str) -> None:
         (["--log", "z"], "there is no axis 'z'"),
         (["--out", "picture.docx"], "pictures are png, pdf, svg"),
         (["--out", "nowhere/picture.png"], "cannot write nowhere/picture.png"),
-        (["--movie", "height"], "no map of height: pressure, gap"),
+        (["--movie", "height"], "no map of height; it holds pressure, gap"),
         (["--movie", "gap", "--out", "gap.mp4"], "must end in .gif"),
         (["--over", "distance"], "nothing to draw over distance"),
         (["--over", "velocity"], "the surface slides in no stage"),

@@ -230,7 +230,7 @@ def test_data_in_other_files(comm: MPI.Intracomm, shared_path: Path) -> None:
         layout = h5py.VirtualLayout((NY, NX), "f8")
         layout[...] = h5py.VirtualSource(str(shared_path / "other.h5"), "heights", (NY, NX))
         with h5py.File(path, "w") as file:
-            file.create_dataset("raw", (NY, NX), external=[(str(shared_path / "raw.bin"), 0, h5py.h5f.UNLIMITED)])
+            file.create_dataset("raw", (NY, NX), "f8", external=[(str(shared_path / "raw.bin"), 0, h5py.h5f.UNLIMITED)])
             file.create_virtual_dataset("virtual", layout)
 
     path = made(comm, shared_path / "map.h5", make)

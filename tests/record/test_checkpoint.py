@@ -174,7 +174,8 @@ def test_info(comm: MPI.Intracomm, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         info.describe(tmp_path / "absent.h5")
     (tmp_path / "other.h5").write_bytes(b"something else")
-    assert not info.describe(tmp_path / "other.h5")[1]
+    with pytest.raises(InputError, match="it is no HDF5 file"):
+        info.describe(tmp_path / "other.h5")
     with h5py.File(tmp_path / "other.h5", "w"):
         pass
     with pytest.raises(InputError, match="neither a checkpoint nor a file of fields"):
