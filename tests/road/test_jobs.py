@@ -46,7 +46,7 @@ def heights_of(
     folder: Path, comm: MPI.Intracomm, points: int = POINTS, size: float = LENGTH, more: str = ""
 ) -> np.ndarray:
     """The whole map of a job, on every rank; collective."""
-    path = folder / f"job{comm.size}.yaml"
+    path = folder / comm.bcast(f"job-{comm.size}-of-{MPI.COMM_WORLD.rank}.yaml")  # ranks that are alone share no file
     if comm.rank == 0:
         path.write_text(JOB.format(points=points, size=size, more=more))
     comm.barrier()
