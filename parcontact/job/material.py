@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, Validat
 from ..errors import InputError
 from ..rubber import compound
 from .fault import Fault, quote, refuse
-from .part import Context, Part, Rule, chosen
+from .part import Part, Rule, chosen, existing_file
 from .temperature import Celsius, Shift, shifted
 from .values import NonNegative, Positive
 
@@ -154,20 +154,12 @@ class Zener(Part):
         return self.modulus_inf + sum(branch.long_modulus for branch in self.branches)
 
 
-def _table(path: Path, info: ValidationInfo) -> Path:
-    """The absolute path of a table of moduli; relative ones start at the job file."""
-    found = (info.context.path.parent if isinstance(info.context, Context) else Path.cwd()) / path.expanduser()
-    if not found.is_file():
-        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
-    return found
-
-
 class Dma(Part):
     """A compound fitted to a table of measured moduli when the job is read, as `parcontact fit` does."""
 
     label: ClassVar[str] = "model dma"
     model: Literal["dma"] = "dma"
-    path: Annotated[Path, AfterValidator(_table), Field(description="the path of a table of measured moduli")]
+    path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of measured moduli")]
     poisson: Poisson = 0.5
     reference: Celsius | None = None  # default: the middle one of the measured temperatures
     shift: Literal["wlf", "arrhenius", "free"] = "wlf"

@@ -20,6 +20,7 @@ from pydantic_core import ErrorDetails
 from .fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
 from .loading import Included
 from .source import shorten
+from .values import from_home
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,16 @@ class Context:
 
     path: Path
     included: Included | None = None
+
+
+def existing_file(path: Path, info: ValidationInfo) -> Path:
+    """The absolute path of a file that a job names; relative ones start at the job file."""
+    found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
+    if found.exists() and not (found.is_file() or found.is_dir()):
+        refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
+    if not found.is_file():
+        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
+    return found
 
 
 class Rule(NamedTuple):

@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from .fault import Fault, refuse
-from .part import Context, Part, Rule, chosen
+from .part import Context, Part, Rule, chosen, existing_file
 from .topography import RoughSpectrum, Topography
-from .values import Positive, Real, Seed, Whole, from_home
+from .values import Positive, Real, Seed, Whole
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
@@ -94,15 +94,9 @@ class Wave(Part):
 
 def _surface_file(path: Path, info: ValidationInfo) -> Path:
     """The absolute path of a file of heights; relative ones start at the job file."""
-    path = from_home(path)
-    found = (info.context.path.parent if info.context else Path.cwd()) / path
     if path.suffix not in FILE_KINDS:
         refuse(Fault(f"must end in {' or '.join(FILE_KINDS)}, got {str(path)!r}"))
-    if found.exists() and not (found.is_file() or found.is_dir()):
-        refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
-    if not found.is_file():
-        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
-    return found
+    return existing_file(path, info)
 
 
 class HeightFile(Part):

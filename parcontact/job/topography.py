@@ -5,21 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic import AfterValidator, Field
 
-from .fault import Fault, refuse
-from .part import Part
-from .values import Flag, Positive, Seed, from_home
-
-
-def _map_file(path: Path, info: ValidationInfo) -> Path:
-    """The absolute path of a measured map; relative ones start at the job file."""
-    found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
-    if found.exists() and not (found.is_file() or found.is_dir()):
-        refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
-    if not found.is_file():
-        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
-    return found
+from .part import Part, existing_file
+from .values import Flag, Positive, Seed
 
 
 class RoughSpectrum(Part):
@@ -31,7 +20,7 @@ class RoughSpectrum(Part):
 
     label: ClassVar[str] = "shape rough with a spectrum"
     shape: Literal["rough"] = "rough"
-    spectrum: Annotated[Path, AfterValidator(_map_file), Field(description="the path of a table of a spectrum")]
+    spectrum: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of a spectrum")]
     hurst: float | None = Field(
         default=None, gt=0, le=1, strict=True, description="a Hurst exponent above 0 and up to 1"
     )
@@ -49,7 +38,7 @@ class Topography(Part):
 
     label: ClassVar[str] = "shape topography"
     shape: Literal["topography"] = "topography"
-    path: Annotated[Path, AfterValidator(_map_file), Field(description="the path of a measured map")]
+    path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a measured map")]
     unit: Literal["m", "mm", "um", "nm"] | None = None  # of heights; only for formats that have none
     size: Annotated[
         tuple[Positive, Positive] | None, Field(description="two positive lengths [m], only for formats that have none")
