@@ -138,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     fit.add_argument("--shift", metavar="LAW", default="wlf", help=text)
     text = "rms error of the logarithms of the moduli that is allowed beside the scatter of the data (default: 0.02)"
     fit.add_argument("--error", metavar="E", type=_positive, default=0.02, help=text)
-    fit.add_argument("--poisson", metavar="NU", type=float, default=0.5, help="Poisson's ratio (default: 0.5)")
+    fit.add_argument("--poisson", metavar="NU", type=_poisson, default=0.5, help="Poisson's ratio (default: 0.5)")
     fit.add_argument("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
     fit.set_defaults(act=verbs.fit)
 
@@ -241,6 +241,13 @@ def _positive(text: str) -> float:
         if 0.0 < float(text) < float("inf"):
             return float(text)
     raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}")
+
+
+def _poisson(text: str) -> float:
+    with suppress(ValueError):
+        if -1.0 < float(text) <= 0.5:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"must be a Poisson ratio above -1 and up to 0.5, got {text!r}")
 
 
 def _share(text: str) -> float:

@@ -40,6 +40,9 @@ def test_a_table_becomes_a_material(tmp_path: Path, run_parcontact: "RunParconta
     assert matplotlib.image.imread(tmp_path / "materials" / "rubber.png").shape[:2] == (900, 1200)
     again = run_parcontact(words, ranks=0)
     assert again.returncode == 0  # its own files are made anew
+    ratio = run_parcontact(["fit", "rubber.csv", "--poisson", "-1"], ranks=0)
+    assert ratio.returncode == 2
+    assert "must be a Poisson ratio above -1 and up to 0.5, got '-1'" in ratio.stderr
     (tmp_path / "mine.yaml").write_text("title: mine\n")
     refused = run_parcontact(["fit", "rubber.csv", "--out", "mine.yaml"], ranks=0)
     assert refused.returncode == 2
