@@ -1,7 +1,9 @@
 """The plan of a job: memory to the byte, steps that stand for others, scaling; counts are checked, never times."""
 
 import re
+import subprocess
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,10 +14,12 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import __main__, scene
+from parcontact.command import words
+from parcontact.effects import decisions
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.plan import machine, memory, other_ranks, report, trial
-from parcontact.plan.planning import only_steady_states
+from parcontact.plan.planning import only_steady_states, try_job
 from parcontact.plan.report import Costs
 from parcontact.plan.sample import Sample, StageCost, chosen, sample
 from parcontact.plan.scaling import Machine, Scaling
@@ -182,6 +186,58 @@ def test_a_sample_on_some_ranks_is_gone_by_there(tmp_path: Path) -> None:
     assert both.sample(64).ranks == 2
     ideal = both.messages(4) + 1e-4 + (0.7 - both.messages(2) - 1e-4) / 2 * MACHINE.slowed(4) / MACHINE.slowed(2)
     assert both.step(4) == pytest.approx(ideal)
+
+
+def test_as_many_calls_on_any_number_of_ranks() -> None:
+    """Where two had the time for four steps and one for one of them only: 15 calls of 0.1 s on one rank."""
+    planned, free = job(), Machine(cores=8, crowding=1.5, per_call=0.0, copy_rate=1e10)
+    stages = [StageCost(4, n, float(n), {"seconds": n * time, "operator": n * calls}) for n, time, calls in TRIED]
+    one, two = (Sample(planned, 1 + k, 0.0, 1.0, 0.0, 0, (stage,)) for k, stage in enumerate(stages))
+    both = Scaling.of(planned, [one, two], free)
+    assert both.step(1) == pytest.approx(1.5)
+    assert both.step(2) == pytest.approx(0.9, rel=1e-5)  # but for the messages of a sum
+
+
+TRIED = ((1, 1.0, 10.0), (4, 0.9, 15.0))  # steps, seconds and calls of each
+
+
+def test_all_ranks_try_the_same_grid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four ranks could try a finer grid than one in the time given; they are told not to."""
+    large = job(grid={"points": 512}, history=[CELLS])
+    alone = trial.grid_for(large, 1, 0.5)
+    assert alone is not None
+    assert alone.grid.points != trial.grid_for(large, 4, 0.5).grid.points  # type: ignore[union-attr]
+    asked: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "run", lambda command, **_: asked.append(command))
+    assert list(other_ranks.samples(alone, ["job.yaml"], [2, 4], 0.5)) == []  # nothing was left
+    options = [words.understand(command[command.index("plan") :]) for command in asked]
+    assert [option.sample_points for option in options] == 2 * [alone.grid.points]
+    seen = try_job(large, Slab(MPI.COMM_SELF, 512, 512), 1e-3, 0.0, options[0].sample_points)
+    assert seen is not None
+    assert seen.job == alone
+
+
+def test_the_most_that_is_held() -> None:
+    """The first solve of 256 x 256 points is found on nested grids, whose maps are gone afterwards."""
+    planned = job(grid={"points": 256}, surface={**ROUGH, "short_wavelength": 6.25e-5})
+    seen = sample(planned, Slab(MPI.COMM_SELF, 256, 256), 1e6)
+    march, _ = marched(planned)
+    tally = march.scene.slab.tally
+    assert tally["map bytes at most"] > 1.1 * tally["map bytes"]
+    assert Costs(Scaling.of(planned, [seen], MACHINE), 1e9).held(1) == tally["map bytes at most"]
+    assert Costs(Scaling.of(planned, [replace(seen, held=0)], MACHINE), 1e9).held(1) == tally["map bytes"]
+
+
+@pytest.mark.parametrize("name", JOBS)
+def test_a_tiny_scene_has_all_that_runs(name: str) -> None:
+    """The same effects as the job, on 16 points along each side: what is compiled for it is compiled for the job."""
+    planned = job(**JOBS[name])
+    small = trial.tiny(planned)
+    assert small is not None
+    assert max(small.grid.points) == 16
+    assert decisions.isolated(small).on == decisions.isolated(planned).on
+    assert small.numerics.map_type == planned.numerics.map_type
+    assert (small.material, small.history) == (planned.material, planned.history)
 
 
 def test_a_large_job_is_tried_on_a_coarser_grid() -> None:

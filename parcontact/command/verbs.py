@@ -123,7 +123,7 @@ def plan(options: argparse.Namespace) -> int:
     wanted = planning.Wanted(counts, words, options.seconds, options.cores, options.network)
     slab = Slab(world, *job.grid.points)
     if options.sample:
-        planning.leave_sample(job, slab, wanted, options.sample)
+        planning.leave_sample(job, slab, wanted, options.sample, options.sample_points)
         return DONE
     for warning in (*job.warnings, *(sanity.of_surface(scene.frame(job, slab)) if sanity.is_quickly_made(job) else ())):
         if world.rank == 0:

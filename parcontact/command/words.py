@@ -115,6 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     text = "of that machine's network: seconds of a message, bytes per second of a node (default: 2e-6,12.5e9)"
     plan.add_argument("--network", metavar="ALPHA,BETA", type=_network, help=text)
     plan.add_argument("--sample", type=Path, help=argparse.SUPPRESS)  # by which a plan starts others
+    plan.add_argument("--sample-points", type=_counts, default=(), help=argparse.SUPPRESS)  # on the grid that it tried
     plan.set_defaults(act=verbs.plan)
 
     theory = found.add_parser("theory", help="say what Persson's theory predicts for a job, into theory.csv")

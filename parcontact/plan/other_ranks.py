@@ -19,10 +19,15 @@ MAX_SECONDS_LATE = 60.0  # beyond three times those that a trial is given
 
 
 def samples(job: Job, words: Sequence[str], ranks: Iterable[int], seconds: float) -> Iterator[Sample]:
-    """Samples on some numbers of ranks, as far as they can be had; `words` name the job and change it."""
+    """Samples of the job that was tried here on some numbers of ranks, as far as they can be had.
+
+    `words` name the whole job and change it; all try it on the grid on which it was tried here: only so can times be
+    compared.
+    """
+    words = [*words, "--seconds", repr(seconds), "--sample-points", ",".join(map(str, job.grid.points))]
     for count in ranks:
         with TemporaryDirectory() as directory:
-            found = _attempt(job, [*words, "--seconds", repr(seconds)], count, Path(directory, "sample"), seconds)
+            found = _attempt(job, words, count, Path(directory, "sample"), seconds)
         if found:
             yield found
 

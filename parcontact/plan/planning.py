@@ -70,9 +70,10 @@ def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) ->
     yield from report.times(costs, wanted.ranks)
 
 
-def try_job(job: Job, slab: Slab, seconds: float, started: float) -> Sample | None:
-    """Try a job, or the same on a grid that is coarse enough, with the transforms its run will have; collective."""
-    tried = slab.agree(trial.grid_for(job, slab.comm.size, seconds) if slab.root else None)
+def try_job(job: Job, slab: Slab, seconds: float, started: float, points: Sequence[int] = ()) -> Sample | None:
+    """Try a job, or the same on a grid that is coarse enough, or has so many points, with the transforms its run will
+    have; collective."""
+    tried = slab.agree(_grid_to_try(job, slab.comm.size, seconds, points) if slab.root else None)
     if tried is None:
         return None
     own = slab.resized(*tried.grid.points)
@@ -82,9 +83,13 @@ def try_job(job: Job, slab: Slab, seconds: float, started: float) -> Sample | No
     return found
 
 
-def leave_sample(job: Job, slab: Slab, wanted: Wanted, path: Path) -> None:
-    """Try a job for a program that has started this one; collective."""
-    found = try_job(job, slab, wanted.seconds, 0.0)
+def _grid_to_try(job: Job, ranks: int, seconds: float, points: Sequence[int]) -> Job | None:
+    return trial.on_grid(job, points) if points else trial.grid_for(job, ranks, seconds)
+
+
+def leave_sample(job: Job, slab: Slab, wanted: Wanted, path: Path, points: Sequence[int]) -> None:
+    """Try a job, on the same grid, for a program that has started this one; collective."""
+    found = try_job(job, slab, wanted.seconds, 0.0, points)
     if slab.root and found:
         other_ranks.save(path, found)
 

@@ -27,10 +27,10 @@ class Costs:
         return self.scaling.job
 
     def held(self, ranks: int) -> float:
-        """Bytes that a rank holds in maps; those of steady states are estimated from what was tried."""
-        if self.job.history:
-            return memory.total(self.job, ranks)
-        return self.scaling.held(ranks)
+        """Bytes that a rank holds in maps at once: those of steps, to the byte, or more while a first contact or steady
+        state is found on nested grids, which was seen when the job was tried."""
+        steps = memory.total(self.job, ranks) if self.job.history else 0
+        return max(float(steps), self.scaling.held(ranks))
 
     def marching(self, ranks: int) -> float:
         """Seconds of all steps, or steady states."""
@@ -127,7 +127,7 @@ def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     yield from _disturbance(scaling)
     unit, size = _unit(max(costs.held(count) for count in ranks))
     word = "step" if costs.job.history else "state"
-    yield f"  ranks     maps [{unit}]  resident [{unit}] {f'{word} [s]':>12}   messages   at work   whole run"
+    yield f"  ranks  most maps [{unit}]  resident [{unit}] {f'{word} [s]':>9}   messages   at work   whole run"
     for count in ranks:
         step, held = scaling.step(count), costs.held(count)
         resident = held + scaling.sample(count).resident + costs.instant_bytes // count

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import islice
 
 from .. import scene
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..job import Job
 from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
@@ -23,6 +23,7 @@ from ..parallel.slab import Slab, deal
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
 from ..steady_sliding.sliding import SteadySliding
+from . import trial
 
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever
 BLOCK = 8  # steps of a block, these among them
@@ -104,6 +105,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
 
     Raises InputError for files that do not fit.
     """
+    _warm_up(job, slab)
     began, worked = time.perf_counter(), time.process_time()
     if job.history:
         building, stages = _march(job, slab, seconds)
@@ -116,6 +118,22 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
     return Sample(
         job, slab.comm.size, starting, building, took, slab.agree(resident), tuple(stages), slab.agree(held), 1.0 - idle
     )
+
+
+def _warm_up(job: Job, slab: Slab) -> None:
+    """Make the first steps, or the first steady state, of a tiny scene: compiling is no part of what a job costs."""
+    small = trial.tiny(job)
+    if small is None:
+        return
+    own = Slab(slab.comm, *small.grid.points)
+    with suppress(RunError, InputError):
+        if not small.history:
+            wanted = request(small)
+            SteadySliding(scene.frame(small, own)).solve((wanted.points[0][0], 0.0), wanted.points[0][1])
+            return
+        march = start.first(small, own)
+        for step in islice(steps_to_make(march, small.timeline()), FIRST):
+            march.advance(step)
 
 
 def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:

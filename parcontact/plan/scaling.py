@@ -83,22 +83,33 @@ class Scaling:
         return self.samples[0].steps
 
     def step(self, ranks: int) -> float:
-        """Seconds of a step, on average over the job."""
+        """Seconds of a step, on average over the job.
+
+        Ranks change nothing in how many calls a step has: where one number of them had the time for more steps than
+        another, the calls of these count for both.
+        """
         sample = self.sample(ranks)
         calls = self.machine.per_call * _per_step(sample, "operator")
         seen = _per_step(sample, "seconds") - self._messages(sample.job, sample, sample.ranks) - calls
         shared = max(0.0, seen) * self._finer(sample) * self._share(ranks) / self._share(sample.ranks)
-        return shared + calls + self.messages(ranks)
+        return (shared + calls) * self._more_calls(sample) + self.messages(ranks)
+
+    def _more_calls(self, sample: Sample) -> float:
+        """Operator calls of a step where most steps were tried, over those of another sample."""
+        most = max(self.samples, key=lambda sample: sample.tried)
+        calls = _per_step(sample, "operator")
+        return _per_step(most, "operator") / calls if calls > 0.0 else 1.0
 
     def held(self, ranks: int) -> float:
-        """Bytes that a rank holds in maps, in proportion to its points."""
+        """Bytes that a rank holds in maps at most, in proportion to its points."""
         sample = self.sample(ranks)
         points, tried = (job.grid.nx * job.grid.ny for job in (self.job, sample.job))
         return sample.held * points / tried * sample.ranks / ranks
 
     def messages(self, ranks: int) -> float:
         """Seconds of a step in which data moves between ranks."""
-        return self._messages(self.job, self.sample(ranks), ranks)
+        sample = self.sample(ranks)
+        return self._messages(self.job, sample, ranks) * self._more_calls(sample)
 
     def building(self, ranks: int) -> float:
         """Seconds in which the scene is made."""
