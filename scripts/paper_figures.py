@@ -11,54 +11,26 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
+from paper_panels import WIDTH, MissingError, columns, moduli, over_distance, over_key, panels, there
 
 from parcontact.effects.relaxation import relaxation_of
-from parcontact.job import Job, load, load_cases
+from parcontact.job import load, load_cases
 from parcontact.physics.prony import complex_modulus
-from parcontact.record import measures, sweep_table
 from parcontact.record.pictures import style
 from parcontact.theory import hertz
 
 JOBS = Path(__file__).resolve().parents[1] / "jobs" / "paper"
-WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
 DPI = 300
 RC = {**style.RC, "font.size": 7, "axes.titlesize": 7, "legend.fontsize": 6.5, "lines.linewidth": 1.1}
 RC |= {"lines.markersize": 3, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6}
 CREEP_TIME, RADIUS = 1e-2, 1e-2  # of the sphere's rubber [s], and of the sphere [m]
 INSTANTS = (0.2, 0.4, 1.0, 2.0, 4.0)  # of fig03, in creep times
-
-
-class MissingError(Exception):
-    """What a figure is drawn from is not there."""
-
-
-def there(path: Path) -> Path:
-    if not path.is_file():
-        raise MissingError(f"{path} is missing")
-    return path
-
-
-def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray]:
-    return {key: np.array(values) for key, values in measures.read(there(directory / name)).items()}
-
-
-def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
-    figure = Figure(figsize=(WIDTH, 0.15 + height * count), layout="constrained")
-    return figure, figure.subplots(count, 1, squeeze=False)[:, 0]
-
-
-def moduli(job: Job) -> tuple[float, float]:
-    """Of the first instant and in the end [Pa]."""
-    series = relaxation_of(job)
-    return series.modulus_inf + float(series.moduli.sum()), series.modulus_inf
 
 
 def fig02(out: Path) -> Figure:
@@ -165,15 +137,6 @@ def fig07(out: Path) -> Figure:
     return figure
 
 
-def over_distance(axes: Axes, directory: Path, name: str, label: str, number: int = 0, start: float = 0.0) -> None:
-    """Simulation and theory of one case over the distance slid since an instant [s]; logarithmic, in um."""
-    for table, dashes, of in (("measures.csv", "-", "simulation"), ("theory.csv", "--", "theory")):
-        found = columns(directory, table)
-        distance = found["distance"] - found["distance"][found["time"] <= start * (1 + 1e-9)][-1]
-        slid = distance > 0
-        axes.semilogx(1e6 * distance[slid], found[name][slid], dashes, color=style.COLORS[number], label=f"{of}{label}")
-
-
 def fig08(out: Path) -> Figure:
     directory = out / "fig08_velocity_step"
     figure, (top, bottom) = panels(2)
@@ -186,38 +149,6 @@ def fig08(out: Path) -> Figure:
         axes.set(ylabel=label, ylim=(0, None), xlim=(1e-2, 1e3))
     bottom.set(xlabel="distance slid [µm]")
     top.legend()
-    return figure
-
-
-def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values of a key, means and standard deviations over its cases that are done."""
-    at = sorted({row[key] for row in rows})
-    groups = [np.array([row[name] for row in rows if row[key] == value and row[name] == row[name]]) for value in at]
-    there = [k for k, group in enumerate(groups) if group.size]
-    spread = [groups[k].std(ddof=1) if groups[k].size > 1 else 0.0 for k in there]
-    return np.array(at)[there], np.array([groups[k].mean() for k in there]), np.array(spread)
-
-
-def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> Figure:
-    """Friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds."""
-    rows = sweep_table.read(there(out / name / "sweep.csv"))
-    figure, (top, middle, bottom) = panels(3, 1.75)
-    quantities = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))
-    for number, (axes, (column, short)) in enumerate(zip((top, top, middle), quantities, strict=True)):
-        color = style.COLORS[number]
-        x, y, spread = means(rows, key, column)
-        axes.errorbar(scale * x, y, spread, fmt="o-", color=color, capsize=2, label=f"{short}, simulation")
-        tx, theory, _ = means(rows, key, f"theory_{column}")
-        axes.plot(scale * tx, theory, "--", color=color, label=f"{short}, theory")
-        if x.size == tx.size:
-            bottom.plot(scale * x, 100 * (theory - y) / y, "os^"[number] + "-", color=color, label=short)
-    top.set(ylabel="friction coefficient", ylim=(0, 1.5 * top.get_ylim()[1]))
-    middle.set(ylabel="contact area ratio", yscale="log")
-    bottom.axhline(0, color=style.GREY, lw=0.6)
-    bottom.set(ylabel="theory − simulation [%]", xlabel=label)
-    for axes in (top, middle, bottom):
-        axes.set_xscale("log")
-        axes.legend(**({"loc": "upper center", "ncols": 2} if axes is top else {}))
     return figure
 
 

@@ -1,6 +1,7 @@
 """Jobs as dictionaries or worked examples, marched in this process."""
 
 import importlib.util
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -34,7 +35,11 @@ def load_script(name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
+    sys.path.insert(0, str(ROOT / "scripts"))  # where it finds its neighbours, as when it runs
+    try:
+        spec.loader.exec_module(script)
+    finally:
+        sys.path.remove(str(ROOT / "scripts"))
     return script
 
 

@@ -15,7 +15,7 @@ import yaml
 from conftest import RunParcontact
 
 from parcontact import __main__
-from parcontact.command import words
+from parcontact.command.values import wall_seconds
 from parcontact.run import watch
 
 JOB: dict[str, Any] = {
@@ -205,7 +205,7 @@ def test_wall_limit_of_a_chain(main: Main, tmp_path: Path) -> None:
     [("90", 90.0), ("2:30", 150.0), ("01:00:00", 3600.0), ("1-12:00:00", 129600.0), ("100:00:00", 360000.0)],
 )
 def test_wall_times(text: str, seconds: float) -> None:
-    assert words.wall_seconds(text) == seconds
+    assert wall_seconds(text) == seconds
 
 
 def test_end_of_a_batch_job() -> None:

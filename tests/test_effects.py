@@ -24,7 +24,7 @@ from parcontact.physics.embedded import Embedded
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
 from parcontact.record import fields, measures
-from parcontact.run import runner
+from parcontact.run import journey, runner
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
 Json = dict[str, Any]
@@ -288,7 +288,7 @@ def run(tmp_path: Path) -> Callable[..., Path]:
         planned = job(history=[PRESS], output=output, **changes)
         planned._path = tmp_path / "job.yaml"
         planned.path.write_text(planned.resolved())
-        assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), runner.Options(quiet=True)) == runner.DONE
+        assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), runner.Options(quiet=True)) == journey.DONE
         return tmp_path / name
 
     return go

@@ -1,4 +1,4 @@
-"""The way through the house: imports point down, and only some rooms know MPI."""
+"""The house: imports point down, only some rooms know MPI, files are short, and objects change little."""
 
 import ast
 import graphlib
@@ -10,6 +10,7 @@ import pytest
 import parcontact
 
 HOUSE = Path(parcontact.__file__).parent
+ROOT = Path(__file__).parents[1]
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
     {"errors", "private", "streams"},
@@ -91,3 +92,55 @@ def test_theory_stands_alone() -> None:
     assert {name for name in theirs if room(name) != "theory"} <= {"physics.prony"}
     users = {room(module) for module, names in OURS.items() if "theory" in map(room, names)}
     assert users - {"theory"} <= COMPARE
+
+
+LONGEST_FILE = 300  # lines: a file has one reason to change
+LONG = {"bench.py"}
+MOST_THAT_CHANGES = 10  # attributes of an object that a reader has to follow
+MAKERS = {"__init__", "__post_init__"}
+
+
+@pytest.mark.parametrize("directory", [HOUSE, ROOT / "scripts"], ids=lambda path: path.name)
+def test_files_are_short(directory: Path) -> None:
+    lengths = {path.name: len(path.read_text().splitlines()) for path in directory.rglob("*.py")}
+    assert not {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE and name not in LONG}
+
+
+def changing(kind: ast.ClassDef) -> set[str]:
+    """The attributes of its own objects that a class sets or deletes after they are made."""
+    methods = [part for part in kind.body if isinstance(part, ast.FunctionDef) and part.name not in MAKERS]
+    return {
+        node.attr
+        for method in methods
+        for node in ast.walk(method)
+        if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load)
+        if method.args.args and ast.unparse(node.value) == method.args.args[0].arg
+    }
+
+
+def test_what_changes_is_told() -> None:
+    """Plain, augmented and annotated assignments, those to several at once, of loops, of `with` and of `del`."""
+    text = """
+class Changing:
+    kind: int = 0
+    def __init__(self): self.made = 1
+    def go(self, other):
+        self.plain = self.read = 1
+        self.more += 1
+        self.told: int = 1
+        self.left, (self.right, *self.rest) = other
+        for self.item in other: pass
+        with other as self.opened: pass
+        del self.gone
+        self.held[0] = self.held.inner = other.own = self.made
+"""
+    (found,) = ast.parse(text).body
+    assert isinstance(found, ast.ClassDef)
+    assert changing(found) == {"plain", "read", "more", "told", "left", "right", "rest", "item", "opened", "gone"}
+
+
+def test_classes_change_little() -> None:
+    kinds = [node for path in MODULES.values() for node in ast.walk(ast.parse(path.read_text()))]
+    numbers = {kind.name: len(changing(kind)) for kind in kinds if isinstance(kind, ast.ClassDef)}
+    assert max(numbers.values()) > 1
+    assert not {name: number for name, number in numbers.items() if number > MOST_THAT_CHANGES}

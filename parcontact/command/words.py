@@ -1,17 +1,16 @@
-"""What the words of a command line mean: verbs, options and their values."""
+"""What the words of a command line mean: verbs and their options."""
 
 from __future__ import annotations
 
 import argparse
 import difflib
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 from .. import __version__
 from ..errors import InputError
-from . import guides, ranks, verbs
+from . import guides, ranks, values, verbs
 
 VERBS = (
     *("run", "steady", "check", "plan", "theory", "fit", "surface", "study", "info", "plot", "report", "doctor"),
@@ -84,9 +83,9 @@ def _parser() -> argparse.ArgumentParser:
         "stop after the first step that reaches the time T [s] of the history; one that ends before goes on with its "
         "last stage"
     )
-    run.add_argument("--until", metavar="T", type=_seconds, help=text)
+    run.add_argument("--until", metavar="T", type=values.seconds, help=text)
     text = "stop early, with a checkpoint, to end within this wall time"
-    run.add_argument("--wall", metavar="HH:MM:SS", type=_wall, help=text)
+    run.add_argument("--wall", metavar="HH:MM:SS", type=values.wall, help=text)
     run.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     run.set_defaults(act=verbs.run)
 
@@ -94,9 +93,9 @@ def _parser() -> argparse.ArgumentParser:
     _job_arguments(steady)
     for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
         text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
-        steady.add_argument(f"--{name}", metavar="A:B:N", type=_values, default=(), help=text)
+        steady.add_argument(f"--{name}", metavar="A:B:N", type=values.numbers, default=(), help=text)
     text = "temperatures [deg C], T,T,... (negative ones first: --temperatures=-20,0); the material needs a shift"
-    steady.add_argument("--temperatures", metavar="T,...", type=_degrees, default=(), help=text)
+    steady.add_argument("--temperatures", metavar="T,...", type=values.degrees, default=(), help=text)
     text = "go on with the points that lack (auto, the default), or start afresh and replace what is there (never)"
     steady.add_argument("--restart", metavar="auto|never", choices=("auto", "never"), default="auto", help=text)
     steady.add_argument("--quiet", action="store_true", help="print only warnings and errors")
@@ -109,19 +108,20 @@ def _parser() -> argparse.ArgumentParser:
     plan = found.add_parser("plan", help="say what a job will do, and what it costs on so many ranks; writes nothing")
     _job_arguments(plan)
     text = "numbers of ranks, N,N,... (default: 1 and as many as there are cores here, or as many as plan)"
-    plan.add_argument("--ranks", metavar="N,...", type=_counts, default=(), help=text)
-    plan.add_argument("--seconds", metavar="T", type=_seconds, default=10.0, help="for how long the job is tried [s]")
-    plan.add_argument("--cores", metavar="N", type=_count, help="cores of a node of the machine that it is for")
+    plan.add_argument("--ranks", metavar="N,...", type=values.counts, default=(), help=text)
+    text = "for how long the job is tried [s]"
+    plan.add_argument("--seconds", metavar="T", type=values.seconds, default=10.0, help=text)
+    plan.add_argument("--cores", metavar="N", type=values.count, help="cores of a node of the machine that it is for")
     text = "of that machine's network: seconds of a message, bytes per second of a node (default: 2e-6,12.5e9)"
-    plan.add_argument("--network", metavar="ALPHA,BETA", type=_network, help=text)
-    plan.add_argument("--sample", type=Path, help=argparse.SUPPRESS)  # by which a plan starts others
-    plan.add_argument("--sample-points", type=_counts, default=(), help=argparse.SUPPRESS)  # on the grid that it tried
+    plan.add_argument("--network", metavar="ALPHA,BETA", type=values.network, help=text)
+    plan.add_argument("--sample", type=Path, help=argparse.SUPPRESS)  # by which a plan starts others,
+    plan.add_argument("--sample-points", type=values.counts, default=(), help=argparse.SUPPRESS)  # on the same grid
     plan.set_defaults(act=verbs.plan)
 
     theory = found.add_parser("theory", help="say what Persson's theory predicts for a job, into theory.csv")
     _job_arguments(theory)
     text = "factor that corrects friction in partial contact, 0 to 1 (1: not at all; default: 0.45)"
-    theory.add_argument("--gamma", metavar="G", type=_share, default=0.45, help=text)
+    theory.add_argument("--gamma", metavar="G", type=values.share, default=0.45, help=text)
     text = "waves of the job's spectrum (continuum, the default), or those of the surface in its box (lattice)"
     theory.add_argument("--waves", choices=("continuum", "lattice"), default="continuum", help=text)
     theory.add_argument("--quiet", action="store_true", help="print only warnings and errors")
@@ -138,8 +138,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     fit.add_argument("--shift", metavar="LAW", default="wlf", help=text)
     text = "rms error of the logarithms of the moduli that is allowed beside the scatter of the data (default: 0.02)"
-    fit.add_argument("--error", metavar="E", type=_positive, default=0.02, help=text)
-    fit.add_argument("--poisson", metavar="NU", type=_poisson, default=0.5, help="Poisson's ratio (default: 0.5)")
+    fit.add_argument("--error", metavar="E", type=values.positive, default=0.02, help=text)
+    fit.add_argument("--poisson", metavar="NU", type=values.poisson, default=0.5, help="Poisson's ratio (default: 0.5)")
     fit.add_argument("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
     fit.set_defaults(act=verbs.fit)
 
@@ -176,130 +176,20 @@ def _parser() -> argparse.ArgumentParser:
 def _job_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("job", help="job file (YAML)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
-    parser.add_argument("--out", metavar="DIR", type=_directory, help="output directory")
-    parser.add_argument("--case", metavar="I", type=_natural, help="one case of the job's sweep, from 0 (default: all)")
+    parser.add_argument("--out", metavar="DIR", type=values.directory, help="output directory")
+    text = "one case of the job's sweep, from 0 (default: all)"
+    parser.add_argument("--case", metavar="I", type=values.natural, help=text)
 
 
 def _plot_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run or curve")
     parser.add_argument("--format", choices=("png", "pdf", "svg"), default="", help="default: that of --out, else png")
     text = "which panels, in this order: friction,area,approach,gap,pressure,load,energy,steady,maps (default: all)"
-    parser.add_argument("--panels", metavar="NAME,...", type=_names, default=(), help=text)
+    parser.add_argument("--panels", metavar="NAME,...", type=values.names, default=(), help=text)
     text = "what is along the x axis (default: as the job suggests)"
     parser.add_argument("--over", choices=("time", "distance", "velocity", "load"), default="", help=text)
-    parser.add_argument("--log", metavar="x,y", type=_names, default=(), help="logarithmic axes: x, y or x,y")
+    parser.add_argument("--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y or x,y")
     parser.add_argument("--compare", action="store_true", help="several directories in one picture, comparison.png")
     text = "a movie of this map over its saved instants instead (GIF): pressure, displacement, gap or height"
     parser.add_argument("--movie", metavar="FIELD", default="", help=text)
     parser.add_argument("--out", metavar="FILE", type=Path, help="the picture (default: picture.png in the directory)")
-
-
-# -- values -----------------------------------------------------------------------------------------------------------
-
-
-def _directory(text: str) -> str:
-    if not text:
-        raise argparse.ArgumentTypeError("must name a directory, got ''")
-    return str(Path.cwd() / text) if text.startswith("~") else text  # a shell has said all there is to say of homes
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a time [s] of zero or more, got {text!r}")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"must be positive whole numbers, got {text!r}")
-    return int(text)
-
-
-def _natural(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"must be a whole number of zero or more, got {text!r}")
-    return int(text)
-
-
-def _counts(text: str) -> tuple[int, ...]:
-    return tuple(_count(part) for part in text.split(","))
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(filter(None, (part.strip() for part in text.split(","))))
-
-
-def _network(text: str) -> tuple[float, float]:
-    values = _values(text)
-    if len(values) != 2 or min(values) <= 0.0:
-        raise argparse.ArgumentTypeError(f"must be seconds of a message and bytes per second, got {text!r}")
-    return values[0], values[1]
-
-
-def _positive(text: str) -> float:
-    with suppress(ValueError):
-        if 0.0 < float(text) < float("inf"):
-            return float(text)
-    raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}")
-
-
-def _poisson(text: str) -> float:
-    with suppress(ValueError):
-        if -1.0 < float(text) <= 0.5:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"must be a Poisson ratio above -1 and up to 0.5, got {text!r}")
-
-
-def _share(text: str) -> float:
-    with suppress(ValueError):
-        if 0.0 <= float(text) <= 1.0:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
-
-
-def wall_seconds(text: str) -> float:
-    """Seconds of [[HH:]MM:]SS, or with days in front as in Slurm, D-HH:MM:SS; 0 for other text."""
-    days, dash, rest = text.rpartition("-")
-    fields = rest.split(":")
-    try:
-        if len(fields) > 3:
-            return 0.0
-        seconds = sum(float(field) * 60.0**power for power, field in enumerate(reversed(fields)))
-        return seconds + (86400.0 * int(days) if dash else 0.0)
-    except ValueError:
-        return 0.0
-
-
-def _wall(text: str) -> float:
-    seconds = wall_seconds(text)
-    if not 0.0 < seconds < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a wall time HH:MM:SS, got {text!r}")
-    return seconds
-
-
-def _values(text: str) -> tuple[float, ...]:
-    """Numbers equally spaced in their logarithm, `first:last:count`, or a list `a,b,c`."""
-    try:
-        return _spaced(text) if ":" in text else tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be first:last:count or a list of numbers, got {text!r}") from None
-
-
-def _degrees(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a list of temperatures [deg C], got {text!r}") from None
-
-
-def _spaced(text: str) -> tuple[float, ...]:
-    from ..job import log_range
-
-    first, last, count = text.split(":")
-    if min(float(first), float(last)) <= 0.0:
-        reason = "is spaced equally in the logarithm, so it must begin and end above 0"
-        raise argparse.ArgumentTypeError(f"a range first:last:count {reason}, got {text!r}")
-    if int(count) < 2 and first != last:
-        raise argparse.ArgumentTypeError(f"a range first:last:count must have a count of 2 or more, got {text!r}")
-    return log_range(text)

@@ -10,7 +10,7 @@ from ..job import Case, Job
 from ..parallel.slab import Slab
 from ..record import sweep_table
 from . import watch
-from .runner import AGAIN, DONE
+from .journey import AGAIN, DONE
 
 FAILED = 1
 STOP = "stop"  # a file of this name in the directory of the sweep ends it after the case that runs
