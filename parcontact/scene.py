@@ -1,6 +1,7 @@
-"""From a job to what runs: the only place that makes effects, as `effects/decisions.py` decides from the job.
+"""From a job to what steps are made of: bodies, solver, energies, ledger and followers are made here and nowhere else.
 
-Each effect is one object handed to the march; an effect that a job does not call for is never made.
+What is made follows from the job alone, as `effects/decisions.py` decides; what a job does not call for is never made.
+Steady sliding takes the frame from here and brings a solver of its own.
 """
 
 from dataclasses import dataclass, field, replace
@@ -64,6 +65,10 @@ class Frame:
     @property
     def dtype(self) -> type[np.floating]:
         return np.dtype(self.job.numerics.map_type).type
+
+    def ledger(self) -> Ledger:
+        """A new one, with the shear of the interface if the job has one."""
+        return Ledger(self.slab, self.surface, self.units, interface_of(self.job))
 
 
 @dataclass
@@ -134,8 +139,7 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
     energy = _energy(base, solver, material) if decisions.energies(job).on else None
-    ledger = Ledger(slab, base.surface, base.units, interface_of(job))
-    scene = Scene(base, motion, branches, material, solver, ledger, energy, decisions.lasting(job).on)
+    scene = Scene(base, motion, branches, material, solver, base.ledger(), energy, decisions.lasting(job).on)
     scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
     return scene
 

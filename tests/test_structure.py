@@ -94,6 +94,35 @@ def test_theory_stands_alone() -> None:
     assert users - {"theory"} <= COMPARE
 
 
+MADE_BY = {  # which modules make objects of a kind
+    **{kind: {"scene"} for kind in ("AnyFraction", "WholeCells", "ElasticBody", "ElasticEnergy", "ZenerEnergy")},
+    **{kind: {"scene"} for kind in ("ElasticPressure", "AppliedInverse", "Ledger", "Frame", "Scene")},
+    "ZenerBody": {"scene", "physics.energy"},  # a second one follows A^-1 u
+    "ContactSolver": {"scene", "plan.machine"},  # and one of no job measures a machine
+    "HalfSpace": {"scene", "plan.machine", "plan.memory"},
+    "SteadySolver": {"steady_sliding.sliding"},
+    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample", "python.curves"},
+    "March": {"steady_sliding.start", "study.outcome"},
+}
+
+
+def makes(module: str) -> set[str]:
+    """The kinds of MADE_BY that a module calls, or chooses between to call one."""
+    nodes = list(ast.walk(ast.parse(MODULES[module].read_text())))
+    called = [node.func for node in nodes if isinstance(node, ast.Call)]
+    chosen = [choice for node in nodes if isinstance(node, ast.IfExp) for choice in (node.body, node.orelse)]
+    return {ast.unparse(name).split(".")[-1] for name in (*called, *chosen)} & MADE_BY.keys()
+
+
+def test_who_makes_what() -> None:
+    """What steps are made of is made in scene.py alone."""
+    found: dict[str, set[str]] = {kind: set() for kind in MADE_BY}
+    for module in MODULES:
+        for kind in makes(module):
+            found[kind].add(module)
+    assert found == MADE_BY
+
+
 LONGEST_FILE = 300  # lines: a file has one reason to change
 LONG = {"bench.py"}
 MOST_THAT_CHANGES = 10  # attributes of an object that a reader has to follow

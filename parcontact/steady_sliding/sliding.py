@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.interface import interface_of
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution, wavenumbers
-from ..physics.ledger import Ledger
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..scene import Frame
@@ -64,7 +62,7 @@ class SteadySliding:
 
     def __init__(self, base: Frame) -> None:
         self.base = base
-        self.ledger = Ledger(base.slab, base.surface, base.units, interface_of(base.job))
+        self.ledger = base.ledger()
         heights = base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype))
         finest, *coarser = nested.levels_of(base.slab, heights)
         self.levels = [Level(base.slab, base.fft, finest.heights)]
@@ -81,7 +79,7 @@ class SteadySliding:
         series = relaxation_of(job)
         scaled = Prony(self.base.prony.modulus_inf, self.base.prony.moduli, series.relaxation_times)
         self.base = replace(self.base, job=job, prony=scaled)
-        self.ledger = Ledger(self.base.slab, self.base.surface, self.base.units, interface_of(job))
+        self.ledger = self.base.ledger()
         self.temperature, self._slow = temperature, time_factor_of(job)
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
