@@ -8,7 +8,7 @@ from ..job import Job
 from ..parallel.slab import Slab
 from ..record import wisdom
 from ..steady_sliding.curve import request
-from . import machine, other_ranks, report, trial
+from . import machine, other_ranks, price, report, trial
 from .report import Costs
 from .sample import Sample, sample
 from .scaling import Machine, Scaling
@@ -68,6 +68,8 @@ def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) ->
     yield from report.steps(costs)
     yield ""
     yield from report.times(costs, wanted.ranks)
+    yield ""
+    yield from price.table(costs, wanted.ranks)
 
 
 def try_job(job: Job, slab: Slab, seconds: float, started: float, points: Sequence[int] = ()) -> Sample | None:

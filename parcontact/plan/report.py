@@ -83,8 +83,8 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     columns = [memory.holdings(job, count) for count in ranks]
     width = max(len(holding.what) for holding in columns[0])
     totals = [sum(holding.bytes for holding in column) for column in columns]
-    unit, size = _unit(max(totals))
-    yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f"{_ranks(count):>13}" for count in ranks)
+    unit, size = unit_of(max(totals))
+    yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f"{ranks_text(count):>13}" for count in ranks)
     for row in zip(*columns, strict=True):
         yield f"  {row[0].what:{width}}" + "".join(f"{holding.bytes / size:13.4g}" for holding in row)
     yield f"  {'in all':{width}}" + "".join(f"{total / size:13.4g}" for total in totals)
@@ -106,7 +106,7 @@ def steps(costs: Costs) -> Iterator[str]:
     for sample in samples:
         tried = sample.job.grid.points
         grid = "" if tried == costs.job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
-        where = f"on {_ranks(sample.ranks)}{grid}"
+        where = f"on {ranks_text(sample.ranks)}{grid}"
         yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s; the others are taken to be like them"
 
 
@@ -125,7 +125,7 @@ def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     """Seconds on some numbers of ranks, and where scaling ends; what other programs have disturbed is marked."""
     scaling = costs.scaling
     yield from _disturbance(scaling)
-    unit, size = _unit(max(costs.held(count) for count in ranks))
+    unit, size = unit_of(max(costs.held(count) for count in ranks))
     word = "step" if costs.job.history else "state"
     yield f"  ranks  most maps [{unit}]  resident [{unit}] {f'{word} [s]':>9}   messages   at work   whole run"
     for count in ranks:
@@ -134,9 +134,9 @@ def times(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
         mark = MARK if scaling.sample(count).disturbed else " "
         shares = f"{scaling.messages(count) / step:8.0%} {scaling.efficiency(count):9.0%}"
         memory_text = f"{held / size:13.4g} {resident / size:14.4g}"
-        yield f"{count:7d} {memory_text} {step:12.3g}{mark} {shares} {_duration(costs.whole(count)):>11}"
+        yield f"{count:7d} {memory_text} {step:12.3g}{mark} {shares} {duration_text(costs.whole(count)):>11}"
     mark = MARK if any(sample.disturbed for sample in scaling.samples) else ""
-    end = f"{_ranks(scaling.end)}{mark}"
+    end = f"{ranks_text(scaling.end)}{mark}"
     yield f"scaling ends at {end}: with twice as many they would work for less than half of the time"
     yield from _assumptions(costs, max(ranks))
 
@@ -145,7 +145,7 @@ def _disturbance(scaling: Scaling) -> Iterator[str]:
     """What other programs have taken of the machine, if it matters."""
     disturbed = [sample for sample in scaling.samples if sample.disturbed]
     if disturbed:
-        shares = ", ".join(f"{sample.share:.0%} of a core each on {_ranks(sample.ranks)}" for sample in disturbed)
+        shares = ", ".join(f"{sample.share:.0%} of a core each on {ranks_text(sample.ranks)}" for sample in disturbed)
         load = f"load {machine.load():.2g} on {machine.cores()} cores"
         yield (
             f"warning: this machine is busy with other programs ({load}), and the trial had only {shares}; "
@@ -157,7 +157,7 @@ def _assumptions(costs: Costs, many: int) -> Iterator[str]:
     scaling, nodes = costs.scaling, costs.scaling.machine
     yield (
         f"assumed: {scaling.sample(many).starting:.2g} s to start and {scaling.building(many):.2g} s for the scene on "
-        f"{_ranks(many)}, "
+        f"{ranks_text(many)}, "
         f"{costs.write_rate / MEGA:.3g} MB/s to disk; nodes of {nodes.cores} cores, {nodes.crowding:.2f} times "
         f"slower when all work; {1e6 * nodes.per_call:.2g} us per operator call on any number of ranks"
     )
@@ -167,21 +167,23 @@ def _assumptions(costs: Costs, many: int) -> Iterator[str]:
     )
 
 
-def _unit(most: float) -> tuple[str, float]:
+def unit_of(most: float) -> tuple[str, float]:
     """In which to tell of so many bytes and less: its name and its bytes."""
     return ("GB", 1e9) if most >= LARGE else ("MB", 1e6)
 
 
 def _bytes(count: float) -> str:
-    unit, size = _unit(count)
+    unit, size = unit_of(count)
     return f"{count / size:.4g} {unit}"
 
 
-def _ranks(count: int) -> str:
+def ranks_text(count: int) -> str:
+    """So many ranks, in words."""
     return "1 rank" if count == 1 else f"{count} ranks"
 
 
-def _duration(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
+    """A time as people tell it."""
     if seconds < 600.0:
         return f"{seconds:.3g} s"
     return time.strftime("%Hh%Mm", time.gmtime(seconds)) if seconds < 86400 else f"{seconds / 86400:.3g} days"

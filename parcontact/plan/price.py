@@ -1,0 +1,238 @@
+"""What accuracy costs: the mesh, the steps and the time of a job at other accuracies, from a trial of it at its own.
+
+Nothing more is tried. The mesh has the cells per shortest wave that the accuracy needs (`job.advice.cells_per_wave`);
+where no wave is given the part of the error that the mesh makes, which the trial saw, goes with the power of the cell
+that the budget knows (`physics.budget`). Heights from a file stay on their mesh. The part that time steps make, seen
+too, goes with the second power of the step for the exponential integrator, with the first for backward Euler, and may
+be TIME_SHARE of the accuracy; steps of a slide are a cell, a half, a quarter, ... as it needs. A step has as many
+operator calls as seen, times what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in
+proportion to N log N.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..job import GeometricStep, HeightFile, Job, Rough, Stage
+from ..job.advice import STEPS_PER_WAVE, cells_per_wave
+from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
+from ..job.table import plain
+from ..physics.budget import SPOTS_ORDER
+from .report import MARK, Costs, duration_text, ranks_text, unit_of
+from .sample import Sample, StageCost
+from .scaling import Scaling
+
+ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
+TIME_SHARE = 0.5  # of the accuracy, for the time steps; the rest is the solver's
+EDGE_ORDER = 1.0  # of the cell, in which the error of the contact area falls
+CALLS_PER_DECADE = 1.5  # for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
+BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
+LONGER, COARSER, FINER = 4.0, 8.0, 16.0  # times the own steps, and the own cells, at most: no trial tells of more
+MULTIPLE = 16  # of which points along a side are, so that there are coarser grids to start from
+SAME = 1e-9  # relative: numbers this close are the same
+FAST = (2, 3, 5)  # factors of the lengths of fast transforms
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A job at one accuracy, and what it costs; by how much the mesh makes the contact area wrong."""
+
+    accuracy: float
+    costs: Costs
+    area: float
+
+    @property
+    def job(self) -> Job:
+        return self.costs.job
+
+    @property
+    def steps(self) -> int:
+        return self.costs.scaling.steps
+
+
+def offers(costs: Costs) -> list[Offer]:
+    """The job at the accuracies of the table."""
+    return [offer(costs, accuracy) for accuracy in ACCURACIES]
+
+
+def offer(costs: Costs, accuracy: float) -> Offer:
+    """The job at one accuracy."""
+    own, scaling = costs.job, costs.scaling
+    job = _on_mesh(own, accuracy, mesh_for(own, scaling.samples[0], accuracy))
+    samples = tuple(_scaled(sample, own, job) for sample in scaling.samples)
+    return Offer(accuracy, Costs(Scaling(job, samples, scaling.machine), costs.write_rate), _area_error(costs, job))
+
+
+def _area_error(costs: Costs, job: Job) -> float:
+    """The part of the error of the contact area that the mesh makes, in the first order of the cell."""
+    sample = costs.scaling.samples[0]
+    return (mesh_error(sample, "area") or 0.0) * (sample.job.grid.nx / job.grid.nx) ** EDGE_ORDER
+
+
+# -- mesh --------------------------------------------------------------------------------------------------------------
+
+
+def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
+    """Points along x and y."""
+    factor = _finer(job, sample, accuracy)
+    nx, ny = (1 if n == 1 else n if factor == 1.0 else fast_length(n * factor) for n in job.grid.points)
+    return nx, ny
+
+
+def _finer(job: Job, sample: Sample, accuracy: float) -> float:
+    """How many times the points of the job; 1 where its surface has one mesh only, or the mesh makes no error."""
+    if any(isinstance(shape, HeightFile) for shape in job.surface):
+        return 1.0
+    error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
+    of_waves = cells_per_wave(accuracy) * max(job.grid.dx, job.grid.dy) / waves if waves else 0.0
+    if waves and error is not None:
+        return of_waves
+    if error is None:
+        error, order = mesh_error(sample, "area") or 0.0, EDGE_ORDER
+    factor = (error / accuracy) ** (1.0 / order) * sample.job.grid.nx / job.grid.nx
+    return max(of_waves, min(max(factor, 1.0 / COARSER), FINER)) if factor else of_waves or 1.0
+
+
+def mesh_error(sample: Sample, name: str) -> float | None:
+    """The part of the error of friction or area that the mesh of a sample makes; None where there is none."""
+    weight = sample.total(f"{name} weight")
+    return sample.total(f"{name} mesh error") / weight if weight else None
+
+
+def shortest_wave(job: Job) -> float | None:
+    """Of the rough surfaces of a job [m]."""
+    return min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None)
+
+
+def fast_length(least: float) -> int:
+    """The next multiple of MULTIPLE that transforms like."""
+    count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME)))
+    while _without_fast_factors(count) > 1:
+        count += 1
+    return MULTIPLE * count
+
+
+def _without_fast_factors(count: int) -> int:
+    for factor in FAST:
+        while count % factor == 0:
+            count //= factor
+    return count
+
+
+def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
+    """The job with the numerics of an accuracy; on its own mesh if its surface cannot be put on another."""
+    data: dict[str, Any] = plain(job)
+    shares = {"tolerance": TOLERANCE_SHARE * accuracy, "branch_error": BRANCH_SHARE * accuracy}
+    data["numerics"] |= {"accuracy": accuracy, **shares}
+    try:
+        return Job.model_validate({**data, "grid": {**data["grid"], "points": list(points)}})
+    except ValidationError:
+        return Job.model_validate(data)
+
+
+# -- steps and calls ---------------------------------------------------------------------------------------------------
+
+
+def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
+    """A sample of the own job as one of the job at another accuracy."""
+    times = _calls(own, job)
+    if not own.history:
+        return replace(sample, stages=tuple(_with_calls(stage, times) for stage in sample.stages))
+    order = 2.0 if own.numerics.integrator == "exponential" else 1.0
+    waves = (shortest_wave(sample.job) or 1.0) / (shortest_wave(own) or 1.0)
+    stages = []
+    for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), own.timeline().spans, strict=True):
+        error = time_error(cost, sample) / (TIME_SHARE * job.numerics.accuracy)
+        more = max(error ** (1.0 / order) * tried * waves, 1.0 / LONGER)
+        count, between = steps_of(span.stage, cost.steps - span.jumps, more, own, job)
+        stages.append(_with_calls(replace(cost, steps=count + span.jumps), times * between))
+    return replace(sample, stages=tuple(stages))
+
+
+def _tried_counts(sample: Sample, own: Job) -> Iterator[float]:
+    """Steps of each stage on the grid of the sample, over those on the own one."""
+    for tried, span in zip(sample.job.timeline().spans, own.timeline().spans, strict=True):
+        yield tried.count / max(span.count, 1)
+
+
+def time_error(cost: StageCost, sample: Sample) -> float:
+    """The part that time steps make, in a stage, or in all where it was not tried."""
+    for total in (lambda name: cost.sums.get(name, 0.0), sample.total):
+        for name in ("friction", "area"):
+            if weight := total(f"{name} weight"):
+                return float(total(f"{name} time error") / weight)
+    return 0.0
+
+
+def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple[int, float]:
+    """How many steps a stage has instead of its own `count` that last if these are to be `more` times as many, and how
+    many times the calls one of them takes."""
+    if count == 0:
+        return 0, 1.0
+    longest = stage.seconds / (more * count)
+    if stage.speed and (wave := shortest_wave(own)):
+        longest = min(longest, wave / STEPS_PER_WAVE / stage.speed)
+    if not stage.speed or isinstance(stage.time_step, GeometricStep):
+        return math.ceil(stage.seconds / longest * (1.0 - SAME)), 1.0
+    way, cell = stage.seconds * stage.speed, max(job.grid.dx, job.grid.dy)
+    cells = min(1.0, 2.0 ** math.floor(math.log2(longest * stage.speed / cell) + SAME))
+    whole = way >= count * max(own.grid.dx, own.grid.dy) * (1.0 - SAME)
+    return math.ceil(way / (cells * cell) * (1.0 - SAME)), BETWEEN_CELLS if cells < 1.0 and whole else 1.0
+
+
+def _calls(own: Job, job: Job) -> float:
+    """How many times as many calls a solve to the tolerance of a job takes."""
+    return float(CALLS_PER_DECADE ** math.log10(own.numerics.tolerance / job.numerics.tolerance))
+
+
+def _with_calls(cost: StageCost, times: float) -> StageCost:
+    return replace(cost, sums={name: value * times for name, value in cost.sums.items()})
+
+
+# -- text --------------------------------------------------------------------------------------------------------------
+
+
+def table(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
+    """Mesh, steps, precision, memory and time of each accuracy on some numbers of ranks, and how far to trust them."""
+    own = Offer(costs.job.numerics.accuracy, costs, _area_error(costs, costs.job))
+    rows = [("this job", own), *((_per_cent(one.accuracy), one) for one in offers(costs))]
+    unit, size = unit_of(max(each.costs.held(1) for _, each in rows))
+    slides = costs.scaling.samples[0].total("friction weight") > 0.0
+    yield f"what accuracy costs, in {'friction; the contact area is then within' if slides else 'contact area'}"
+    heads = (("area", 9), ("mesh", 14), ("steps" if costs.job.history else "states", 9))
+    head = "".join(f"{text:>{width}}" for text, width in heads if slides or text != "area")
+    yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11}" + "".join(f"{ranks_text(n):>11}" for n in ranks)
+    for name, each in rows:
+        grid, held = each.job.grid, each.costs.held(1) / size
+        area = f"{_per_cent(each.area):>9}" if slides else ""
+        numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.steps:9d}  {each.job.numerics.precision:9}{held:11.4g}"
+        yield f"  {name:9}{area}{numbers}" + "".join(f"{_time(each.costs, count):>11}" for count in ranks)
+    yield from _basis(costs)
+
+
+def _per_cent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _time(costs: Costs, ranks: int) -> str:
+    """Of the whole run, marked where other programs have disturbed the trial."""
+    return duration_text(costs.whole(ranks)) + MARK * costs.scaling.sample(ranks).disturbed
+
+
+def _basis(costs: Costs) -> Iterator[str]:
+    """What was measured, and what is scaled from it."""
+    sample = costs.scaling.samples[0]
+    calls = sample.total("operator") / max(sample.steps, 1)
+    time, mesh = time_error(StageCost(0), sample), mesh_error(sample, "friction") or mesh_error(sample, "area") or 0.0
+    points = " x ".join(map(str, sample.job.grid.points))
+    yield (
+        f"measured on {points} points: times, {calls:.3g} operator calls a step, errors of {_per_cent(time)} by time "
+        f"steps and {_per_cent(mesh)} by the mesh"
+    )
+    yield (
+        "scaled: cells by what the shortest wave or a contact spot needs, steps by the order of the integrator, "
+        f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time by N log N; maps are those on 1 rank"
+    )

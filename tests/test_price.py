@@ -1,0 +1,153 @@
+"""What other accuracies cost, scaled from a trial: meshes, steps and calls, also against runs at what is offered."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import marched
+from mpi4py import MPI
+
+from parcontact.job import Job
+from parcontact.job.advice import cells_per_wave
+from parcontact.job.table import plain
+from parcontact.parallel.slab import Slab
+from parcontact.physics.budget import SPOTS_ORDER, Summary
+from parcontact.plan import price
+from parcontact.plan.report import Costs
+from parcontact.plan.sample import Sample, StageCost, sample
+from parcontact.plan.scaling import Machine, Scaling
+
+Json = dict[str, Any]
+WAVE = 1.25e-4
+ROUGH: Json = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": WAVE, "rms_slope": 0.02}
+SOLID = {"model": "zener", "modulus_inf": 0.3e6, "branches": [{"modulus": 2.5e6, "relaxation_time": 1e-3}]}
+SLIDE = {"pressure": 1e4, "velocity": 0.1, "distance": 1e-3, "cells_per_step": 1}
+MACHINE = Machine(cores=8, crowding=1.5, per_call=0.0, copy_rate=1e10)
+
+
+def job(**changes: Any) -> Job:
+    grid = {"points": 64, "size": 1e-3}
+    return Job.model_validate({"grid": grid, "surface": ROUGH, "material": SOLID, "history": [SLIDE], **changes})
+
+
+def costs(planned: Job, time: float = 0.0, mesh: float = 0.0, of: str = "friction", calls: float = 10.0) -> Costs:
+    """As if a trial of all steps had seen such errors; a step takes 1 s and some calls."""
+    stages = []
+    for span in planned.timeline().spans:
+        n = span.jumps + span.count
+        sums = {"seconds": n, "operator": n * calls, f"{of} weight": n, f"{of} time error": n * time}
+        stages.append(StageCost(n, n, float(n), {**sums, f"{of} mesh error": n * mesh}))
+    seen = Sample(planned, 1, 0.0, 0.0, 0.0, 0, tuple(stages))
+    return Costs(Scaling.of(planned, [seen], MACHINE), 1e30)
+
+
+def test_meshes_have_the_cells_that_waves_need() -> None:
+    """8 of them in the box: those of an accuracy of 1 % are 8 cells each, the least multiple of 16 that is not less."""
+    found = price.offers(costs(job(), mesh=0.01))
+    assert [each.job.grid.nx for each in found] == [48, 64, 128, 192]
+    for each in found:
+        assert each.job.grid.nx >= 8 * cells_per_wave(each.accuracy)
+
+
+def test_meshes_of_spots_go_by_their_error() -> None:
+    """A sphere whose mesh makes eight times the error asked for; half of it with as many cells less."""
+    ball = job(surface={"shape": "sphere", "radius": 1e-2})
+    for error in (0.08, 0.005):
+        points = price.offer(costs(ball, mesh=error), 0.01).job.grid.nx
+        least = 64 * (error / 0.01) ** (1 / SPOTS_ORDER)
+        assert least <= points < least + 32
+    assert price.offer(costs(ball, mesh=0.02, of="area"), 0.01).job.grid.nx == 128  # at rest, in the first order
+
+
+def test_heights_from_a_file_stay(tmp_path: Any) -> None:
+    np.save(tmp_path / "road.npy", np.zeros((64, 64)))
+    given = job(surface={"shape": "file", "path": str(tmp_path / "road.npy")})
+    assert all(each.job.grid == given.grid for each in price.offers(costs(given, mesh=0.1)))
+
+
+@pytest.mark.parametrize("count", [1, 16, 17, 100, 416, 1000])
+def test_fast_lengths(count: int) -> None:
+    found = price.fast_length(count)
+    assert found >= count
+    assert found % price.MULTIPLE == 0
+    assert max(p for p in range(1, found + 1) if found % p == 0 and all(p % q for q in range(2, p))) <= 5
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2), ("backward-euler", 1)])
+def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: int) -> None:
+    """On the own mesh: nine times the error that is allowed. Steps of a slide are whole cells, halves, quarters, ..."""
+    stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-5}
+    planned = job(history=[stage, SLIDE], numerics={"integrator": integrator})
+    found = price.offer(costs(planned, time=9 * price.TIME_SHARE * 0.01), 0.01)
+    cells = {2: 4, 1: 16}[order]  # steps of a cell: the power of two not below 3, or 9
+    steps = [stage.steps for stage in found.costs.scaling.samples[0].stages]
+    assert steps == [1 + {2: 300, 1: 900}[order], cells * 64]
+
+
+def test_steps_are_never_longer_than_a_cell() -> None:
+    """However accurate they are; half the mesh needs half as many."""
+    found = price.offer(costs(job(), time=1e-9), 0.05)
+    assert (found.job.grid.nx, found.steps) == (48, 1 + 48)
+
+
+def test_single_solves_stay() -> None:
+    found = price.offer(costs(job(history=[{"pressure": 1e4}, {"pressure": 2e4}]), of="area"), 1e-3)
+    assert found.steps == 2
+
+
+def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
+    """1.5 times for a tenth; steps of half a cell 1.4 times more; time with N log N."""
+    one, ten = (price.offer(costs(job(), time=0.0), accuracy) for accuracy in (1e-2, 1e-3))
+    seconds = [each.costs.marching(1) / each.steps for each in (one, ten)]
+    assert seconds[0] == pytest.approx(1.0)
+    assert seconds[1] == pytest.approx(1.5 * (192**2 * math.log(192**2 + 1)) / (64**2 * math.log(64**2 + 1)))
+    halves = price.offer(costs(job(), time=4 * price.TIME_SHARE * 0.01), 1e-2)
+    assert halves.costs.marching(1) / halves.steps == pytest.approx(price.BETWEEN_CELLS)
+
+
+def test_from_a_coarser_grid() -> None:
+    """What was tried on twice the cell, and so twice the step, has four times the error of the own steps."""
+    own = job(grid={"points": 128, "size": 1e-3})
+    tried = costs(job(), time=4 * price.TIME_SHARE * 0.01).scaling.samples[0]
+    seen = Costs(Scaling.of(own, [tried], MACHINE), 1e30)
+    assert seen.scaling.steps == 1 + 128
+    assert price.offer(seen, 0.01).steps == 1 + 128  # on 64 points: halves of a cell
+
+
+@pytest.mark.parametrize("accuracy", [0.05, 0.01])
+def test_what_is_offered_keeps_its_promise(accuracy: float) -> None:
+    """The run at the mesh, steps and tolerance of the offer: its own budget is within the accuracy for the mesh, and
+    for solver and steps together; it takes as many steps, and as many calls to a factor of 1.5 (trials of small jobs
+    differ by that from mesh to mesh)."""
+    planned = job()
+    seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
+    found = price.offer(Costs(Scaling.of(planned, [seen], MACHINE), 1e30), accuracy)
+    stage = {**{k: v for k, v in SLIDE.items() if k != "cells_per_step"}, "time_step": 0.01 / (found.steps - 1)}
+    _, rows = marched(Job.model_validate({**plain(found.job), "history": [stage]}))
+    budget, calls = Summary(), sum(row.operator_calls for row in rows)
+    for before, row in pairwise(rows):
+        assert row.errors is not None
+        budget.add(row.errors, row.measures.friction, row.time - before.time)
+    assert budget.friction is not None
+    assert len(rows) == 1 + found.steps  # the initial state, and the jump of the load among the steps
+    assert budget.friction.mesh <= accuracy
+    assert budget.friction.solver + budget.friction.time <= accuracy
+    assert budget.area is not None
+    assert budget.area.mesh == pytest.approx(found.area, rel=0.3)  # of the first order but for the waves' own corners
+    assert 1 / 1.5 < calls / found.costs.scaling.samples[0].total("operator") < 1.5
+
+
+def test_the_table() -> None:
+    """As a user reads it: one line for the job, one for each accuracy; a disturbed trial is marked."""
+    seen = costs(job(), time=1e-3, mesh=8.8e-3)
+    head, names, own, *rows = list(price.table(seen, [1, 2]))[:7]
+    assert "friction" in head
+    assert " ".join(names.split()) == "accuracy area mesh steps precision maps [MB] 1 rank 2 ranks"
+    assert " ".join(own.split()).startswith("this job 0 % 64 x 64 65 double")
+    assert [row.split()[0] for row in rows] == ["5", "1", "0.3", "0.1"]
+    assert not any("*" in row for row in rows)
+    busy = Costs(replace(seen.scaling, samples=(replace(seen.scaling.samples[0], share=0.5),)), 1e30)
+    assert all("*" in row for row in list(price.table(busy, [1]))[2:7])
