@@ -16,7 +16,8 @@ from mpi4py import MPI
 from parcontact import job
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.record import checkpoint, marker
+from parcontact.record import checkpoint, info, marker, measures
+from parcontact.record.provenance import read_budget
 from parcontact.run import runner
 
 ROUGH = {
@@ -163,6 +164,42 @@ def test_cut_anywhere(bench: Bench, name: str) -> None:
 def test_cut_after_steady_start(bench: Bench) -> None:
     data = bench.job("viscoelastic", history=[SLIDE, FASTER], output={"energy": False, "branch_dissipation": False})
     cut_anywhere(bench, data | {"initial": {"state": "steady", "velocity": 0.2, "pressure": 1e5}})
+
+
+def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:
+    """Also after a restart: what the files and the log say are the means of all rows of measures.csv."""
+    data = bench.job("viscoelastic")
+    whole = bench.where / "whole"
+    assert bench.run(data, whole) == 0
+    part = cut(bench, whole, 9)
+    assert bench.run(data, part) == 0
+    table = measures.read(part / "measures.csv")
+    dt, friction, moved, errors = (
+        np.array(column)[1:]
+        for column in (
+            np.diff(table["time"], prepend=0.0),
+            table["friction"],
+            table["distance"],
+            table["error_friction"],
+        )
+    )
+    slides = moved > 0.0
+    weight = (dt * friction)[slides]
+    for out in (whole, part):
+        with h5py.File(out / "fields.h5") as file:
+            budget = read_budget(file)
+        assert budget["accuracy"] == 0.01
+        assert budget["friction"]["total"] == pytest.approx((weight @ errors[slides]) / weight.sum(), rel=1e-12)
+        area = np.array(table["error_area"])[1:]
+        assert budget["contact_area_corrected"]["total"] == pytest.approx((dt @ area) / dt.sum(), rel=1e-12)
+        said = f"friction is wrong by about {100 * budget['friction']['total']:.2g} % ("
+        assert said in (out / "run.log").read_text().splitlines()[-3]
+        assert (
+            f"error of friction: solver {100 * budget['friction']['solver']:.2g} %"
+            in info.describe(out / "fields.h5")[0]
+        )
+        with h5py.File(max(out.glob("checkpoint/*.h5"), key=lambda path: path.stat().st_mtime)) as file:
+            assert read_budget(file) == budget
 
 
 # -- other settings ---------------------------------------------------------------------------------------------------

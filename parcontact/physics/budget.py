@@ -17,7 +17,11 @@ wrong with pressures then counts more, by about the root of the ratio.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import asdict, astuple, dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .measures import SIDE
 
@@ -27,6 +31,7 @@ EULER_FRICTION, EULER_AREA = 0.7, 0.4  # times its root
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 EDGES, STRAIGHT_EDGES = 0.25, 2.0  # of the correction of the area; along edges that follow the grid
+AT_ONCE = 1e-200  # s: what a step weighs that lasts no time
 ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
 
 
@@ -123,32 +128,45 @@ def _area(known: Known, seen: Seen) -> Parts:
 
 
 class Summary:
-    """Budgets of many steps, each for as long as it lasted; friction also in proportion to it."""
+    """Budgets of many steps, each for as long as it lasted; friction also in proportion to it.
 
-    def __init__(self) -> None:
-        self._friction, self._area = [0.0] * len(NAMES), [0.0] * len(NAMES)
-        self._weights = [0.0, 0.0]
+    Steps that last no time count only where none does. `numbers` are its sums, shape (10,), from which another begins.
+    """
+
+    def __init__(self, numbers: NDArray[np.float64] | None = None) -> None:
+        self._sums = np.zeros((2, 1 + len(NAMES))) if numbers is None else numbers.reshape(2, 1 + len(NAMES)).copy()
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """The weight, and the weighted sum of each part, of friction and then of area."""
+        return self._sums.ravel()
 
     def add(self, budget: ErrorBudget, friction: float, seconds: float) -> None:
         """One step."""
-        for parts, sums, index, weight in (
-            (budget.friction, self._friction, 0, friction * seconds),
-            (budget.area, self._area, 1, seconds),
-        ):
+        seconds = seconds or AT_ONCE
+        for sums, parts, weight in zip(self._sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
-                for k, name in enumerate(NAMES):
-                    sums[k] += weight * getattr(parts, name)
-                self._weights[index] += weight
+                sums += weight * seconds * np.array([1.0, *astuple(parts)])
 
     @property
     def friction(self) -> Parts | None:
         """The mean over time, None where nothing has slid."""
-        return Parts(*(value / self._weights[0] for value in self._friction)) if self._weights[0] > 0.0 else None
+        return self._mean(0)
 
     @property
     def area(self) -> Parts | None:
-        """The mean over time, None where no step has lasted."""
-        return Parts(*(value / self._weights[1] for value in self._area)) if self._weights[1] > 0.0 else None
+        """The mean over time, None where nothing has touched."""
+        return self._mean(1)
+
+    def _mean(self, index: int) -> Parts | None:
+        weight, *sums = self._sums[index].tolist()
+        return Parts(*(value / weight for value in sums)) if weight > 0.0 else None
+
+    def facts(self, accuracy: float) -> dict[str, Any]:
+        """As plain data: the accuracy that was asked for, and the relative errors by part, and in all."""
+        found = {"friction": self.friction, "contact_area_corrected": self.area}
+        parts = {name: asdict(each) | {"total": each.total} for name, each in found.items() if each is not None}
+        return {"accuracy": accuracy, **parts}
 
     def lines(self, accuracy: float) -> list[str]:
         """Sentences for run.log, with what to change where more is wrong than `accuracy` allows."""

@@ -1,7 +1,7 @@
 """What a file of a run holds, and whether it is sound."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 from . import checkpoint, fields, hdf5
-from .provenance import Link, read_chain
+from .provenance import Link, read_budget, read_chain
 
 SHOWN = 20  # numbers of one name at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
@@ -72,7 +72,7 @@ def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
     layout = fields.Layout(file)
     saved = [index for index, time in enumerate(layout.times) if not np.isnan(time)]
     lines = [f"{path}: {', '.join(layout.names)} on {len(file['x'])} x {len(file['y'])} points"]
-    lines += _runs(read_chain(file))
+    lines += [*_runs(read_chain(file)), *_budget(read_budget(file))]
     lines.append(f"  {len(saved)} of {len(layout.steps)} instants saved")
     if saved:
         first, last = saved[0], saved[-1]
@@ -89,6 +89,13 @@ def _runs(chain: tuple[Link, ...]) -> list[str]:
         f"{'s' if link.ranks > 1 else ''}, {link.program}, {link.started}"
         for link in chain
     ]
+
+
+def _budget(budget: Mapping[str, Any]) -> Iterator[str]:
+    """How wrong friction and area are, by part."""
+    for name, parts in budget.items():
+        if isinstance(parts, dict):
+            yield f"  error of {name}: " + ", ".join(f"{part} {100 * value:.2g} %" for part, value in parts.items())
 
 
 def _short(value: NDArray[Any]) -> str:

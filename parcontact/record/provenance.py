@@ -2,10 +2,11 @@
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from importlib import metadata
+from typing import Any
 
 import h5py
 import numpy as np
@@ -21,8 +22,10 @@ REFERENCES = (
     "A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377 (pressure constant on a cell)",
     "M. Frigo, S. G. Johnson, Proc. IEEE 93 (2005) 216 (FFTW)",
 )
+BUDGET = "error_budget"
 LEFT_OUT = "(too long to be kept)"
 WARNING_BYTES = 4_000
+BUDGET_BYTES = 1_000
 CHAIN_BYTES = 50_000  # of the text of a chain: an attribute of fixed size can be renewed in place
 
 
@@ -45,20 +48,23 @@ class Link:
 @dataclass(frozen=True)
 class Provenance:
     """What a file is to say of its origin: the chain of runs up to the present one, the seeds of its roughness, the
-    file that its job includes, and the warnings about its scene."""
+    file that its job includes, the warnings about its scene, and the error budget of the run so far, as plain data."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
     included: str = ""
     warnings: tuple[str, ...] = ()
+    budget: Mapping[str, Any] = field(default_factory=dict)
 
     def write(self, file: h5py.File) -> None:
-        """Attributes of the file: program, resolved job (YAML), chain (JSON), ranks, seeds, libraries, references."""
+        """Attributes of the file: program, resolved job (YAML), chain (JSON), error budget (JSON), ranks, seeds,
+        libraries, references."""
         now = self.chain[-1]
         file.attrs["program"] = now.program
         file.attrs["job"] = now.job
         file.attrs.create("chain", _fixed(self.chain, now.job))
         file.attrs.create("warnings", self._warnings)
+        file.attrs.create(BUDGET, self._budget)
         file.attrs["ranks"] = now.ranks
         small = all(seed < 2**63 for seed in self.seeds)
         file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64) if small else [str(seed) for seed in self.seeds]
@@ -70,15 +76,27 @@ class Provenance:
         file.attrs["references"] = "\n".join(REFERENCES)
 
     def renew(self, file: h5py.File) -> None:
-        """Put the longer chain into a file that has one; nothing else in it changes its place."""
+        """Put the longer chain, and what else has changed, into a file that has one; nothing changes its place."""
         file.attrs.modify("chain", _fixed(self.chain, file.attrs["job"]))
         if "warnings" in file.attrs:
             file.attrs.modify("warnings", self._warnings)
+        if BUDGET in file.attrs:
+            file.attrs.modify(BUDGET, self._budget)
 
     @property
     def _warnings(self) -> NDArray[np.bytes_]:
         """One a line, of fixed size: it can be renewed in place."""
         return np.array("\n".join(self.warnings).encode()[:WARNING_BYTES], dtype=f"S{WARNING_BYTES}")
+
+    @property
+    def _budget(self) -> NDArray[np.bytes_]:
+        """As JSON, of fixed size too."""
+        return np.array(json.dumps(self.budget).encode(), dtype=f"S{BUDGET_BYTES}")
+
+
+def read_budget(file: h5py.File) -> dict[str, Any]:
+    """The error budget of the run so far, of friction and area by part (relative); empty where there is none."""
+    return dict(json.loads(bytes(file.attrs.get(BUDGET, b"{}"))))
 
 
 def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:

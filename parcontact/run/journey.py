@@ -10,13 +10,12 @@ from ..march import loop
 from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
-from ..physics.budget import Summary
 from ..physics.entries import Entry
 from ..record import checkpoint, wisdom
 from ..record.checkpoint import Facts
 from ..record.directory import Directory
 from ..record.recorder import Recorder
-from ..record.row import Row
+from .errors_so_far import ErrorsSoFar
 from .restart import Origin
 from .watch import Watch
 
@@ -35,6 +34,7 @@ class Journey:
         watching: Watch,
         facts: Facts,
         until: float | None,
+        origin: Origin | None,
     ) -> None:
         self.march, self.timeline, self.directory, self.recorder = marching, timeline, directory, recorder
         self.watch, self.facts, self.until = watching, facts, until
@@ -44,10 +44,11 @@ class Journey:
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
         self.contacts = sanity.ContactWatch(self.job, timeline)
         self.stop = ""
-        self.errors, self._recorded = Summary(), marching.row.time
+        self.errors = ErrorsSoFar(marching.row.time, origin.contents.numbers if origin else None)
         self.began, self.saving = time.monotonic(), 0.0
+        self.origin = origin
 
-    def go(self, origin: Origin | None) -> int:
+    def go(self) -> int:
         grid, ranks = self.job.grid, "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
         title = self.job.title or self.job.path.stem
         self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
@@ -55,10 +56,10 @@ class Journey:
             self.console.say(str(self.job.included))
         for fact in scene.facts(self.march.scene):
             self.console.say(fact)
-        if origin:
-            self.console.say(f"goes on after step {self.first} from {origin.contents.path}")
+        if self.origin:
+            self.console.say(f"goes on after step {self.first} from {self.origin.contents.path}")
             self.recorder.catch_up(self.march.row, self.march.field)
-        ended = loop.run_tasks(self.march, [self.decide] if origin else [self.record, self.decide])
+        ended = loop.run_tasks(self.march, [self.decide] if self.origin else [self.record, self.decide])
         if not ended:
             self._march()
         if self.job.checkpoint.keep == 0 and self.march.row.step >= len(self.timeline):
@@ -69,11 +70,18 @@ class Journey:
 
     def _finish_without_checkpoint(self) -> None:
         """Remove what a run that has finished does not need, if its results are safe."""
-        self.recorder.sync()
+        self._bring_up_to_date()
         if problem := self.slab.agree(self.recorder.problem):
             raise RunError(problem + self._left())
         if self.slab.root:
             self.directory.prune(0)
+
+    def _bring_up_to_date(self) -> None:
+        """What was recorded is on the disk then, with the error budget so far."""
+        budget = self.errors.summary.facts(self.job.numerics.accuracy)
+        self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
+        self.recorder.renew(self.facts.provenance)
+        self.recorder.sync()
 
     def _march(self) -> None:
         steps = steps_to_make(self.march, self.timeline, self.until)
@@ -98,7 +106,7 @@ class Journey:
         if marching.row.remark:
             self.console.say(marching.row.remark)
         self.recorder.write(marching.row, marching.field)
-        self._weigh_errors(marching.row)
+        self.errors.weigh(marching.row)
         try:
             doubts = self.contacts.judge(marching.row.step, marching.row.measures)
         except RunError as error:
@@ -114,11 +122,6 @@ class Journey:
         provenance = replace(provenance, warnings=(*provenance.warnings, *texts))
         self.facts = replace(self.facts, provenance=provenance)
         self.recorder.renew(provenance)
-
-    def _weigh_errors(self, row: Row) -> None:
-        if row.errors is not None:
-            self.errors.add(row.errors, row.measures.friction, row.time - self._recorded)
-        self._recorded = row.time
 
     def decide(self, marching: March) -> bool:
         """Save if it is time to; True ends the march."""
@@ -145,9 +148,9 @@ class Journey:
         """
         began, row = time.monotonic(), self.march.row
         path = self.directory.checkpoint(row.step)
-        self.recorder.sync()
+        self._bring_up_to_date()
         facts = replace(self.facts, step=row.step, time=row.time, table=self.recorder.table)
-        entries = {**self.march.entries(), "plans/all": Entry(wisdom.gather(self.slab))}
+        entries = {**self.march.entries(), **self.errors.entries(), "plans/all": Entry(wisdom.gather(self.slab))}
         try:
             checkpoint.write(path, self.slab, facts, entries)
         except RunError as error:
@@ -178,7 +181,7 @@ class Journey:
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
-        for line in self.errors.lines(self.job.numerics.accuracy):
+        for line in self.errors.summary.lines(self.job.numerics.accuracy):
             console.say(line)
         if self.stop:
             console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")

@@ -79,8 +79,8 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
             facts = Facts(0, 0.0, plain, provenance, claim.id)
             with Signals().noted() as signals:
                 watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
-                journey = Journey(marching, timeline, directory, recorder, watching, facts, options.until)
-                return Ended(journey.go(origin), marching)
+                journey = Journey(marching, timeline, directory, recorder, watching, facts, options.until, origin)
+                return Ended(journey.go(), marching)
         finally:
             recorder.close()
 

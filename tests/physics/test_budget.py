@@ -66,3 +66,29 @@ def test_summary() -> None:
     assert area.startswith("contact area, corrected, is wrong by about ")
     assert area.endswith(", more than numerics.accuracy = 0.012: try a finer grid")
     assert Summary().lines(0.012) == []
+
+
+def test_summary_goes_on() -> None:
+    """From the sums of another, as if there had been one; as plain data it has parts that add up."""
+    one, other = Summary(), Summary()
+    for summary in (one, other):
+        summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
+    on = Summary(other.numbers)
+    for summary in (one, on):
+        summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
+    assert on.facts(0.01) == one.facts(0.01)
+    friction = on.facts(0.01)["friction"]
+    assert friction.pop("total") == pytest.approx(sum(friction.values()))
+    assert other.numbers[0] == pytest.approx(0.06)  # not changed by the one that went on from them
+
+
+def test_steps_that_last_no_time_count_where_none_does() -> None:
+    """Three loads without duration: their mean; beside a step that lasts they are nothing."""
+    summary = Summary()
+    for complementarity in (1e-3, 2e-3, 6e-3):
+        summary.add(estimate(KNOWN, Seen(complementarity, 0.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0)
+    assert summary.friction is None
+    assert summary.area is not None
+    assert summary.area.solver == pytest.approx(3e-3)
+    summary.add(estimate(KNOWN, Seen(8e-3, 0.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9)
+    assert summary.area.solver == pytest.approx(8e-3)
