@@ -234,3 +234,16 @@ def test_waves_that_never_pass_are_at_rest(bands: list[Band]) -> None:
     assert fold_branches(TYRE, [slide(1.0, 1e-6)], bands, "exponential", 1e-3) == fold_branches(
         TYRE, [slide(1.0, 1e-6, 0.0)], [WAVE], "exponential", 1e-3
     )
+
+
+@pytest.mark.parametrize("unit", [2.0**600, 2.0**-600])
+def test_any_unit_of_time(unit: float) -> None:
+    """A rubber slower by a factor on which everything happens slower by it has the same errors, to the last bit."""
+    phases = [slide(1e-3, 1e-6, 3.0, jump=True), slide(1e-2, 1e-6, 0.1)]
+    slower = [
+        Phase(p.duration * unit, p.first * unit, p.last * unit, (p.velocity[0] / unit, 0.0), p.jump) for p in phases
+    ]
+    other = Prony(TYRE.modulus_inf, TYRE.moduli, TYRE.relaxation_times * unit)
+    expected = fold_branches(TYRE, phases, [ROAD], "exponential", 1e-3)
+    assert expected.bound > 0.0
+    assert fold_branches(other, slower, [ROAD], "exponential", 1e-3) == expected

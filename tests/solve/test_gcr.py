@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.gcr import Directions
+from parcontact.solve.gcr import Directions, residual
 
 Map = NDArray[np.float64]
 NX, NY = 5, 4
@@ -61,6 +61,14 @@ class Problem:
     def residual(self) -> float:
         gaps = (self.u - self.h)[self.working]
         return float(np.linalg.norm(gaps - gaps.mean()))
+
+
+def test_residual_of_a_set() -> None:
+    """Small whole numbers, without rounding: u - h - mean on the set, nothing beside it, and the sum of squares."""
+    working = np.array([[True, False, True], [False, True, False]])
+    u, h, r = np.array([[5.0, 9.0, 2.0], [9.0, 4.0, 9.0]]), np.ones((2, 3)), np.full((2, 3), np.nan)
+    assert residual(working, u, h, 2.0, r) == 2.0**2 + 1.0**2 + 1.0**2
+    assert r.tolist() == [[2.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
 
 
 @pytest.mark.parametrize("skew", [0.0, 0.3, 3.0])
