@@ -45,7 +45,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
     surface in the box (`lattice`). Raises InputError for jobs that the theory does not know.
     """
     _refuse_unknown(job)
-    timeline = Timeline(job.history, job.grid, pressure=job.initial.pressure)
+    timeline = job.timeline()
     rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
     memory = Memory(rings, _material(job))
     if job.initial.state == "steady":

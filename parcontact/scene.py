@@ -23,7 +23,7 @@ from .physics.entries import Remembers
 from .physics.folding import FoldedBranches
 from .physics.halfspace import HalfSpace
 from .physics.ledger import Ledger
-from .physics.motion import AnyFraction, Motion, WholeCells
+from .physics.motion import AnyFraction, Motion, PartCells, WholeCells
 from .physics.prony import Prony
 from .physics.roughness import Moments, moments
 from .physics.surface import Surface
@@ -133,8 +133,7 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     Collective. Raises InputError for surface files that do not fit.
     """
     base = frame(job, slab)
-    way = AnyFraction if decisions.part_cells(job).on else WholeCells
-    motion: Motion = way(base.surface, base.dtype)
+    motion: Motion = _way(job)(base.surface, base.dtype)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
@@ -167,6 +166,13 @@ def facts(built: Scene) -> list[str]:
 
 
 # -- parts ------------------------------------------------------------------------------------------------------------
+
+
+def _way(job: Job) -> type[AnyFraction | PartCells | WholeCells]:
+    """How the surface moves."""
+    if not decisions.part_cells(job).on:
+        return WholeCells
+    return PartCells if decisions.whole_cells_at_times(job) else AnyFraction
 
 
 def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:

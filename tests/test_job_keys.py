@@ -152,8 +152,14 @@ HISTORIES = {
     "history: [{pressure: {from: 1, to: 2}}]": (
         "4:22: history.0.pressure changes from one value to another, which needs a duration [s] or a distance [m]"
     ),
-    "history: [{pressure: 1, duration: 1}]": (
-        "4:11: history.0 needs exactly one of time_step | cells_per_step, got none"
+    "history: [{pressure: 1, velocity: 1, duration: 1, time_step: auto, cells_per_step: 1}]": (
+        "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
+    ),
+    "history: [{pressure: 1, duration: 1, time_step: {first: auto, growth: 2}}]": (
+        "4:57: history.0.time_step.first must be a positive time step [s], got 'auto'"
+    ),
+    "history: [{pressure: 1, time_step: auto}]": (
+        "4:36: history.0.time_step needs a duration [s] or a distance [m]: without them a stage is one solve"
     ),
     "history: [{pressure: 1, velocity: 1, duration: 1, time_step: 1, cells_per_step: 1}]": (
         "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
@@ -174,7 +180,7 @@ HISTORIES = {
         "4:35: history.0.duration must be a positive time [s], got 0"
     ),
     "history: [{pressure: 1, duration: 1, time_step: fine}]": (
-        "4:49: history.0.time_step must be a positive time step [s], or {first, growth}, got 'fine'"
+        "4:49: history.0.time_step must be a positive time step [s], {first, growth}, or auto, got 'fine'"
     ),
     "history: [{pressure: 1, duration: 1, time_step: {first: 1, growth: 0.9}}]": (
         "4:68: history.0.time_step.growth must be a factor [-] of one or more, got 0.9"

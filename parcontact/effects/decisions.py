@@ -33,10 +33,21 @@ def _part_cells(job: Job) -> tuple[bool, str]:
         return False, "the surface stands"
     if job.grid.boundary == "free":
         return True, "a free box is not cyclic: the heights are made anew"
+    if whole_cells_at_times(job):
+        return True, "stages that choose their own steps begin with parts of a cell where they must"
     step = job.timeline().first_between_cells(job.grid)
     if step is None:
         return False, "every step is of whole cells along x"
     return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
+
+
+def whole_cells_at_times(job: Job) -> bool:
+    """Whether the surface slides along x on a periodic box, in steps that are chosen while it does: by whole cells
+    where these are accurate enough."""
+    timeline = job.timeline()
+    spans = [span for span in timeline.spans if span.moves]
+    along_x = job.grid.boundary == "periodic" and not any(span.stage.velocity[1] for span in spans)
+    return along_x and timeline.chooses and any(span.stage.chooses for span in spans)
 
 
 def lasting(job: Job) -> Decision:

@@ -8,6 +8,8 @@ import numpy as np
 
 from .. import job as jobs
 from ..job import Grid, Job
+from ..job.chosen import ChosenEnds, bounds
+from ..job.timeline import Span
 from ..physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from ..physics.prony import Prony
 from .effect import Decision
@@ -58,9 +60,18 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
     for span in job.timeline(until).spans:
-        first, last = (span.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
+        first, last = _first_and_last(span, job.grid)
         duration = span.ends[span.count] * span.stage.seconds if span.count else 0.0
         yield Phase(duration, first, last, span.stage.velocity, span.jumps)
+
+
+def _first_and_last(span: Span, grid: Grid) -> tuple[float, float]:
+    """The first and the last step of a stage [s]; those that it chooses lie between the shortest and the longest."""
+    if isinstance(span.ends, ChosenEnds):
+        limits = bounds(span.stage, grid)
+        return limits.least, limits.most
+    first, last = (span.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
+    return first, last
 
 
 def bands(job: Job) -> Iterator[Band]:

@@ -1,7 +1,7 @@
 """A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
 
 from ..errors import JobError
-from .history import Control, GeometricStep, Initial, Ramp, Stage, Steady
+from .history import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
 from .material import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe
 from .reading import Case, choose, load, load_cases
@@ -12,6 +12,7 @@ from .topography import RoughSpectrum, Topography
 from .values import log_range
 
 __all__ = [
+    "AUTO",
     "Case",
     "Checkpoint",
     "Control",

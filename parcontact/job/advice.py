@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from .history import GeometricStep, Stage
+from .history import AUTO, GeometricStep, Stage
 from .material import Elastic, Zener
 from .sections import Grid, Numerics
 from .surface import Rough
@@ -69,8 +69,10 @@ def _surface(grid: Grid, surface: tuple[Any, ...], accuracy: float) -> Iterator[
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:
-    """The longest time step of a stage [s], before steps are fitted to its end."""
+    """The longest time step of a stage [s], before steps are fitted to its end; 0 where it chooses its own."""
     step = stage.time_step
+    if step == AUTO:
+        return 0.0
     if stage.cells_per_step is not None:
         return min(stage.seconds, stage.cells_per_step * grid.dx / stage.speed)
     if isinstance(step, GeometricStep):  # n steps last first (growth^n - 1) / (growth - 1)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create_model
 
 from .fault import Fault, quote, refuse
-from .part import Part, Rule
+from .part import Context, Part, Rule
 from .temperature import Celsius
 from .values import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 
@@ -64,7 +64,13 @@ class GeometricStep(Part):
     growth: float = Field(ge=1, allow_inf_nan=False, strict=True, description="a factor [-] of one or more")
 
 
-def _time_step(value: Any) -> float | GeometricStep:
+Auto = Literal["auto"]
+AUTO: Auto = "auto"  # time steps that follow the error asked for
+
+
+def _time_step(value: Any) -> float | GeometricStep | Auto:
+    if value == AUTO:
+        return AUTO
     if isinstance(value, dict | GeometricStep):
         return GeometricStep.model_validate(value)
     return SECONDS.validate_python(value)
@@ -74,15 +80,13 @@ def _stepping(
     duration: float | None,
     distance: float | None,
     velocity: tuple[float, float],
-    time_step: float | GeometricStep | None,
+    time_step: float | GeometricStep | Auto | None,
     cells_per_step: float | None,
 ) -> Iterator[Fault]:
-    """A stage that lasts needs its steps; one that does not must have none."""
+    """A stage that does not last must have no steps."""
     lasts = duration is not None or distance is not None
     given = {"time_step": time_step, "cells_per_step": cells_per_step}
     steps = [name for name, value in given.items() if value is not None]
-    if lasts and not steps:
-        yield Fault("needs exactly one of time_step | cells_per_step, got none")
     if steps and not lasts:
         yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (steps[0],))
     for name, value in (("distance", distance), ("cells_per_step", cells_per_step)):
@@ -106,9 +110,9 @@ class Stage(Part):
     velocity: Velocity = (0.0, 0.0)
     duration: Positive | None = Field(default=None, description="a positive time [s]")
     distance: Positive | None = Field(default=None, description="a positive length [m]")
-    time_step: Annotated[float | GeometricStep | None, PlainValidator(_time_step)] = Field(
-        default=None, description="a positive time step [s], or {first, growth}"
-    )
+    time_step: Annotated[float | GeometricStep | Auto | None, PlainValidator(_time_step)] = Field(
+        default=None, description="a positive time step [s], {first, growth}, or auto"
+    )  # auto where the stage lasts and does not give cells_per_step either
     cells_per_step: Positive | None = Field(
         default=None, description="a positive number of cells (a fraction is allowed)"
     )
@@ -119,6 +123,17 @@ class Stage(Part):
         Rule(("duration", "distance", "velocity", "time_step", "cells_per_step"), _stepping),
         Rule(("duration", "distance", *CONTROLS), _lasting_ramp),
     )
+
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+        """A stage that lasts and does not say in which steps chooses them itself."""
+        lasts, given = data.keys() & {"duration", "distance"}, data.keys() & {"time_step", "cells_per_step"}
+        return {**data, "time_step": AUTO} if lasts and not given else data
+
+    @property
+    def chooses(self) -> bool:
+        """Whether it chooses its own time steps."""
+        return self.time_step == AUTO
 
     @property
     def control(self) -> Control:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from .fault import Fault
-from .history import GeometricStep, Initial, Stage, Steady
+from .history import AUTO, GeometricStep, Initial, Stage, Steady
 from .material import Elastic, Zener, ZenerBranch
 from .sections import Grid
 from .source import Key
@@ -167,11 +167,18 @@ def of_steps(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
 def first_step(stage: Stage, grid: Grid) -> float:
     """The (first) time step [s] of a stage that lasts, before steps are fitted to its end."""
     if stage.cells_per_step is not None:
-        cell = math.hypot(stage.velocity[0] / stage.speed * grid.dx, stage.velocity[1] / stage.speed * grid.dy)
-        return stage.cells_per_step * cell / stage.speed
+        return stage.cells_per_step * one_cell(stage, grid)
     if isinstance(stage.time_step, GeometricStep):
         return stage.time_step.first
+    if stage.time_step == AUTO:
+        return one_cell(stage, grid) if stage.speed else stage.seconds
     return stage.time_step or 0.0
+
+
+def one_cell(stage: Stage, grid: Grid) -> float:
+    """How long the surface takes to slide by one cell [s]."""
+    cell = math.hypot(stage.velocity[0] / stage.speed * grid.dx, stage.velocity[1] / stage.speed * grid.dy)
+    return cell / stage.speed
 
 
 def steps_of(stage: Stage, seconds: float, first: float) -> float:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
 from . import advice, extension, limits, meaning, size, table
+from .chosen import ChosenSteps
 from .fault import Fault
 from .history import Initial, Stage, Steady
 from .loading import Included
@@ -199,9 +200,18 @@ class Job(Part):
         """The section that an effect has added, None if this job has not given it."""
         return getattr(self, name, None)
 
-    def timeline(self, until: float = 0.0) -> Timeline:
-        """All steps of the history; its last stage goes on to `until` [s] if that is later than its end."""
-        return Timeline(self.history, self.grid, until, self.initial.pressure)
+    def timeline(self, until: float = 0.0, chosen: ChosenSteps | None = None) -> Timeline:
+        """All steps of the history; its last stage goes on to `until` [s] if that is later than its end.
+
+        `chosen` are the steps that stages have chosen so far; those to come are guessed.
+        """
+        record = (chosen or ChosenSteps()) if self.remembers else None
+        return Timeline(self.history, self.grid, until, self.initial.pressure, record)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the body has a memory, and time steps an error: an elastic one has neither."""
+        return not isinstance(self.material, Elastic) and bool(getattr(self.material, "branches", True))
 
     def resolved(self) -> str:
         """YAML text with every default filled in; it loads back to an equal job."""

@@ -2,17 +2,17 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
-from .history import GeometricStep, Ramp, Stage
+from .chosen import RAMP_STEPS, SAME_TIME, ChosenEnds, ChosenSteps, reached
+from .history import AUTO, GeometricStep, Ramp, Stage
 from .limits import first_step
 from .sections import Grid
 
-SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
 MANY = 10**12  # steps of a stage, of which one is too little to be told from the end
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
@@ -22,7 +22,8 @@ class Step(NamedTuple):
 
     `dt` = 0 is a jump, at an instant, of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is
     dt over the dt of the step before, 0 where that was a jump: how far to extrapolate what changes smoothly. `passed`
-    is the number of steps that this one stands for besides its own.
+    is the number of steps that this one stands for besides its own. `judge`, of a step that may be too long, is told
+    the error of the step when it has been tried: it returns the shorter one to make instead, or None.
     """
 
     number: int
@@ -35,15 +36,11 @@ class Step(NamedTuple):
     load: float
     growth: float
     passed: int = 0
+    judge: Callable[["Step", float], "Step | None"] | None = None
 
     @property
     def jump(self) -> bool:
         return self.dt == 0.0
-
-
-def reached(time: float, until: float) -> bool:
-    """Whether a time is the one asked for, or later."""
-    return time >= until * (1.0 - SAME_TIME)
 
 
 @dataclass(frozen=True)
@@ -79,9 +76,14 @@ class Fractions:
 
 
 def divided(stage: Stage, grid: Grid) -> Fractions:
-    """The steps of a stage: none is longer than asked for, and an instantaneous stage has none."""
+    """The steps of a stage: none is longer than asked for, and an instantaneous stage has none.
+
+    Of a body without memory that may choose its own: one cell in sliding, the whole stage at rest, some on a ramp.
+    """
     if stage.seconds == 0.0:
         return Fractions(0)
+    if stage.time_step == AUTO and not stage.load.constant and not stage.speed:
+        return Fractions(RAMP_STEPS)
     steps = stage.seconds / first_step(stage, grid)
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     if growth == 1.0:
@@ -102,7 +104,7 @@ class Span:
     before: int
     jumps: bool
     count: int
-    ends: Fractions
+    ends: Fractions | ChosenEnds
     start: float
     origin: tuple[float, float]
 
@@ -119,24 +121,36 @@ class Span:
     def rests(self) -> bool:
         """Whether it stands under a constant load, and its steps may be as long as what happens allows."""
         stage = self.stage
-        return not any(stage.velocity) and stage.load.constant and isinstance(stage.time_step, GeometricStep)
+        return (
+            not any(stage.velocity)
+            and stage.load.constant
+            and (stage.chooses or isinstance(stage.time_step, GeometricStep))
+        )
+
+    def elapsed(self, index: int) -> float:
+        """How long after the start of the stage the step `index` of those that last ends [s]."""
+        if isinstance(self.ends, ChosenEnds):
+            return self.ends.elapsed(index)
+        return self.ends[index] * self.stage.seconds if index else 0.0
 
     def time(self, index: int) -> float:
         """When the step `index` of those that last ends [s]."""
-        return self.start + self.ends[index] * self.stage.seconds if index else self.start
+        return self.start + self.elapsed(index)
 
     def interval(self, index: int, since: int | None = None) -> float:
         """How long the step `index` takes, or all steps `since` another one have taken with it [s].
 
         From the stage alone, as late instants may have no digits for it; steps that are alike are so to the last bit.
         """
+        if isinstance(self.ends, ChosenEnds):
+            return self.elapsed(index) - self.elapsed(index - 1 if since is None else since)
         if since is None and self.ends.growth == 1.0:
             return self.stage.seconds / self.ends.count
         return (self.ends[index] - self.ends[index - 1 if since is None else since]) * self.stage.seconds
 
     def position(self, index: int) -> tuple[float, float]:
         """Where the surface then is [m]."""
-        slid = self.ends[index] * self.stage.seconds if index else 0.0
+        slid = self.elapsed(index)
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
@@ -175,22 +189,69 @@ class Timeline:
     Where the history ends before `until`, its last stage goes on with its last time step, velocity and load, to the
     first step that reaches it; a last stage that is one solve cannot go on. `pressure` [Pa] is that of the initial
     state, None for a virgin body.
+
+    `chosen` has the steps of stages that choose their own: as it grows, so does what is known here, and the others
+    are guessed. None: these stages have the steps of a body without memory.
     """
 
     def __init__(
-        self, history: tuple[Stage, ...], grid: Grid, until: float = 0.0, pressure: float | None = None
+        self,
+        history: tuple[Stage, ...],
+        grid: Grid,
+        until: float = 0.0,
+        pressure: float | None = None,
+        chosen: ChosenSteps | None = None,
     ) -> None:
-        self.spans: list[Span] = []
+        self.history, self.grid, self.until, self.chosen = history, grid, until, chosen
+        self.chooses = chosen is not None and any(stage.chooses for stage in history)
+        self._before = None if pressure is None else ("pressure", pressure)
+        self._number_spans()
+
+    @property
+    def spans(self) -> list[Span]:
+        """Those of all stages."""
+        if self.chooses and self.chosen is not None and self._known != self.chosen.count:
+            self._number_spans()
+        return self._spans
+
+    @property
+    def _lasts(self) -> list[int]:
+        return [span.last for span in self.spans] if self.chooses else self._numbers
+
+    def _number_spans(self) -> None:
+        self._spans: list[Span] = []
+        self._known = 0 if self.chosen is None else self.chosen.count
         number, time, position = 0, 0.0, (0.0, 0.0)
-        before = None if pressure is None else ("pressure", pressure)
-        for index, stage in enumerate(history):
-            ends = divided(stage, grid)
-            more = ends.beyond((until - time) / stage.seconds) if ends.count and index == len(history) - 1 else 0
+        before = self._before
+        for index, stage in enumerate(self.history):
+            ends = self._ends(index, stage, self.until - time)
+            more = ends.beyond((self.until - time) / stage.seconds) if ends.count and self._is_last(index) else 0
             span = Span(index, stage, number, _jumps(stage, before), ends.count + more, ends, time, position)
-            self.spans.append(span)
+            self._spans.append(span)
             number, time, position = span.last, span.time(ends.count), span.position(ends.count)
             before = (stage.control, stage.load.end)
-        self._lasts = [span.last for span in self.spans]
+        self._numbers = [span.last for span in self._spans]
+
+    def _is_last(self, index: int) -> bool:
+        return index == len(self.history) - 1
+
+    def _ends(self, index: int, stage: Stage, until: float) -> Fractions | ChosenEnds:
+        if self.chosen is None or not stage.chooses:
+            return divided(stage, self.grid)
+        return self.chosen.of(index, stage, self.grid, until if self._is_last(index) else 0.0)
+
+    def follow(self, times: Mapping[int, float]) -> "Timeline":
+        """Take the times [s] of steps that were made, by their numbers, as those that the stages have chosen."""
+        for index in range(len(self.history) if self.chooses else 0):
+            assert self.chosen is not None
+            span = self.spans[index]
+            while isinstance(span.ends, ChosenEnds) and span.ends.ladder.count:
+                number = span.before + span.jumps + len(span.ends.made) + 1
+                if number not in times:
+                    return self
+                self.chosen.ends.setdefault(index, []).append(times[number] - span.start)
+                span = self.spans[index]
+        return self
 
     @property
     def count(self) -> int:
@@ -239,6 +300,8 @@ class Timeline:
     def first_between_cells(self, grid: Grid) -> Step | None:
         """The first step after which the surface is not moved by whole cells along x."""
         for span in filter(lambda span: span.moves, self.spans):
+            if isinstance(span.ends, ChosenEnds):
+                return span.step(span.before + span.jumps + 1)
             (x, _), (slid, _) = span.origin, span.position(span.ends.count)
             start, each = x / grid.dx, (slid - x) / grid.dx / span.ends.count
             worst = abs(start - round(start)) + abs(each - round(each)) * span.count

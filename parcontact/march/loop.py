@@ -15,11 +15,10 @@ def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = N
     Without a timeline it is all of the job's, and the tasks are done for the initial state too. Returns whether a task
     has ended the march.
     """
-    job = march.scene.job
     if timeline is None:
         if run_tasks(march, tasks):
             return True
-        timeline = steps_to_make(march, job.timeline())
+        timeline = steps_to_make(march, march.timeline())
     for step in timeline:
         march.advance(step)
         if run_tasks(march, tasks):

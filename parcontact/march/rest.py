@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from ..job.timeline import Span, Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import ZenerBody
+from .choosing import StepChooser
 from .step import March
 
 SHARE = 0.1  # of the largest displacement: about the length that certificates compare gaps with
@@ -30,8 +31,12 @@ def steps_to_make(march: March, timeline: Timeline, until: float | None = None) 
     What is decided follows from the state of the march, and so is the same after a restart.
     """
     stop = len(timeline) if until is None else timeline.first_reaching(until)
+    chooser = StepChooser(march.scene, march.chosen) if march.chosen is not None else None
     while (number := march.row.step + 1) <= len(timeline):
         span = timeline.span(number)
+        if chooser is not None and span.stage.chooses and span.place(number) > 0:
+            yield chooser.propose(span, number, is_relaxed=_is_relaxed(march, span, number))
+            continue
         target = min([span.last, *_due(march, number), *([stop] if stop >= number else [])]) if span.rests else number
         yield span.leap(number, target) if _at_rest(march, span, number, target) else span.step(number)
 
@@ -45,7 +50,13 @@ def _due(march: March, number: int) -> list[int]:
 def _at_rest(march: March, span: Span, number: int, target: int) -> bool:
     """Whether from a step on nothing changes until the end of its stage, and there is a step to spare; collective."""
     index = span.place(number)
-    if target <= number or index < 1:
+    return target > number and index >= 1 and _is_relaxed(march, span, number)
+
+
+def _is_relaxed(march: March, span: Span, number: int) -> bool:
+    """Whether from a step on nothing changes until the end of its stage; collective."""
+    index = span.place(number)
+    if not span.rests:
         return False
     material = march.scene.material
     if not isinstance(material, ZenerBody):

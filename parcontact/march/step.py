@@ -8,13 +8,15 @@ from functools import partial
 import numpy as np
 
 from ..effects.effect import Instant
-from ..job.timeline import Step
+from ..job.chosen import SYMBOLS, ChosenSteps
+from ..job.timeline import Step, Timeline
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
 from ..physics.body import Trial, ZenerBody
 from ..physics.energy import Pressed
 from ..physics.entries import Entry
+from ..physics.measures import Measures
 from ..physics.motion import cells_between
 from ..record.checkpoint import Contents
 from ..record.row import Row
@@ -22,7 +24,7 @@ from ..scene import Scene, solver_on
 from ..solve import cold, retry
 from ..solve.contact import Approach, Contact, MeanPressure
 from . import failure, state
-from .errors import Errors
+from .errors import Errors, Estimate
 from .failure import StepError
 from .state import State
 
@@ -44,25 +46,31 @@ class March:
         self._next_pressure = slab.zeros(dtype)
         self._errors = Errors(scene)
         self._elastic_displacement: Array | None = None  # of the solver: until its next solve
+        self.chosen = ChosenSteps() if scene.job.timeline().chooses else None
 
     @property
     def row(self) -> Row:
         """What the last step is recorded as."""
         return self.state.row
 
+    def timeline(self, until: float = 0.0) -> Timeline:
+        """All steps of the history, as `Job.timeline`, with those that have been chosen so far."""
+        return self.scene.job.timeline(until, self.chosen)
+
     def advance(self, step: Step) -> Row:
-        """Make the next state; collective. Raises StepError, and leaves the last one, when that cannot be."""
+        """Make the next state, or with a shorter step if its judge asks for it; collective.
+
+        Raises StepError, and leaves the last state, when that cannot be.
+        """
         began, tally, scene, old = time.perf_counter(), self.scene.slab.tally, self.scene, self.state
         calls = tally["operator"]
-        trial = scene.material.begin(step.dt, scene.motion.at(step.position))
-        contact, remark = self._solve(step, trial)
-        measures = scene.ledger.measures(
-            contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
-        )
-        if not measures.finite:
-            raise failure.not_finite(scene, step, measures)
-        scene.material.commit(trial, contact.u)
-        errors = self._errors.of(step, trial, contact, measures)
+        while True:
+            trial, contact, remark, measures = self._try(step)
+            errors = self._commit(step, trial, contact, measures)
+            shorter = self._judge(step, errors)
+            if shorter is None:
+                break
+            step = shorter
         if scene.energy is not None:
             now, before = Pressed(contact.p, trial.alpha), Pressed(old.pressure, old.alpha)
             scene.energy.advance(step.dt, now, before, contact.u)
@@ -78,7 +86,7 @@ class March:
             tally["operator"] - calls,
             seconds=time.perf_counter() - began,
             remark=remark,
-            errors=errors,
+            errors=errors.budget,
         )
         earlier = None if old.earlier is None else old.pressure
         self.state = State(row, contact.p, earlier, trial.alpha, old.alpha, contact.d, step.position)
@@ -92,11 +100,13 @@ class March:
 
     def entries(self) -> dict[str, Entry]:
         """Everything remembered after the last step, by names `part/name`; maps are the run's own, not copies."""
-        return state.entries(self.scene, self.state)
+        return {**state.entries(self.scene, self.state), **self._chosen_entries()}
 
     def restore(self, contents: Contents) -> None:
         """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
         restored = state.restore(self.scene, self.state, contents)
+        if self.chosen is not None:
+            self.chosen = ChosenSteps.restored(contents.numbers)
         self.begin_with(replace(restored, row=self._complete(restored.row)))
 
     def begin_with(self, begun: State) -> None:
@@ -108,6 +118,45 @@ class March:
         self._elastic_displacement = None
 
     # -- the parts of a step ------------------------------------------------------------------------------------------
+
+    def _try(self, step: Step) -> tuple[Trial, Contact, str, Measures]:
+        """The contact of a step, what was unusual about it and what it measures; collective. Raises StepError."""
+        scene = self.scene
+        trial = scene.material.begin(step.dt, scene.motion.at(step.position))
+        contact, remark = self._solve(step, trial)
+        measures = scene.ledger.measures(
+            contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
+        )
+        if not measures.finite:
+            raise failure.not_finite(scene, step, measures)
+        return trial, contact, remark, measures
+
+    def _commit(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Estimate:
+        """Let the body go on; how wrong the step is. The displacement before it is kept if it may be taken back."""
+        material = self.scene.material
+        if step.judge is not None and isinstance(material, ZenerBody):
+            self._kept()[...] = material.u
+        material.commit(trial, contact.u)
+        return self._errors.of(step, trial, contact, measures)
+
+    def _judge(self, step: Step, error: Estimate) -> Step | None:
+        """The shorter step to make instead, the body being as before this one; None for a step that is good."""
+        if step.judge is None:
+            return None
+        shorter = step.judge(step, self.scene.slab.agree(error.step))
+        if shorter is not None and isinstance(self.scene.material, ZenerBody):
+            self.scene.material.take_back(self._kept())
+        return shorter
+
+    def _chosen_entries(self) -> dict[str, Entry]:
+        """The steps that stages have chosen; none where no stage chooses."""
+        if self.chosen is None:
+            return {}
+        return {name: Entry(numbers, 1.0, SYMBOLS[name]) for name, numbers in self.chosen.numbers().items()}
+
+    def _kept(self) -> Array:
+        """A map for the displacement before a step, of the solver until its next solve."""
+        return self.scene.solver.lend()[0]
 
     def _solve(self, step: Step, trial: Trial) -> tuple[Contact, str]:
         """The contact of a step, and what was unusual about it; collective. Raises StepError."""

@@ -184,6 +184,11 @@ class ZenerBody:
         loops.commit(displacement, trial.effective, self.u, *trial.heights.parts)
         self._pending = trial.advance
 
+    def take_back(self, u: Array) -> None:
+        """Undo the step just committed: `u` is the displacement before it; local to this rank."""
+        self.u[...] = u
+        self._pending = self._still
+
     def begin_with(self, u: Array, branches: Iterable[Array]) -> None:
         """Begin with a displacement and the map of each branch of `prony`, in order."""
         self.u[...] = u

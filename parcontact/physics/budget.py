@@ -26,7 +26,10 @@ from numpy.typing import NDArray
 from .measures import SIDE
 
 SOLVER_FRICTION, SOLVER_AREA = 0.5, 1.0  # times the complementarity
-EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 1.2, 0.4  # times the difference of the pair
+EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 2.0, 0.4  # times the difference of the pair
+TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
+EQUAL_DIFFERENCE = 0.01  # of the pair, at which a material of many branches is no worse than one of a single branch
+FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
 EULER_FRICTION, EULER_AREA = 0.7, 0.4  # times its root
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
@@ -83,11 +86,13 @@ class Known:
 
 @dataclass(frozen=True)
 class Seen:
-    """What a step has shown: the certificate's complementarity; by how much the embedded pair differs; the rms slope
-    of the surface under the pressure; friction; contact area, counted and corrected, as shares."""
+    """What a step has shown: the certificate's complementarity; by how much the embedded pair differs, with its order
+    in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
+    shares."""
 
     complementarity: float
     difference: float
+    order: float
     slope: float
     friction: float
     area: float
@@ -101,8 +106,21 @@ def estimate(known: Known, seen: Seen, points: int) -> ErrorBudget:
 
 def _friction(known: Known, seen: Seen, points: int) -> Parts:
     more = math.sqrt(max(1.0, seen.slope / seen.friction))
-    spread = EXPONENTIAL_FRICTION * seen.difference if known.exponential else EULER_FRICTION * seen.difference**0.5
-    return Parts(SOLVER_FRICTION * seen.complementarity * more, spread * more, known.folded, _mesh(known, seen, points))
+    spread = time_error(known, seen) * (1.0 if known.exponential else more)
+    return Parts(SOLVER_FRICTION * seen.complementarity * more, spread, known.folded, _mesh(known, seen, points))
+
+
+def time_error(known: Known, seen: Seen) -> float:
+    """What the length of a step adds to the error of friction, or would where something slides.
+
+    In contacts the error of the exponential integrator goes with the power TIME_ORDER of the step, the difference of
+    the pair with `order`.
+    """
+    if not known.exponential:
+        return EULER_FRICTION * seen.difference**0.5
+    power = max(0.0, TIME_ORDER / max(seen.order, 1.0) - 1.0)
+    fixed = 1.0 - FIXED_EDGES * seen.area**2
+    return fixed * EXPONENTIAL_FRICTION * seen.difference * (seen.difference / EQUAL_DIFFERENCE) ** power
 
 
 def _mesh(known: Known, seen: Seen, points: int) -> float:

@@ -23,11 +23,12 @@ SAMPLED_ROWS = 32  # at least, of a map with as many
 
 @dataclass(frozen=True)
 class Look:
-    """The relative difference of the pair, and the rms slope along x of the surface under the pressure, in the unit of
-    heights over that of lengths."""
+    """The relative difference of the pair; the power of the length of the step with which it grows; and the rms slope
+    along x of the surface under the pressure, in the unit of heights over that of lengths."""
 
     difference: float
     slope: float
+    order: float = 2.0
 
 
 class Embedded:
@@ -37,11 +38,11 @@ class Embedded:
         self.slab, self.material, self.dx = slab, material, dx
         self.stride = max(1, slab.ny // SAMPLED_ROWS)
         self._first = -slab.rows.start % self.stride
-        self._apart: tuple[float, Array, float] | None = None
+        self._apart: tuple[float, Array, float, float] | None = None
 
     def look(self, dt: float, trial: Trial, pressure: Array, displacement: Array) -> Look:
         """At a step just committed: the solver's pressure and displacement, `A p/alpha`; one message; collective."""
-        decay, gain = self._difference(dt, trial.alpha)
+        decay, gain, order = self._difference(dt, trial.alpha)
         material = self.material
         sums = loops.embedded(
             material.branches,
@@ -57,13 +58,25 @@ class Embedded:
         load, apart, size, slope = self.slab.sum(*sums)
         if load <= 0.0:
             return Look(0.0, 0.0)
-        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, math.sqrt(slope / load) / (2.0 * self.dx))
+        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, math.sqrt(slope / load) / (2.0 * self.dx), order)
 
-    def _difference(self, dt: float, alpha: float) -> tuple[Array, float]:
-        """What h_k and du weigh in e, over alpha; that of the last dt is kept."""
+    def _difference(self, dt: float, alpha: float) -> tuple[Array, float, float]:
+        """What h_k and du weigh in e, over alpha, and the order of the latter's part; those of the last dt are kept."""
         if self._apart is None or self._apart[0] != dt:
             material = self.material
-            pair = [coefficients(material.prony, name, dt) for name in ("exponential", "backward-euler")]
-            decay, gain = (np.asarray(one - other) for one, other in zip(*pair, strict=True))
-            self._apart = dt, decay[material.kept] / alpha, float(gain[material.moving].sum()) / alpha
+            decay, gain = self._pair(dt)
+            whole = float(gain[material.moving].sum())
+            self._apart = dt, decay[material.kept] / alpha, whole / alpha, self._order(dt, whole)
         return self._apart[1:]
+
+    def _pair(self, dt: float) -> tuple[Array, Array]:
+        """Decay and gain of one integrator minus those of the other."""
+        pair = [coefficients(self.material.prony, name, dt) for name in ("exponential", "backward-euler")]
+        decay, gain = (np.asarray(one - other) for one, other in zip(*pair, strict=True))
+        return decay, gain
+
+    def _order(self, dt: float, gain: float) -> float:
+        """Of `gain du` in dt, du being proportional to dt: 2 where all branches are slow, 1 where some are as fast as
+        the step is short, however short it is."""
+        shorter = float(self._pair(0.5 * dt)[1][self.material.moving].sum())
+        return 1.0 + math.log2(gain / shorter) if dt > 0.0 and gain > 0.0 and shorter > 0.0 else 2.0

@@ -1,5 +1,6 @@
 """Where the rigid surface is: `h(x, t) = h0(x - s(t))`, with s its displacement [m]."""
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -9,6 +10,7 @@ from .body import Heights
 from .surface import Surface
 
 Vector = tuple[float, float]
+SAME_PLACE = 1e-6  # of a cell: a displacement this close to whole cells is one of whole cells
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
@@ -48,3 +50,24 @@ class AnyFraction:
             self._surface.heights(displacement, self._map)
             self._where = displacement
         return Heights(self._map)
+
+
+class PartCells:
+    """Sliding along x on a periodic box by whole cells, or by a part of one now and then: one map, made anew when the
+    part has changed, and an index offset for the whole cells."""
+
+    def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
+        self._surface = surface
+        self._cell = surface.cell[0]
+        self._part = 0.0
+        self._map = surface.heights((0.0, 0.0), surface.slab.empty(dtype))
+
+    def at(self, displacement: tuple[float, float]) -> Heights:
+        cells = displacement[0] / self._cell
+        whole = math.floor(cells + SAME_PLACE)
+        part = cells - whole if abs(cells - whole) > SAME_PLACE else 0.0
+        if part != self._part:
+            self._surface.slab.tally["shift"] += 1
+            self._surface.heights((part * self._cell, 0.0), self._map)
+            self._part = part
+        return Heights(self._map, whole % self._surface.slab.nx)

@@ -62,7 +62,7 @@ class Simulation:
         if not self._began:
             self._began = True
             yield self.row
-        for step in steps_to_make(march, self.job.timeline()):
+        for step in steps_to_make(march, march.timeline()):
             march.advance(step)
             yield self.row
 
@@ -98,7 +98,7 @@ class Simulation:
     @property
     def finished(self) -> bool:
         """Whether all steps of the history are made."""
-        return self._march.row.step >= len(self.job.timeline())
+        return self._march.row.step >= len(self._march.timeline())
 
     # -- fields -------------------------------------------------------------------------------------------------------
 

@@ -85,6 +85,12 @@ class Console:
             clock = f"{int(left // 3600)}:{int(left // 60) % 60:02d}:{int(left) % 60:02d}"
             self._write(f"# step {step} of {self._total}, about {clock} left")
 
+    def expect(self, total: int) -> None:
+        """So many steps are there to be, as far as is known by now."""
+        self._total = total
+        if self._bar is not None:
+            self._bar.total = total
+
     def close(self) -> None:
         if self._bar is not None:
             self._bar.close()
@@ -109,5 +115,7 @@ class Silence:
     def warn(self, text: str) -> None: ...
 
     def step(self, row: Row) -> None: ...
+
+    def expect(self, total: int) -> None: ...
 
     def close(self) -> None: ...

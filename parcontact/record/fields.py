@@ -39,18 +39,30 @@ class FieldsFile:
         self._drawn = 0.0
         self._identity = (0, 0)
         self._kept: frozenset[int] = frozenset()
+        self._provenance: Provenance | None = None
 
     def make(self, provenance: Provenance) -> None:
         """Lay the file out anew; what has its name is replaced."""
+        self._provenance = provenance
         new = self.slab.agree(files.unused(self.path))
         layout.lay_out(new, self.slab, lambda file: self._build(file, provenance))
         self._publish(new)
+
+    def make_place(self, steps: Sequence[int]) -> None:
+        """Lay the file out for other steps to come than were foreseen; what was saved stays, and no more place."""
+        found, _ = _found(self.path, self.slab)
+        if found is None or self._provenance is None:
+            return
+        kept = [step for step, time in zip(found.steps, found.times, strict=True) if not np.isnan(time)]
+        self.steps = {step: index for index, step in enumerate(sorted({*kept, *steps}))}
+        self._move_over(found, kept, self._provenance)
 
     def resume(self, step: int, provenance: Provenance) -> str:
         """Go on after a step: what was saved up to it stays, whatever else was asked for then.
 
         Returns what is lost, or ''; a file that cannot be read is put aside. Raises InputError for one that is locked.
         """
+        self._provenance = provenance
         found, problem = _found(self.path, self.slab)
         kept = [] if found is None else found.reached(step)
         self.steps = {n: i for i, n in enumerate(sorted({*kept, *(n for n in self.steps if n >= step)}))}
@@ -72,6 +84,7 @@ class FieldsFile:
 
     def renew(self, provenance: Provenance) -> None:
         """Put what has changed of its origin into the file."""
+        self._provenance = provenance
         layout.change(self.path, self.slab, provenance.renew)
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:

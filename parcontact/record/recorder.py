@@ -19,10 +19,11 @@ from .row import Row
 class Recorder:
     """Writes what a job asks for after every step; making one, and its methods, are collective.
 
-    Parameters: the `directory`; the `provenance` of its files; `total` steps of the run; `after`, the step after which
-    it goes on, or None to begin, and what the `table` of measures held then; `dissipated`, the number of branches whose
-    dissipation has a column; `added`, the columns of effects. Raises InputError where the files cannot be written.
-    `warnings` says what was lost of an earlier run, `problem` what of the results cannot be written.
+    Parameters: the `directory`; the `provenance` of its files; `total` steps of the run, about so many if it is
+    `open_ended`; `after`, the step after which it goes on, or None to begin, and what the `table` of measures held;
+    `dissipated`, the number of branches whose dissipation has a column; `added`, the columns of effects. Raises
+    InputError where the files cannot be written. `warnings` says what was lost of an earlier run, `problem` what of the
+    results cannot be written.
     """
 
     def __init__(
@@ -37,7 +38,9 @@ class Recorder:
         dissipated: int,
         quiet: bool,
         added: Sequence[str] = (),
+        open_ended: bool = False,
     ) -> None:
+        self._every = job.output.every if open_ended else 0
         self.slab, self.path, self.problem = slab, directory.path, ""
         self.console: Console | Silence = Silence()
         self._measures: MeasuresFile | None = None
@@ -65,7 +68,8 @@ class Recorder:
             if after is not None:
                 self.warnings += filter(None, [fields.cut_back(path, self.slab, after)])
             return None
-        steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), total})
+        ends = set[int]() if self._every else {total}
+        steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), *ends})
         file = FieldsFile(path, self.slab, job.grid.size, output.fields, steps)
         if after is None:
             file.make(provenance)
@@ -78,18 +82,37 @@ class Recorder:
         """What measures.csv holds; on root."""
         return self._measures.table if self._measures else Table()
 
-    def write(self, row: Row, field: Callable[[str], Array]) -> None:
-        """Record an instant; `field(name)` gives this rank's rows of a map.
+    def write(self, row: Row, field: Callable[[str], Array], total: int = 0) -> None:
+        """Record an instant; `field(name)` gives this rank's rows of a map. `total` is how many steps an open-ended run
+        will have, as far as is known by now; when the row's step is the last one, its number.
 
         What goes wrong is left in `problem`, for the next decision, which saves the state first.
         """
+        if total:
+            self.console.expect(total)
         self.console.step(row)
         if self._measures:
             try:
                 self._measures.write(row)
             except OSError as error:
                 self.problem = f"cannot write {self._measures.path}: {hdf5.reason(error)}"
+        if self._fields and self._every and total:
+            self._make_place(self._fields, row.step, total)
         self._save_fields(row, field)
+
+    def _make_place(self, file: FieldsFile, step: int, total: int) -> None:
+        """In an open-ended run there may be more instants than were foreseen, and in the end there are as many as there
+        are."""
+        wanted: list[int] = []
+        if step >= total:
+            wanted = [step]
+        elif step % self._every == 0 and step not in file.steps:
+            wanted = list(range(step, max(total, 2 * step) + 1, self._every))
+        if wanted and wanted != [last for last in file.steps if last >= step]:
+            try:
+                file.make_place(wanted)
+            except RunError as error:
+                self.problem = self.problem or str(error)
 
     def catch_up(self, row: Row, field: Callable[[str], Array]) -> None:
         """Save the maps of the step after which a run goes on, if they are due and could not be saved then."""

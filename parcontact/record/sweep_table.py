@@ -82,7 +82,9 @@ def _state(case: Case) -> str:
     columns = measures.read(table)
     if not case.job.history:
         return "done"
-    return "done" if columns["step"] and columns["step"][-1] >= len(case.job.timeline()) else "begun"
+    steps = [int(step) for step in columns["step"]]
+    timeline = case.job.timeline().follow(dict(zip(steps, columns["time"], strict=True)))
+    return "done" if steps and steps[-1] >= len(timeline) else "begun"
 
 
 def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:

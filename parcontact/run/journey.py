@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from .. import sanity, scene
 from ..errors import RunError
-from ..job.timeline import Timeline, reached
+from ..job.chosen import reached
+from ..job.timeline import Timeline
 from ..march import loop
 from ..march.failure import StepError
 from ..march.rest import steps_to_make
@@ -105,7 +106,8 @@ class Journey:
     def record(self, marching: March) -> None:
         if marching.row.remark:
             self.console.say(marching.row.remark)
-        self.recorder.write(marching.row, marching.field)
+        total = len(self.timeline) if self.timeline.chooses else 0
+        self.recorder.write(marching.row, marching.field, total)
         self.errors.weigh(marching.row)
         try:
             doubts = self.contacts.judge(marching.row.step, marching.row.measures)
@@ -184,7 +186,8 @@ class Journey:
         for line in self.errors.summary.lines(self.job.numerics.accuracy):
             console.say(line)
         if self.stop:
-            console.say(f"stopped after step {row.step} of {len(self.timeline)}: {self.stop}; run again to go on")
+            of = f"about {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
+            console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")
             return AGAIN
         finished = row.step >= len(self.timeline)
         if self.slab.root and finished:

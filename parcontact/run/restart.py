@@ -12,7 +12,8 @@ from pydantic import TypeAdapter
 
 from ..errors import InputError
 from ..job import Job, Stage
-from ..job.timeline import Step
+from ..job.chosen import ChosenSteps, reached
+from ..job.timeline import Step, Timeline
 from ..parallel.slab import Slab
 from ..record import checkpoint, marker
 from ..record.checkpoint import Contents
@@ -73,7 +74,7 @@ def claim(plain: Mapping[str, Any], origin: Origin | None) -> Claim:
 
 
 def finished_before(
-    job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, steps: int
+    job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, timeline: Timeline
 ) -> str:
     """What to say of a run of this job that has finished and was to keep no checkpoint, or ''; collective."""
 
@@ -82,7 +83,9 @@ def finished_before(
         if restart != "auto" or job.checkpoint.keep or claim is None or claim.finished is None or directory.saved():
             return ""
         same = not any(marker.differences(claim.job, plain, (*SAME, *SAME_NUMERICS)))
-        if not same or claim.finished[0] != steps or not (directory.path / "measures.csv").exists():
+        steps, at = claim.finished
+        whole = reached(at, timeline.end) if timeline.chooses else steps == len(timeline)
+        if not same or not whole or not (directory.path / "measures.csv").exists():
             return ""
         return f"finished before, at t = {claim.finished[1]:g} s, without a checkpoint (--restart never: run it afresh)"
 
@@ -156,7 +159,10 @@ def find_changed_step(contents: Contents, job: Job) -> str:
     """Which of the steps already made would be another one in this job, or ''; those to come may be others."""
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
-    old, new = (each.timeline(until) for each in (job.model_copy(update={"history": history}), job))
+    old, new = (
+        each.timeline(until, ChosenSteps.restored(contents.numbers))
+        for each in (job.model_copy(update={"history": history}), job)
+    )
     count = min(number, len(old), len(new))
     for step in range(old.shared(new) + 1, count + 1):
         if difference := next(_apart(old[step], new[step]), ""):

@@ -6,7 +6,8 @@ from .. import sanity
 from ..effects import decisions
 from ..errors import InputError
 from ..job import Job, Rough, RoughSpectrum
-from ..job.timeline import Timeline, reached
+from ..job.chosen import ChosenSteps, reached
+from ..job.timeline import Timeline
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -54,8 +55,10 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
     with directory.claimed():
         plain = marker.plain_job(job) if slab.root else {}
         timeline = job.timeline(options.until or 0.0)
-        finished = restart.finished_before(job, plain, slab, directory, options.restart, len(timeline))
+        finished = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
         origin, warnings = (None, []) if finished else restart.choose(job, plain, slab, directory, options.restart)
+        if origin:
+            timeline = job.timeline(options.until or 0.0, ChosenSteps.restored(origin.contents.numbers))
         _refuse_no_end(timeline, options.until)
         sanity.refuse_impossible(job, timeline)
         reason = _nothing_to_do(origin, timeline, options.until) if origin else finished
@@ -65,11 +68,12 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
             return Ended(DONE, None, origin.contents if origin else None)
         wisdom.recall(job, slab, origin.wisdom if origin else None)
         marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
+        timeline = marching.timeline(options.until or 0.0)
         doubts = (*job.warnings, *sanity.of_surface(marching.scene.frame))
         wisdom.keep(job, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = restart.claim(plain, origin)
-        recorder = _begin(marching.scene, directory, claim, provenance, origin, len(timeline), options.quiet)
+        recorder = _begin(marching.scene, directory, claim, provenance, origin, timeline, options.quiet)
         try:
             for text in header.lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
@@ -116,7 +120,7 @@ def _begin(
     claim: Claim,
     provenance: Provenance,
     origin: Origin | None,
-    total: int,
+    timeline: Timeline,
     quiet: bool,
 ) -> Recorder:
     """Make the output directory ready, and its files; collective."""
@@ -130,4 +134,5 @@ def _begin(
     dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
     after, then = (origin.contents.step, origin.contents.table) if origin else (None, Table())
     added = [name for follower in built.followers.values() for name in follower.columns]
-    return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet, added)
+    total, chooses = len(timeline), timeline.chooses
+    return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet, added, chooses)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields, replace
 
 from ..errors import InputError
-from ..job import GeometricStep, HeightFile, Job, Study
+from ..job import AUTO, GeometricStep, HeightFile, Job, Study
 
 
 @dataclass(frozen=True)
@@ -116,6 +116,6 @@ def overrides(job: Job, own: Case, case: Case) -> list[str]:
         elif isinstance(stage.time_step, GeometricStep):
             first, growth = stage.time_step.first * factor, stage.time_step.growth**factor
             words.append(f"{place}.time_step={{first: {first!r}, growth: {growth!r}}}")
-        elif stage.time_step is not None:
+        elif stage.time_step is not None and stage.time_step != AUTO:
             words.append(f"{place}.time_step={stage.time_step * factor!r}")
     return words

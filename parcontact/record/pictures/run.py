@@ -79,8 +79,8 @@ class Run:
     @cached_property
     def timeline(self) -> Timeline:
         """What the job says about each step."""
-        last = float(self._columns["time"][-1])
-        return Timeline(self.job.history, self.job.grid, last, self.job.initial.pressure)
+        steps, times = self._columns["step"].astype(int).tolist(), self._columns["time"].tolist()
+        return self.job.timeline(times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
     def stages(self) -> NDArray[np.int64]:

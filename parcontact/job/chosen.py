@@ -1,0 +1,157 @@
+"""Stages that choose their own time steps: within which bounds, which were chosen, and a guess of those to come.
+
+Which step is next is decided when the one before it has been made (`march.choosing`). What was chosen is kept, so that
+a history has numbered steps here as everywhere, and a run goes on from them. What is not known yet is taken to be a
+ladder: steps double from the shortest to the longest that are allowed and go on with these, as they do where the error
+permits it.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .history import Stage
+from .limits import one_cell
+from .sections import Grid
+
+SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
+HALVINGS = 10  # of a cell, in the shortest step of a surface that slides
+LEAST_SHARE = 2.0**-20  # of its duration, in the shortest step of a stage at rest
+SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/next": "s"}  # of what is remembered
+RAMP_STEPS = 16  # at least, while a load changes
+
+
+def reached(time: float, until: float) -> bool:
+    """Whether a time is the one asked for, or later."""
+    return time >= until * (1.0 - SAME_TIME)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The shortest and the longest step of a stage that chooses its own [s]."""
+
+    least: float
+    most: float
+
+
+def bounds(stage: Stage, grid: Grid) -> Bounds:
+    """In sliding from a small part of a cell to one; at rest from a small part of the stage to all of it."""
+    most = stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
+    if not stage.speed:
+        return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
+    cell = one_cell(stage, grid)
+    most = min(cell, most)
+    return Bounds(min(cell / 2**HALVINGS, most), most)
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Steps that double from `first` to `most` [s], and then are alike, over some `seconds`."""
+
+    first: float
+    most: float
+    seconds: float
+
+    @property
+    def doublings(self) -> int:
+        return max(0, math.ceil(math.log2(self.most / self.first) * (1.0 - SAME_TIME)))
+
+    @property
+    def count(self) -> int:
+        """How many they are."""
+        if self.seconds <= 0.0:
+            return 0
+        top = self.first * 2.0**self.doublings
+        if self.seconds <= top:
+            return 1 + max(0, math.ceil(math.log2(self.seconds / self.first) * (1.0 - SAME_TIME)))
+        return self.doublings + math.ceil(self.seconds / top * (1.0 - SAME_TIME))
+
+    def end(self, index: int) -> float:
+        """When step `index`, from 1, ends [s]; 0 is the start."""
+        if index <= 0:
+            return 0.0
+        doubled = min(index - 1, self.doublings)
+        return min(self.first * 2.0**doubled * (1 + max(0, index - 1 - self.doublings)), self.seconds)
+
+
+@dataclass(frozen=True)
+class ChosenEnds:
+    """Ends of the steps of a stage as fractions of it: those that were `made` [s after its start], then a ladder.
+
+    The stage ends at the first of `stops` [s]; a later one is where it was asked to go on to.
+    """
+
+    made: Sequence[float]
+    stops: tuple[float, ...]
+    ladder: Ladder
+
+    growth = 0.0  # not all alike
+
+    @property
+    def count(self) -> int:
+        return len(self.made) + self.ladder.count
+
+    @property
+    def last(self) -> float:
+        """How much the last step is of the stage."""
+        return self[self.count] - self[self.count - 1]
+
+    def beyond(self, until: float) -> int:
+        """None: steps that go on are among them."""
+        return 0
+
+    def elapsed(self, index: int) -> float:
+        """When the step ends [s after the start of the stage]."""
+        if index <= len(self.made):
+            return self.made[index - 1] if index > 0 else 0.0
+        now = self.made[-1] if self.made else 0.0
+        return self.stops[-1] if index >= self.count else now + self.ladder.end(index - len(self.made))
+
+    def __getitem__(self, index: int) -> float:
+        return self.elapsed(index) / self.stops[0]
+
+
+@dataclass
+class ChosenSteps:
+    """The steps that the stages of a history have chosen so far: their `ends` [s after the start of their stage] by the
+    number of the stage, and how long the next one is meant to be [s], 0 where that is yet to be found."""
+
+    ends: dict[int, list[float]] = field(default_factory=dict)
+    next: float = 0.0
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return sum(map(len, self.ends.values()))
+
+    def of(self, stage: int, asked: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
+        """Those of a stage that may go on to `until` [s after its start]."""
+        made, limits = self.ends.get(stage, []), bounds(asked, grid)
+        stops = (asked.seconds, *([until] if not reached(asked.seconds, until) else []))
+        left = 0.0 if made and reached(made[-1], stops[-1]) else stops[-1] - (made[-1] if made else 0.0)
+        first = self.next if made and self.next else limits.least
+        return ChosenEnds(made, stops, Ladder(min(first, limits.most), limits.most, left))
+
+    def numbers(self) -> dict[str, NDArray[np.float64]]:
+        """As arrays, by the names that they have in a checkpoint."""
+        stages = sorted(self.ends)
+        values = (
+            [float(stage) for stage in stages],
+            [float(len(self.ends[stage])) for stage in stages],
+            [end for stage in stages for end in self.ends[stage]],
+            self.next,
+        )
+        return {name: np.array(value) for name, value in zip(SYMBOLS, values, strict=True)}
+
+    @classmethod
+    def restored(cls, saved: Mapping[str, NDArray[Any]]) -> "ChosenSteps":
+        """From the arrays of a checkpoint; none were chosen before one that has no such arrays."""
+        if not SYMBOLS.keys() <= saved.keys():
+            return cls()
+        stages, counts, ends, following = (saved[name] for name in SYMBOLS)
+        parts = np.split(ends, np.cumsum(counts.astype(int))[:-1]) if counts.size else []
+        return cls({int(stage): part.tolist() for stage, part in zip(stages, parts, strict=True)}, float(following))

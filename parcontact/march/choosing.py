@@ -1,0 +1,164 @@
+"""Time steps that follow the error of a step.
+
+The embedded pair estimates the error E of a step of length dt from that step alone. It is to be `allowed` E0, a share
+of `numerics.accuracy`. As E goes with dt^p (p = 1.7 for the exponential integrator, 1 for backward Euler), the next is
+
+    dt <- dt clip(SAFETY (E0/E)^(1/p), MOST_SHRINK, MOST_GROWTH),
+
+and a step with E > REJECTED E0 is made anew from the same state, shorter; the one after it does not grow (E. Hairer,
+S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993), II.4). Steps are a shortest one times powers
+of two, at rest of its fourth root, so that rounding has no part in their length.
+
+While the surface slides, steps end at multiples of their length, counted in cells from where the surface was at first
+(block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump,
+halves, quarters, ... lead back to whole cells, by which heights are moved without a transform.
+"""
+
+import math
+from dataclasses import dataclass
+
+from ..job.chosen import Bounds, ChosenEnds, ChosenSteps, bounds, reached
+from ..job.limits import one_cell
+from ..job.timeline import Span, Step
+from ..physics.body import ZenerBody
+from ..physics.budget import TIME_ORDER
+from ..scene import Scene
+
+TIME_SHARE = 0.65  # of numerics.accuracy, for the error of a step
+SAFETY = 0.9
+REJECTED = 1.5  # times the error allowed: the error of a slide varies from step to step, and its mean counts
+MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0
+REST_LEVELS = 4  # lengths of steps at rest per factor of two
+STRETCH = 1.1  # of the last step of a stage: no step shorter than a tenth of the one before is left over
+RELAXING = 0.1  # of the shortest relaxation time: the first step at rest after a jump
+SAME_LEVEL = 1e-6  # of a level
+
+
+@dataclass
+class StepChooser:
+    """Proposes the steps of stages that choose their own, and judges them when they have been tried.
+
+    `allowed` is the error of a step; `order` p; `shortest` the shortest relaxation time that is resolved [s].
+    """
+
+    scene: Scene
+    chosen: ChosenSteps
+
+    def __post_init__(self) -> None:
+        numerics, material = self.scene.job.numerics, self.scene.material
+        self.allowed = TIME_SHARE * numerics.accuracy
+        self.order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
+        self.shortest = math.inf
+        if isinstance(material, ZenerBody) and material.kept:
+            self.shortest = float(material.prony.relaxation_times[material.kept].min())
+        self._rejected = False
+
+    def propose(self, span: Span, number: int, is_relaxed: bool) -> Step:
+        """The next step of a stage; it has this number. Where the body is relaxed, it ends the stage."""
+        if number == span.before + span.jumps + 1:
+            self.chosen.next = self._first(span)
+        if is_relaxed:
+            self.chosen.next = self._bounds(span).most
+        self._rejected = False
+        return self._step(span, number, self.chosen.next)
+
+    def judge(self, span: Span, step: Step, error: float) -> Step | None:
+        """The shorter step to make instead of one with such an error, or None: then it counts as made."""
+        ratio = error / self.allowed
+        wanted = SAFETY * ratio ** (-1.0 / self.order) if ratio > 0.0 else MOST_GROWTH
+        if ratio > REJECTED and (shorter := self._shorter(span, step, min(max(wanted, MOST_SHRINK), 1.0))):
+            self._rejected = True
+            return shorter
+        most = 1.0 if self._rejected else MOST_GROWTH
+        self.chosen.next = self._level(span, step.dt * min(max(wanted, 1.0), most))
+        self.chosen.ends.setdefault(span.index, []).append(self._end)
+        return None
+
+    def _shorter(self, span: Span, step: Step, share: float) -> Step | None:
+        """A step that is at most that share of one, None if that one is the shortest."""
+        least, dt = self._bounds(span).least, share * step.dt
+        while True:
+            self.chosen.next = self._level(span, dt)
+            shorter = self._step(span, step.number, self.chosen.next)
+            if shorter.dt < step.dt * (1.0 - SAME_LEVEL):
+                return shorter
+            if self.chosen.next <= least:
+                return None
+            dt = 0.5 * self.chosen.next
+
+    # -- parts --------------------------------------------------------------------------------------------------------
+
+    def _bounds(self, span: Span) -> Bounds:
+        return bounds(span.stage, self.scene.job.grid)
+
+    def _levels(self, span: Span) -> int:
+        """Lengths of steps per factor of two."""
+        return 1 if span.stage.speed else REST_LEVELS
+
+    def _level(self, span: Span, dt: float) -> float:
+        """The longest of the lengths that steps may have which is no longer than dt."""
+        limits, levels = self._bounds(span), self._levels(span)
+        if dt <= limits.least:
+            return limits.least
+        power = math.floor(levels * math.log2(dt / limits.least) + SAME_LEVEL)
+        return min(limits.least * 2.0 ** (power / levels), limits.most)
+
+    def _first(self, span: Span) -> float:
+        """How long to try the first step of a stage."""
+        limits = self._bounds(span)
+        if self._goes_on(span) and self.chosen.next:
+            return self._level(span, self.chosen.next)
+        if span.stage.speed:
+            return limits.most
+        return self._level(span, RELAXING * self.shortest)
+
+    def _goes_on(self, span: Span) -> bool:
+        """Whether nothing has changed since the stage before, which chose its steps too."""
+        if span.index == 0 or span.jumps:
+            return False
+        before = self.scene.job.history[span.index - 1]
+        return before.chooses and before.velocity == span.stage.velocity
+
+    def _step(self, span: Span, number: int, dt: float) -> Step:
+        """The step that is about so long: it ends at a multiple of its length, or with the stage."""
+        ends = span.ends
+        assert isinstance(ends, ChosenEnds)
+        now = ends.made[-1] if ends.made else 0.0
+        stop = next(stop for stop in ends.stops if not reached(now, stop))
+        if span.stage.speed:
+            dt = self._to_a_multiple(span, now, dt)
+        elif stop - now < 2.0 * dt:
+            dt = max(dt, stop - now) if stop - now <= STRETCH * dt else 0.5 * (stop - now)
+        if stop - now <= (STRETCH if not span.stage.speed else 1.0 + SAME_LEVEL) * dt:
+            dt, self._end = stop - now, stop
+        else:
+            self._end = now + dt
+        return self._made(span, number, dt)
+
+    def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
+        """How long until the surface is at a multiple of the way of such a step, nearest to one step from now."""
+        if span.stage.velocity[1]:
+            return dt
+        (x, _), (along, _) = span.origin, span.stage.velocity
+        cell = one_cell(span.stage, self.scene.job.grid)
+        at = math.copysign(1.0, along) * x / self.scene.job.grid.dx + now / cell
+        size = dt / cell
+        way = (round(at / size + 1.0) * size - at) * cell
+        return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
+
+    def _made(self, span: Span, number: int, dt: float) -> Step:
+        stage, seconds = span.stage, span.stage.seconds
+        (x, y), (along_x, along_y) = span.origin, stage.velocity
+        made = self.chosen.ends.get(span.index, [])
+        last = made[-1] - (made[-2] if len(made) > 1 else 0.0) if made else 0.0
+        return Step(
+            number,
+            span.index,
+            span.start + self._end,
+            dt,
+            (x + along_x * self._end, y + along_y * self._end),
+            *span.facts,
+            span.load.at(min(self._end / seconds, 1.0)),
+            dt / last if last > 0.0 else 0.0,
+            judge=lambda step, error: self.judge(span, step, error),
+        )
