@@ -133,7 +133,7 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     Collective. Raises InputError for surface files that do not fit.
     """
     base = frame(job, slab)
-    motion: Motion = _way(job)(base.surface, base.dtype)
+    motion = _motion(base)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
@@ -168,11 +168,13 @@ def facts(built: Scene) -> list[str]:
 # -- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _way(job: Job) -> type[AnyFraction | PartCells | WholeCells]:
+def _motion(base: Frame) -> Motion:
     """How the surface moves."""
-    if not decisions.part_cells(job).on:
-        return WholeCells
-    return PartCells if decisions.whole_cells_at_times(job) else AnyFraction
+    if not decisions.part_cells(base.job).on:
+        return WholeCells(base.surface, base.dtype)
+    if decisions.whole_cells_at_times(base.job):
+        return PartCells(base.surface, base.dtype)
+    return AnyFraction(base.surface, base.dtype)
 
 
 def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from parcontact.job import Grid, Stage
 from parcontact.job.chosen import reached
-from parcontact.job.timeline import Timeline, divided
+from parcontact.job.division import divided
+from parcontact.job.timeline import Timeline
 
 GRID = Grid(points=(16, 12), size=(1e-3, 7.5e-4))
 SLIDE = {"pressure": 1e4, "velocity": 0.1, "cells_per_step": 1}

@@ -95,7 +95,10 @@ def test_theory_stands_alone() -> None:
 
 
 MADE_BY = {  # which modules make objects of a kind
-    **{kind: {"scene"} for kind in ("AnyFraction", "WholeCells", "ElasticBody", "ElasticEnergy", "ZenerEnergy")},
+    **{
+        kind: {"scene"}
+        for kind in ("AnyFraction", "PartCells", "WholeCells", "ElasticBody", "ElasticEnergy", "ZenerEnergy")
+    },
     **{kind: {"scene"} for kind in ("ElasticPressure", "AppliedInverse", "Ledger", "Frame", "Scene")},
     "ZenerBody": {"scene", "physics.energy"},  # a second one follows A^-1 u
     "ContactSolver": {"scene", "plan.machine"},  # and one of no job measures a machine
