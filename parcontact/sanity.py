@@ -21,6 +21,7 @@ SEAM = (
     2.0  # the jump across the edge of the box over the largest increment of neighbours inside: 1 if nothing is special
 )
 ROUGH = 0.5  # of the curvature over one cell that is gone over two: half of it, as in a wave of four cells
+ODD_CONTACTS = ("edge", "cells")  # at the edge of the box; a few cells wide
 FEW_CELLS = (
     0.15  # of the area of contact that counting cells takes too large: contacts of three cells, a circle of four
 )
@@ -171,7 +172,7 @@ class ContactWatch:
 
     def _new(self, where: str, measures: Measures, ends: bool) -> list[str]:
         """What has not been told yet."""
-        found = {"edge": at_edge(measures), "cells": few_cells(measures) if ends else ""}
+        found = dict(zip(ODD_CONTACTS, (at_edge(measures), few_cells(measures) if ends else ""), strict=True))
         new = {kind: f"{where}: {text}" for kind, text in found.items() if text and kind not in self.told}
         self.told |= new.keys()
         if new and self.job.numerics.strict:

@@ -4,6 +4,7 @@ Programs are compared by all their counts: operator calls, transforms by size an
 and held. A solve that is given up after a fixed number of iterations makes them the same for all loads and bodies.
 """
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -338,6 +339,18 @@ def test_dissipation_per_branch(run: Callable[..., Path]) -> None:
     assert not np.isnan(found[1]["work"]).any()
 
 
+def test_run_on_half_the_mesh(run: Callable[..., Path]) -> None:
+    """Only where it is asked for, and then no map more in the run itself."""
+    name, found = "run on half the mesh", {}
+    for mesh_check in (False, True):
+        output = {"mesh_check": mesh_check}
+        assert row(job(output=output), name).on == mesh_check
+        out = run(str(mesh_check), output=output)
+        assert (out / "half_mesh").exists() == mesh_check
+        (found[mesh_check],) = re.findall(r"map bytes (\d+)", (out / "run.log").read_text())
+    assert found[True] == found[False]
+
+
 def test_counts_are_in_the_log(run: Callable[..., Path]) -> None:
     log = (run("logged") / "run.log").read_text()
     for name in ("allreduce", "fft", TRANSFORM, "map bytes", "operator"):
@@ -352,6 +365,7 @@ TESTED = {
         "steady start",
         "displacement control",
         "dissipation per branch",
+        "run on half the mesh",
     ),
     *("fields", "checkpoints", "interface"),  # the last in effects/test_interface.py
 }

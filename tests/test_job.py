@@ -300,7 +300,9 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     assert "only 2 long waves fit into the box along x" in long
     assert "a size of 0.002 m or a long_wavelength of 0.00025 m" in long
     assert "only 4 cells per shortest wave along x" in short
-    assert "128 points or a short_wavelength of 0.000125 m" in short
+    assert (
+        "128 points (4 times the memory, some 8 times the time in sliding) or a short_wavelength of 0.000125 m" in short
+    )
 
 
 def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:

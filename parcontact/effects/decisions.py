@@ -127,6 +127,13 @@ def checkpoints(job: Job) -> Decision:
     return Decision("checkpoints", True, f"{when} and at the end; {rules.keep} are kept")
 
 
+def mesh_check(job: Job) -> Decision:
+    """The same run on half the mesh first, from which what the mesh makes wrong is seen."""
+    asked = job.output.mesh_check
+    why = "output.mesh_check asks for it, about a third of the work more" if asked else "output.mesh_check is not set"
+    return Decision("run on half the mesh", asked, why)
+
+
 def mixed_precision(job: Job) -> Decision:
     """A preconditioner in single precision, with transforms of its own."""
     precision = job.numerics.precision
@@ -135,5 +142,15 @@ def mixed_precision(job: Job) -> Decision:
 
 TABLE: tuple[Callable[[Job], Decision], ...] = (
     *(relaxation.decide, folded_branches.decide, isolated, sliding, part_cells, lasting, short_rest, steady_start),
-    *(approach, mixed_precision, spectrum, energies, energy_memory, branch_dissipation, fields, checkpoints),
+    *(
+        approach,
+        mixed_precision,
+        spectrum,
+        energies,
+        energy_memory,
+        branch_dissipation,
+        mesh_check,
+        fields,
+        checkpoints,
+    ),
 )

@@ -63,9 +63,16 @@ def _surface(grid: Grid, surface: tuple[Any, ...], accuracy: float) -> Iterator[
             yield (
                 f"surface.{index}: only {shape.short_wavelength / cell:.3g} cells per shortest wave along {name}; "
                 f"for a resolved contact use at least {needed}: "
-                f"{math.ceil((1 - SAME_LENGTH) * needed * length / shape.short_wavelength)} points or a "
+                f"{math.ceil((1 - SAME_LENGTH) * needed * length / shape.short_wavelength)} points"
+                f"{_price(grid, needed * cell / shape.short_wavelength)} or a "
                 f"short_wavelength of {needed * cell:.4g} m"
             )
+
+
+def _price(grid: Grid, finer: float) -> str:
+    """What so many times the points along each direction cost, when steps of a slide are as many times shorter."""
+    more = finer ** sum(n > 1 for n in grid.points)
+    return f" ({more:.2g} times the memory, some {more * finer:.2g} times the time in sliding)"
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:

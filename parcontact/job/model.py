@@ -23,7 +23,7 @@ from .material import Dma, Elastic, Material, Zener, heated
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
-from .surface import Rough, Shape
+from .surface import HeightFile, Rough, Shape
 from .timeline import Timeline
 from .yamltext import dump
 
@@ -47,6 +47,21 @@ def _waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
             if abs(waves) > n / 2:
                 sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
                 yield Fault(sentence, ("surface", index, "waves", axis))
+
+
+def _half_mesh_fits(grid: Grid, surface: tuple[Any, ...], output: Output) -> Iterator[Fault]:
+    """A check of the mesh needs the same scene on half of it."""
+    key = ("output", "mesh_check")
+    if not output.mesh_check or next(_waves_fit(grid, surface), None):
+        return
+    if any(n % 2 for n in grid.points if n > 1):
+        yield Fault(f"needs even numbers of grid.points, got {list(grid.points)}", key)
+    for index, shape in enumerate(surface):
+        if isinstance(shape, HeightFile):
+            yield Fault(f"the heights of surface.{index} are given on one mesh, and cannot be put on half of it", key)
+    half = grid.model_copy(update={"points": tuple(max(n // 2, 1) for n in grid.points)})
+    for fault in _waves_fit(half, surface):
+        yield Fault(f"on half the mesh {'.'.join(map(str, fault.path))} {fault.predicate}", key)
 
 
 def _some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
@@ -106,6 +121,7 @@ class Job(Part):
         Rule(("grid", "numerics"), _kernel_fits),
         Rule(("surface",), _some_shape),
         Rule(("grid", "surface"), _waves_fit),
+        Rule(("grid", "surface", "output"), _half_mesh_fits),
         Rule(("history", "steady"), _some_history),
         Rule(("history", "initial"), _some_load),
         Rule(("initial", "material"), _steady_at_rest),

@@ -115,6 +115,7 @@ class Output(Part):
     every: Count = Field(default=1, description="a positive whole number of steps")
     energy: Flag = Field(default=False, description="true or false")
     branch_dissipation: Flag = Field(default=False, description="true or false")
+    mesh_check: Flag = Field(default=False, description="true or false")
 
     rules = (Rule(("branch_dissipation", "energy"), _needs_energy), Rule(("fields",), _no_repeats))
 

@@ -10,14 +10,14 @@ time: from the embedded pair (see `embedded`). Over one step the pair differs in
     order and goes with the root.
 folded: the bound of the branches without a map.
 mesh: of friction from the cells per shortest wave of a rough surface, or per radius of a contact spot; of the corrected
-    area from the correction itself.
+    area from the correction itself. Where there is a run on half the mesh, both from their difference to it.
 
 Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
 wrong with pressures then counts more, by about the root of the ratio.
 """
 
 import math
-from dataclasses import asdict, astuple, dataclass, fields
+from dataclasses import asdict, astuple, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact
 EULER_FRICTION, EULER_AREA = 0.7, 0.4  # times its root
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
+CORRECTED_ORDER = 1.0  # of the corrected area
 EDGES, STRAIGHT_EDGES = 0.25, 2.0  # of the correction of the area; along edges that follow the grid
 AT_ONCE = 1e-200  # s: what a step weighs that lasts no time
 ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
@@ -135,6 +136,21 @@ def spot_radius(seen: Seen, points: int) -> float:
     there are no edges."""
     sides = (seen.area - seen.corrected) * points / SIDE
     return ROUND * min(seen.area, 1.0 - seen.area) * points / sides if sides > 0.0 else math.inf
+
+
+def compared_with_half_mesh(
+    budget: ErrorBudget, here: tuple[float, float], coarse: tuple[float, float], waves: bool
+) -> ErrorBudget:
+    """The budget with what another run shows of the mesh: `here` friction and corrected area of an instant, `coarse`
+    those with twice the cell. As errors go with the power p of the cell, the difference is 2^p - 1 of them.
+
+    With p as above; of the corrected area, whose error falls slower, 1.
+    """
+    apart = [abs(one - other) / one if one > 0.0 else 0.0 for one, other in zip(here, coarse, strict=True)]
+    friction = apart[0] / (2.0 ** (WAVES_ORDER if waves else SPOTS_ORDER) - 1.0)
+    area = apart[1] / (2.0**CORRECTED_ORDER - 1.0)
+    found = budget.friction
+    return ErrorBudget(found and replace(found, mesh=friction), replace(budget.area, mesh=area))
 
 
 def _area(known: Known, seen: Seen) -> Parts:

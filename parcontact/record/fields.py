@@ -96,8 +96,8 @@ class FieldsFile:
         if self.slab.agree(clock.monotonic() - self._drawn > XDMF_SECONDS):
             self._draw()
 
-    def sync(self) -> None:
-        """Wait until all that was saved is on the disk, and bring fields.xdmf up to date.
+    def sync(self, provenance: Provenance) -> None:
+        """Wait until all that was saved is on the disk, with what is new of its origin; bring fields.xdmf up to date.
 
         Raises RunError, also when the file was removed or replaced.
         """
@@ -107,6 +107,7 @@ class FieldsFile:
                 raise ValueError("it was removed, or replaced by another file, during the run: maps are lost")
 
         hdf5.on_root(self.slab, look, f"cannot write {self.path}")
+        self.renew(provenance)
         hdf5.sync(self.path, self.slab)
         self._draw()
 

@@ -131,9 +131,11 @@ class Recorder:
         if self._fields:
             self._fields.renew(provenance)
 
-    def sync(self) -> None:
-        """Wait until all that was recorded is on the disk. What is wrong with it is left in `problem`, if results are
-        lost by it, or warned of."""
+    def sync(self, provenance: Provenance) -> None:
+        """Wait until all that was recorded is on the disk, with where it comes from.
+
+        What is wrong with it is left in `problem`, if results are lost by it, or warned of.
+        """
 
         def sync() -> None:
             if self._measures:
@@ -146,7 +148,7 @@ class Recorder:
         try:
             hdf5.on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
             if self._fields:
-                self._fields.sync()
+                self._fields.sync(provenance)
         except RunError as error:
             self.problem = self.problem or str(error)
         if self._fields and self._fields.trouble:

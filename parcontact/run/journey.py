@@ -35,7 +35,8 @@ class Journey:
         watching: Watch,
         facts: Facts,
         until: float | None,
-        origin: Origin | None,
+        errors: ErrorsSoFar,
+        contacts: sanity.ContactWatch,
     ) -> None:
         self.march, self.timeline, self.directory, self.recorder = marching, timeline, directory, recorder
         self.watch, self.facts, self.until = watching, facts, until
@@ -43,13 +44,11 @@ class Journey:
         self.console = recorder.console
         self.first, self.saved, self.failed = marching.row.step, -1, False
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
-        self.contacts = sanity.ContactWatch(self.job, timeline)
+        self.errors, self.contacts = errors, contacts
         self.stop = ""
-        self.errors = ErrorsSoFar(marching.row.time, origin.contents.numbers if origin else None)
         self.began, self.saving = time.monotonic(), 0.0
-        self.origin = origin
 
-    def go(self) -> int:
+    def go(self, origin: Origin | None) -> int:
         grid, ranks = self.job.grid, "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
         title = self.job.title or self.job.path.stem
         self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
@@ -57,10 +56,10 @@ class Journey:
             self.console.say(str(self.job.included))
         for fact in scene.facts(self.march.scene):
             self.console.say(fact)
-        if self.origin:
-            self.console.say(f"goes on after step {self.first} from {self.origin.contents.path}")
+        if origin:
+            self.console.say(f"goes on after step {self.first} from {origin.contents.path}")
             self.recorder.catch_up(self.march.row, self.march.field)
-        ended = loop.run_tasks(self.march, [self.decide] if self.origin else [self.record, self.decide])
+        ended = loop.run_tasks(self.march, [self.decide] if origin else [self.record, self.decide])
         if not ended:
             self._march()
         if self.job.checkpoint.keep == 0 and self.march.row.step >= len(self.timeline):
@@ -81,8 +80,7 @@ class Journey:
         """What was recorded is on the disk then, with the error budget so far."""
         budget = self.errors.summary.facts(self.job.numerics.accuracy)
         self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
-        self.recorder.renew(self.facts.provenance)
-        self.recorder.sync()
+        self.recorder.sync(self.facts.provenance)
 
     def _march(self) -> None:
         steps = steps_to_make(self.march, self.timeline, self.until)
@@ -107,8 +105,7 @@ class Journey:
         if marching.row.remark:
             self.console.say(marching.row.remark)
         total = len(self.timeline) if self.timeline.chooses else 0
-        self.recorder.write(marching.row, marching.field, total)
-        self.errors.weigh(marching.row)
+        self.recorder.write(self.errors.weigh(marching.row, self.timeline), marching.field, total)
         try:
             doubts = self.contacts.judge(marching.row.step, marching.row.measures)
         except RunError as error:

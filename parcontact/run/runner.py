@@ -1,10 +1,11 @@
 """A run from a job to its output directory: it begins or goes on, saves what it remembers, and ends well."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from .. import sanity
 from ..effects import decisions
-from ..errors import InputError
+from ..errors import InputError, RunError
 from ..job import Job, Rough, RoughSpectrum
 from ..job.chosen import ChosenSteps, reached
 from ..job.timeline import Timeline
@@ -13,13 +14,16 @@ from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..record import header, marker, wisdom
 from ..record.checkpoint import Contents, Facts, Table
+from ..record.console import Console, Silence
 from ..record.directory import Directory
 from ..record.marker import Claim
 from ..record.provenance import Link, Provenance, extended
 from ..record.recorder import Recorder
 from ..scene import Scene
 from ..steady_sliding import start as steadystart
-from . import restart, watch
+from . import half_mesh, restart, watch
+from .errors_so_far import ErrorsSoFar
+from .half_mesh import HalfMesh
 from .journey import DONE, Journey
 from .restart import Origin
 from .watch import Watch
@@ -27,12 +31,17 @@ from .watch import Watch
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program."""
+    """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
+
+    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene.
+    """
 
     quiet: bool = False
     restart: str = "auto"
     until: float | None = None
     wall: float | None = None
+    stop_file: Path | None = None
+    beside: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         wisdom.recall(job, slab, origin.wisdom if origin else None)
         marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
         timeline = marching.timeline(options.until or 0.0)
-        doubts = (*job.warnings, *sanity.of_surface(marching.scene.frame))
+        doubts = () if options.beside else (*job.warnings, *sanity.of_surface(marching.scene.frame))
         wisdom.keep(job, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = restart.claim(plain, origin)
@@ -82,11 +91,50 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
             limit = watch.limit(options.wall) if slab.root else None
             facts = Facts(0, 0.0, plain, provenance, claim.id)
             with Signals().noted() as signals:
-                watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit)
-                journey = Journey(marching, timeline, directory, recorder, watching, facts, options.until, origin)
-                return Ended(journey.go(), marching)
+                stop_file = options.stop_file or directory.stop_file
+                watching = Watch(slab, job.checkpoint, stop_file, signals, limit)
+                code, half = _half_mesh(job, slab, options, recorder.console, stop_file)
+                if code != DONE:
+                    return Ended(code, marching)
+                saved = origin.contents.numbers if origin else None
+                errors = ErrorsSoFar(marching.row.time, saved, half)
+                told = set(sanity.ODD_CONTACTS if options.beside else ())
+                contacts = sanity.ContactWatch(job, timeline, told)
+                journey = Journey(
+                    marching, timeline, directory, recorder, watching, facts, options.until, errors, contacts
+                )
+                return Ended(journey.go(origin), marching)
         finally:
             recorder.close()
+
+
+def _half_mesh(
+    job: Job, slab: Slab, options: Options, console: Console | Silence, stop_file: Path
+) -> tuple[int, HalfMesh | None]:
+    """Run the job on half the mesh if that is asked for; the exit code, and what was measured there; collective.
+
+    Where that cannot be done the run goes on without it.
+    """
+    if not decisions.mesh_check(job).on:
+        return DONE, None
+    half = half_mesh.job_on_half_mesh(job)
+    grid, where = half.grid, half.output.directory
+    console.say(f"mesh check: {grid.nx} x {grid.ny} points first, in {where}")
+    beside = replace(options, quiet=True, stop_file=stop_file, beside=True)
+    restart = "never" if options.restart == "never" else "auto"
+    own = slab.resized(*grid.points)
+    try:
+        try:
+            code = run(half, own, replace(beside, restart=restart))
+        except InputError:  # of an earlier run of another job
+            code = run(half, own, replace(beside, restart="never"))
+        if code != DONE:
+            console.say(f"stopped in the run on half the mesh, {where}; run again to go on")
+            return code, None
+        return DONE, HalfMesh.read(half, slab)
+    except (InputError, RunError) as error:
+        console.warn(f"mesh check: the run on half the mesh failed, and its errors are estimated: {error}")
+        return DONE, None
 
 
 def _refuse_no_end(timeline: Timeline, until: float | None) -> None:

@@ -34,7 +34,7 @@ def saved(path: Path, slab: Slab, names: tuple[str, ...], steps: list[int], unti
     for step in steps:
         if step <= until:
             file.save(step, 0.1 * step, {name: field(slab, step, name) for name in names})
-    file.sync()
+    file.sync(FIRST)
     slab.comm.Barrier()
     return file
 
@@ -87,7 +87,7 @@ def test_goes_on_where_it_was(comm: MPI.Intracomm, shared_path: Path) -> None:
         assert [link.job for link in read_chain(h5)] == ["title: first\n", "title: second\n"]
     slab.comm.Barrier()
     file.save(6, 0.6, {"pressure": field(slab, 6, "pressure")})
-    file.sync()
+    file.sync(SECOND)
     check(path, slab, [2, 4, 6, 8], 3, {"pressure": [2, 4, 6]})
 
 
@@ -99,7 +99,7 @@ def test_goes_on_with_other_instants_and_maps(comm: MPI.Intracomm, shared_path: 
     assert file.resume(5, SECOND) == ""
     check(path, slab, [2, 4, 6, 9, 10], 2, {"pressure": [2, 4], "gap": []})
     file.save(6, 0.6, {name: field(slab, 6, name) for name in ("pressure", "gap")})
-    file.sync()
+    file.sync(SECOND)
     check(path, slab, [2, 4, 6, 9, 10], 3, {"pressure": [2, 4, 6], "gap": [6]})
 
 

@@ -1,0 +1,92 @@
+"""The run on half the mesh beside a run (`output.mesh_check`): what the mesh makes wrong, seen instead of estimated.
+
+It has twice the cell along both directions, and the same waves, loads, numerics and time steps, whose error would else
+be taken for that of the mesh. With a quarter of the points, and steps of half a cell instead of one, which take some
+more calls, it is about a third of the work. It has a directory of its own below that of the run, in which it goes on
+after a stop like any run, and comes first: then every row of the run can be compared with it at its instant.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..job import Job, Rough
+from ..job.table import plain
+from ..job.timeline import Timeline
+from ..parallel.slab import Slab
+from ..physics.budget import ErrorBudget, compared_with_half_mesh
+from ..record import measures
+from ..record.row import Row
+
+DIRECTORY = "half_mesh"  # below that of the run
+COLUMNS = ("time", "friction", "contact_area_corrected")
+SAME_TIME = 1e-9  # relative
+
+
+def job_on_half_mesh(job: Job) -> Job:
+    """The job of the run beside another one: no fields, no energies, nothing but its table."""
+    data: dict[str, Any] = plain(job)
+    data["grid"]["points"] = [max(n // 2, 1) for n in job.grid.points]
+    data["output"] = {"directory": str(job.output.directory / DIRECTORY)}
+    data["numerics"]["strict"] = False
+    for stage in data["history"]:
+        if "cells_per_step" in stage:
+            stage["cells_per_step"] /= 2
+    data["title"] = f"{job.title or job.path.stem}, on half the mesh"
+    for section in ("steady", "study"):
+        data.pop(section, None)
+    return Job.model_validate(data).of(job.origin, job.path)
+
+
+@dataclass(frozen=True)
+class HalfMesh:
+    """What was measured on half the mesh: friction and corrected contact area at increasing times [s].
+
+    `waves`: whether the surface has a shortest wave.
+    """
+
+    times: Sequence[float]
+    friction: Sequence[float]
+    area: Sequence[float]
+    waves: bool
+
+    @classmethod
+    def read(cls, job: Job, slab: Slab) -> "HalfMesh":
+        """From the table that it has left; collective. Raises InputError where that cannot be read."""
+        found = measures.read(job.output.directory / "measures.csv") if slab.root else {}
+        times, friction, area = slab.agree([found.get(name, []) for name in COLUMNS])
+        return cls(times, friction, area, any(isinstance(shape, Rough) for shape in job.surface))
+
+    def judge(self, row: Row, place: int) -> ErrorBudget | None:
+        """The error budget of a row of the run; it is the row number `place` of those at its time, from 0."""
+        if row.errors is None:
+            return None
+        m = row.measures
+        return compared_with_half_mesh(
+            row.errors, (m.friction, m.contact_area_corrected), self._at(row.time, place), self.waves
+        )
+
+    def _at(self, time: float, place: int) -> tuple[float, float]:
+        """Friction and area at an instant: of the row there that stands for the same, or between two."""
+        first = bisect_left(self.times, time * (1.0 - SAME_TIME))
+        there = bisect_right(self.times, time * (1.0 + SAME_TIME)) - first
+        if there > 0:
+            index = first + min(place, there - 1)
+            return self.friction[index], self.area[index]
+        friction, area = (float(np.interp(time, self.times, series)) for series in (self.friction, self.area))
+        return friction, area
+
+
+def place_of(timeline: Timeline, step: int) -> int:
+    """How many rows have the time of a step before it; the initial state is one, at 0."""
+    place = 0
+    while place < step and _time(timeline, step - place - 1) == _time(timeline, step):
+        place += 1
+    return place
+
+
+def _time(timeline: Timeline, step: int) -> float:
+    return timeline[step].time if step else 0.0

@@ -1,0 +1,188 @@
+"""The run on half the mesh: what its difference says of the mesh, and that it stops and goes on like any run."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from marching import marched
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact import job as jobs
+from parcontact.errors import JobError, RunError
+from parcontact.job import Job
+from parcontact.parallel.slab import Slab
+from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER
+from parcontact.record import measures
+from parcontact.run import half_mesh, runner
+from parcontact.run.half_mesh import HalfMesh, place_of
+from parcontact.run.journey import AGAIN
+
+Json = dict[str, Any]
+Series = NDArray[np.float64]
+ROUGH: Json = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2.5e-4, "rms_slope": 0.02}
+SOLID: Json = {"model": "zener", "modulus_inf": 0.3e6, "branches": [{"modulus": 2.5e6, "relaxation_time": 1e-3}]}
+PRESS: Json = {"pressure": 1e4, "duration": 1e-3, "time_step": 2e-4}
+SLIDE: Json = {"pressure": 1e4, "velocity": 0.1, "distance": 5e-4, "cells_per_step": 1}
+
+
+def data(points: int = 32, check: bool = True, **changes: Any) -> Json:
+    return {
+        "grid": {"points": points, "size": 1e-3},
+        "surface": ROUGH,
+        "material": SOLID,
+        "history": [PRESS, SLIDE],
+        "output": {"mesh_check": check},
+        **changes,
+    }
+
+
+def run(job: Json, out: Path, comm: MPI.Intracomm = MPI.COMM_SELF) -> int:
+    path = out.with_suffix(".yaml")
+    if comm.rank == 0:
+        path.write_text(yaml.safe_dump(job))
+    comm.Barrier()
+    loaded = jobs.load(path, [f"output.directory={out}"])
+    return runner.run(loaded, Slab(comm, *loaded.grid.points), runner.Options(quiet=True))
+
+
+def columns(out: Path, *names: str) -> list[Series]:
+    table = measures.read(out / "measures.csv")
+    return [np.array(table[name]) for name in names]
+
+
+@pytest.mark.mpi
+def test_the_mesh_part_is_the_difference(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Of another run with the same time steps, made here on its own, over 2^p - 1; the other parts are as they were."""
+    half = [PRESS, {**SLIDE, "cells_per_step": 0.5}]
+    assert run(data(), shared_path / "checked", comm) == 0
+    assert run(data(check=False), shared_path / "plain", comm) == 0
+    assert run(data(points=16, check=False, history=half), shared_path / "half", comm) == 0
+    if comm.rank:
+        return
+    assert not (shared_path / "plain" / half_mesh.DIRECTORY).exists()
+    names = ("friction", "contact_area_corrected", "contact_area", "error_friction", "error_area")
+    friction, area, counted, *estimates = (column[1:] for column in columns(shared_path / "plain", *names))
+    coarse = (column[1:] for column in columns(shared_path / "half", *names[:2]))
+    errors = (column[1:] for column in columns(shared_path / "checked", *names[3:]))
+    estimated = (mesh_part(friction), 0.25 * (counted - area) / area)
+    for values, other, order, error, estimate, mesh in zip(
+        (friction, area), coarse, (WAVES_ORDER, CORRECTED_ORDER), errors, estimates, estimated, strict=True
+    ):
+        apart = np.abs(values - other) / values / (2.0**order - 1.0)
+        assert error - estimate + mesh == pytest.approx(apart, abs=1e-12)
+
+
+def mesh_part(friction: Series) -> Series:
+    """What is estimated for friction on 8 cells per shortest wave."""
+    return np.full(len(friction), 0.05 * (4.0 / 8.0) ** WAVES_ORDER)
+
+
+def test_it_is_honest(tmp_path: Path) -> None:
+    """With 8 cells per shortest wave: half to five times the mean error in a slide, which is the difference to four
+    times the mesh, with the same time steps; that is itself wrong by a thirtieth of it (the order is 2.5)."""
+    slide = {**SLIDE, "distance": 1e-3}
+    assert run(data(history=[slide]), tmp_path / "run") == 0
+    assert run(data(history=[slide], check=False), tmp_path / "plain") == 0
+    friction, error = columns(tmp_path / "run", "friction", "error_friction")
+    (estimate,) = columns(tmp_path / "plain", "error_friction")
+    _, rows = marched(Job.model_validate(data(128, False, history=[{**slide, "cells_per_step": 4}])))
+    exact = np.array([row.measures.friction for row in rows])
+    late = slice(len(rows) // 2, None)
+    mesh = (friction * (error - estimate + mesh_part(friction)))[late].mean()
+    assert 0.5 < mesh / np.abs(friction - exact)[late].mean() < 5.0
+
+
+def test_it_stops_and_goes_on(tmp_path: Path) -> None:
+    """A stop file of the run ends that on half the mesh too; afterwards there is nothing to be seen of it."""
+    assert run(data(), tmp_path / "whole") == 0
+    (tmp_path / "cut").mkdir()
+    (tmp_path / "cut" / "stop").touch()
+    assert run(data(), tmp_path / "cut") == AGAIN
+    table = measures.read(tmp_path / "cut" / half_mesh.DIRECTORY / "measures.csv")
+    assert len(table["step"]) == 1
+    assert "run again" in (tmp_path / "cut" / "run.log").read_text().splitlines()[-1]
+    assert run(data(), tmp_path / "cut") == 0
+    for names in (("friction",), ("error_friction",), ("error_area",)):
+        one, other = (columns(tmp_path / name, *names)[0] for name in ("whole", "cut"))
+        assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_a_run_of_another_job_is_made_anew(tmp_path: Path) -> None:
+    """What is below the directory of a run is that run's."""
+    assert run(data(), tmp_path / "run") == 0
+    other = data(numerics={"integrator": "backward-euler"})
+    path = tmp_path / "run.yaml"
+    path.write_text(yaml.safe_dump(other))
+    loaded = jobs.load(path, [f"output.directory={tmp_path / 'run'}"])
+    options = runner.Options(quiet=True, restart="never")
+    assert runner.run(loaded, Slab(MPI.COMM_SELF, 32, 32), options) == 0
+    resolved = (tmp_path / "run" / half_mesh.DIRECTORY / "job.resolved.yaml").read_text()
+    assert "backward-euler" in resolved
+
+
+def test_a_run_on_half_the_mesh_that_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The run goes on with estimates, and says so."""
+
+    def fail(job: Job, slab: Slab) -> HalfMesh:
+        raise RunError("no table")
+
+    monkeypatch.setattr(HalfMesh, "read", fail)
+    assert run(data(), tmp_path / "run") == 0
+    assert "failed, and its errors are estimated: no table" in capsys.readouterr().err
+    assert run(data(check=False), tmp_path / "plain") == 0
+    one, other = (columns(tmp_path / name, "error_friction")[0] for name in ("run", "plain"))
+    assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_loads_without_duration_are_compared_one_by_one(tmp_path: Path) -> None:
+    """All are at one time: the third with the third."""
+    loads = [{"pressure": pressure} for pressure in (1e3, 1e4, 5e4)]
+    elastic = {"model": "elastic", "shear_modulus": 1e6}
+    assert run(data(material=elastic, history=loads), tmp_path / "run") == 0
+    (area,) = columns(tmp_path / "run", "contact_area_corrected")
+    (half,) = columns(tmp_path / "run" / half_mesh.DIRECTORY, "contact_area_corrected")
+    timeline = Job.model_validate(data(history=loads)).timeline()
+    assert [place_of(timeline, step) for step in range(4)] == [0, 1, 2, 3]
+    (error,) = columns(tmp_path / "run", "error_area")
+    apart = np.abs(area - half)[1:] / area[1:]
+    assert np.all(error[1:] >= apart)  # that, and what the solver adds
+    assert error[1:] == pytest.approx(apart, abs=5e-3)  # numerics.tolerance
+
+
+def test_between_the_instants_of_the_other_run() -> None:
+    half = HalfMesh([0.0, 0.0, 2.0], [0.0, 0.1, 0.3], [0.0, 0.2, 0.6], True)
+    assert half._at(0.0, 0) == (0.0, 0.0)
+    assert half._at(0.0, 1) == (0.1, 0.2)
+    assert half._at(0.0, 5) == (0.1, 0.2)
+    assert half._at(1.0, 0) == pytest.approx((0.2, 0.4))
+    assert half._at(2.0 * (1 + 1e-12), 0) == (0.3, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"grid": {"points": 33, "size": 1e-3}}, "needs even numbers of grid.points, got [33, 33]"),
+        ({"surface": {**ROUGH, "short_wavelength": 1e-4}}, "must be at least two cells"),
+        ({"surface": {"shape": "wave", "amplitude": 1e-6, "waves": [12, 0]}}, "must be within -8 and 8 waves"),
+    ],
+)
+def test_scenes_that_have_no_half(changes: Json, said: str) -> None:
+    with pytest.raises((JobError, ValueError), match="mesh_check") as caught:
+        Job.model_validate({**data(), **changes})
+    assert said in str(caught.value)
+
+
+def test_half_of_a_line() -> None:
+    line = Job.model_validate(data(grid={"points": [32, 1], "size": [1e-3, 1e-3]}))
+    half = half_mesh.job_on_half_mesh(line)
+    assert half.grid.points == (16, 1)
+    assert not half.output.mesh_check
+    assert half.output.directory == line.output.directory / "half_mesh"
+    assert (half.surface, half.material) == (line.surface, line.material)
+    assert [stage.cells_per_step for stage in half.history] == [None, 0.5]
+    assert [step.dt for step in half.timeline()] == [step.dt for step in line.timeline()]
