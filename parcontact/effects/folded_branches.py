@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import job as jobs
 from ..job import Grid, Job
-from ..job.chosen import ChosenEnds, bounds
+from ..job.chosen import ChosenEnds
 from ..job.timeline import Span
 from ..physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from ..physics.prony import Prony
@@ -60,16 +60,15 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
     for span in job.timeline(until).spans:
-        first, last = _first_and_last(span, job.grid)
+        first, last = _first_and_last(span)
         duration = span.ends[span.count] * span.stage.seconds if span.count else 0.0
         yield Phase(duration, first, last, span.stage.velocity, span.jumps)
 
 
-def _first_and_last(span: Span, grid: Grid) -> tuple[float, float]:
+def _first_and_last(span: Span) -> tuple[float, float]:
     """The first and the last step of a stage [s]; those that it chooses lie between the shortest and the longest."""
     if isinstance(span.ends, ChosenEnds):
-        limits = bounds(span.stage, grid)
-        return limits.least, limits.most
+        return span.ends.limits.least, span.ends.limits.most
     first, last = (span.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
     return first, last
 

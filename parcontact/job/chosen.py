@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 from .history import Stage
 from .limits import one_cell
 from .sections import Grid
+from .surface import Cylinder, Flat, Rough, Sphere, Wave
 
 SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
 HALVINGS = 10  # of a cell, in the shortest step of a surface that slides
 LEAST_SHARE = 2.0**-20  # of its duration, in the shortest step of a stage at rest
 SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/next": "s"}  # of what is remembered
+MOST_CELLS = 4  # in the longest
+WAVE_STEPS = 8  # in which the shortest wave passes, at least
 RAMP_STEPS = 16  # at least, while a load changes
 
 
@@ -38,13 +41,27 @@ class Bounds:
     most: float
 
 
-def bounds(stage: Stage, grid: Grid) -> Bounds:
-    """In sliding from a small part of a cell to one; at rest from a small part of the stage to all of it."""
+def most_cells(grid: Grid, surface: Sequence[Any]) -> int:
+    """The longest step of a surface that slides, in cells, a power of two: an eighth of its shortest wave; one cell
+    where that is shorter, or a file may have any wave."""
+    waves = [2.0 * MOST_CELLS * WAVE_STEPS]
+    for shape in surface:
+        if isinstance(shape, Wave):
+            waves += [n / abs(count) for n, count in zip(grid.points, shape.waves, strict=True) if count]
+        elif isinstance(shape, Rough):
+            waves.append(shape.short_wavelength / max(grid.dx, grid.dy))
+        elif not isinstance(shape, Sphere | Cylinder | Flat):
+            return 1
+    return int(min(MOST_CELLS, 2 ** max(0, math.floor(math.log2(min(waves) / WAVE_STEPS * (1.0 + SAME_TIME))))))
+
+
+def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
+    """In sliding from a small part of a cell to so many; at rest from a small part of the stage to all of it."""
     most = stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
     cell = one_cell(stage, grid)
-    most = min(cell, most)
+    most = min(cells * cell, most)
     return Bounds(min(cell / 2**HALVINGS, most), most)
 
 
@@ -88,6 +105,7 @@ class ChosenEnds:
     made: Sequence[float]
     stops: tuple[float, ...]
     ladder: Ladder
+    limits: Bounds
 
     growth = 0.0  # not all alike
 
@@ -118,8 +136,10 @@ class ChosenEnds:
 @dataclass
 class ChosenSteps:
     """The steps that the stages of a history have chosen so far: their `ends` [s after the start of their stage] by the
-    number of the stage, and how long the next one is meant to be [s], 0 where that is yet to be found."""
+    number of the stage, and how long the `next` one is meant to be [s], 0 where that is yet to be found. None is longer
+    than some `cells` of sliding."""
 
+    cells: int = 1
     ends: dict[int, list[float]] = field(default_factory=dict)
     next: float = 0.0
 
@@ -130,11 +150,13 @@ class ChosenSteps:
 
     def of(self, stage: int, asked: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
         """Those of a stage that may go on to `until` [s after its start]."""
-        made, limits = self.ends.get(stage, []), bounds(asked, grid)
+        made, limits = self.ends.get(stage, []), bounds(asked, grid, self.cells)
         stops = (asked.seconds, *([until] if not reached(asked.seconds, until) else []))
         left = 0.0 if made and reached(made[-1], stops[-1]) else stops[-1] - (made[-1] if made else 0.0)
         first = self.next if made and self.next else limits.least
-        return ChosenEnds(made, stops, Ladder(min(first, limits.most), limits.most, left))
+        longest = min(limits.most, one_cell(asked, grid)) if asked.speed else limits.most
+        ladder = Ladder(min(first, limits.most), max(min(first, limits.most), longest), left)
+        return ChosenEnds(made, stops, ladder, limits)
 
     def numbers(self) -> dict[str, NDArray[np.float64]]:
         """As arrays, by the names that they have in a checkpoint."""
@@ -147,11 +169,11 @@ class ChosenSteps:
         )
         return {name: np.array(value) for name, value in zip(SYMBOLS, values, strict=True)}
 
-    @classmethod
-    def restored(cls, saved: Mapping[str, NDArray[Any]]) -> "ChosenSteps":
-        """From the arrays of a checkpoint; none were chosen before one that has no such arrays."""
+    def restored(self, saved: Mapping[str, NDArray[Any]]) -> "ChosenSteps":
+        """Those of a checkpoint; none were chosen before one that has no such arrays."""
         if not SYMBOLS.keys() <= saved.keys():
-            return cls()
+            return ChosenSteps(self.cells)
         stages, counts, ends, following = (saved[name] for name in SYMBOLS)
         parts = np.split(ends, np.cumsum(counts.astype(int))[:-1]) if counts.size else []
-        return cls({int(stage): part.tolist() for stage, part in zip(stages, parts, strict=True)}, float(following))
+        found = {int(stage): part.tolist() for stage, part in zip(stages, parts, strict=True)}
+        return ChosenSteps(self.cells, found, float(following))

@@ -7,7 +7,7 @@ everywhere. No MPI and no maps here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
 from . import advice, extension, limits, meaning, size, table
-from .chosen import ChosenSteps
+from .chosen import ChosenSteps, most_cells
 from .fault import Fault
 from .history import Initial, Stage, Steady
 from .loading import Included
@@ -221,8 +221,13 @@ class Job(Part):
 
         `chosen` are the steps that stages have chosen so far; those to come are guessed.
         """
-        record = (chosen or ChosenSteps()) if self.remembers else None
+        record = (chosen or self.chosen_steps()) if self.remembers else None
         return Timeline(self.history, self.grid, until, self.initial.pressure, record)
+
+    def chosen_steps(self, saved: Mapping[str, Any] | None = None) -> ChosenSteps:
+        """The steps that stages had chosen when a checkpoint with these numbers was written; none without."""
+        none = ChosenSteps(most_cells(self.grid, self.surface))
+        return none.restored(saved) if saved is not None else none
 
     @property
     def remembers(self) -> bool:

@@ -17,14 +17,14 @@ halves, quarters, ... lead back to whole cells, by which heights are moved witho
 import math
 from dataclasses import dataclass
 
-from ..job.chosen import Bounds, ChosenEnds, ChosenSteps, bounds, reached
+from ..job.chosen import Bounds, ChosenEnds, ChosenSteps, reached
 from ..job.limits import one_cell
 from ..job.timeline import Span, Step
 from ..physics.body import ZenerBody
 from ..physics.budget import TIME_ORDER
 from ..scene import Scene
 
-TIME_SHARE = 0.65  # of numerics.accuracy, for the error of a step
+TIME_SHARE = 0.7  # of numerics.accuracy, for the error of a step
 SAFETY = 0.9
 REJECTED = 1.5  # times the error allowed: the error of a slide varies from step to step, and its mean counts
 MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0
@@ -89,7 +89,8 @@ class StepChooser:
     # -- parts --------------------------------------------------------------------------------------------------------
 
     def _bounds(self, span: Span) -> Bounds:
-        return bounds(span.stage, self.scene.job.grid)
+        assert isinstance(span.ends, ChosenEnds)
+        return span.ends.limits
 
     def _levels(self, span: Span) -> int:
         """Lengths of steps per factor of two."""
@@ -109,7 +110,7 @@ class StepChooser:
         if self._goes_on(span) and self.chosen.next:
             return self._level(span, self.chosen.next)
         if span.stage.speed:
-            return limits.most
+            return min(limits.most, one_cell(span.stage, self.scene.job.grid))
         return self._level(span, RELAXING * self.shortest)
 
     def _goes_on(self, span: Span) -> bool:

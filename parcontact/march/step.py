@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ..effects.effect import Instant
-from ..job.chosen import SYMBOLS, ChosenSteps
+from ..job.chosen import SYMBOLS
 from ..job.timeline import Step, Timeline
 from ..parallel import rows
 from ..parallel.slab import Array
@@ -46,7 +46,7 @@ class March:
         self._next_pressure = slab.zeros(dtype)
         self._errors = Errors(scene)
         self._elastic_displacement: Array | None = None  # of the solver: until its next solve
-        self.chosen = ChosenSteps() if scene.job.timeline().chooses else None
+        self.chosen = scene.job.chosen_steps() if scene.job.timeline().chooses else None
 
     @property
     def row(self) -> Row:
@@ -106,7 +106,7 @@ class March:
         """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
         restored = state.restore(self.scene, self.state, contents)
         if self.chosen is not None:
-            self.chosen = ChosenSteps.restored(contents.numbers)
+            self.chosen = self.scene.job.chosen_steps(contents.numbers)
         self.begin_with(replace(restored, row=self._complete(restored.row)))
 
     def begin_with(self, begun: State) -> None:

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from .measures import SIDE
 
 SOLVER_FRICTION, SOLVER_AREA = 0.5, 1.0  # times the complementarity
-EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 2.0, 0.4  # times the difference of the pair
+EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 1.7, 0.4  # times the difference of the pair
 TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
-EQUAL_DIFFERENCE = 0.01  # of the pair, at which a material of many branches is no worse than one of a single branch
+EQUAL_DIFFERENCE = 0.0072  # of the pair, at which a material of many branches is no worse than one of a single branch
 FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
 EULER_FRICTION, EULER_AREA = 0.7, 0.4  # times its root
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 
 from ..errors import InputError
 from ..job import Job, Stage
-from ..job.chosen import ChosenSteps, reached
+from ..job.chosen import reached
 from ..job.timeline import Step, Timeline
 from ..parallel.slab import Slab
 from ..record import checkpoint, marker
@@ -160,7 +160,7 @@ def find_changed_step(contents: Contents, job: Job) -> str:
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
     old, new = (
-        each.timeline(until, ChosenSteps.restored(contents.numbers))
+        each.timeline(until, each.chosen_steps(contents.numbers))
         for each in (job.model_copy(update={"history": history}), job)
     )
     count = min(number, len(old), len(new))

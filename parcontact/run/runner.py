@@ -7,7 +7,7 @@ from .. import sanity
 from ..effects import decisions
 from ..errors import InputError, RunError
 from ..job import Job, Rough, RoughSpectrum
-from ..job.chosen import ChosenSteps, reached
+from ..job.chosen import reached
 from ..job.timeline import Timeline
 from ..march.step import March
 from ..parallel.signals import Signals
@@ -67,7 +67,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         finished = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
         origin, warnings = (None, []) if finished else restart.choose(job, plain, slab, directory, options.restart)
         if origin:
-            timeline = job.timeline(options.until or 0.0, ChosenSteps.restored(origin.contents.numbers))
+            timeline = job.timeline(options.until or 0.0, job.chosen_steps(origin.contents.numbers))
         _refuse_no_end(timeline, options.until)
         sanity.refuse_impossible(job, timeline)
         reason = _nothing_to_do(origin, timeline, options.until) if origin else finished

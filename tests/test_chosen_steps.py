@@ -1,0 +1,233 @@
+"""Steps that choose themselves: they follow the error asked for, end with their stages, and do not depend on how a run
+was cut into pieces or on how many ranks made it."""
+
+import csv
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import SLS, begun, column, marched
+from mpi4py import MPI
+
+from parcontact.job import Job, load
+from parcontact.job.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
+from parcontact.job.timeline import Step
+from parcontact.march.rest import steps_to_make
+from parcontact.parallel.slab import Slab
+from parcontact.run import runner
+
+POINTS = 32
+CELL = 1e-3 / POINTS
+WAVES = {"shape": "wave", "amplitude": 2e-6, "waves": [2, 1]}
+PRESS = {"name": "press", "pressure": 1e4, "duration": 5e-3}
+SLIDE = {"name": "slide", "pressure": 1e4, "velocity": 0.1, "distance": 6.5 * CELL}
+LIFT = {"name": "lift", "pressure": {"from": 1e4, "to": 2e3}, "velocity": 0.1, "distance": 3 * CELL}
+
+
+def data(*history: dict[str, Any], **sections: Any) -> dict[str, Any]:
+    scene = {"grid": {"points": POINTS, "size": 1e-3}, "surface": WAVES, "material": SLS}
+    return {**scene, "history": list(history or (PRESS, SLIDE, LIFT)), **sections}
+
+
+def job(*history: dict[str, Any], **sections: Any) -> Job:
+    return Job.model_validate(data(*history, **sections))
+
+
+def test_it_is_what_a_stage_does_that_says_nothing() -> None:
+    """Where it lasts; it is written into the resolved job."""
+    silent, told, given = job(PRESS), job({**PRESS, "time_step": "auto"}), job({**PRESS, "time_step": 1e-3})
+    assert silent == told
+    assert "time_step: auto" in silent.resolved()
+    assert (silent.timeline().chooses, given.timeline().chooses) == (True, False)
+    assert job({"pressure": 1e4}).history[0].time_step is None
+
+
+@pytest.mark.parametrize(
+    ("first", "most", "seconds"), [(1.0, 8.0, 30.0), (1.0, 8.0, 5.0), (3.0, 3.0, 7.5), (0.1, 64, 64)]
+)
+def test_ladder(first: float, most: float, seconds: float) -> None:
+    """Steps double up to the longest and end where they should; none is longer than twice the one before."""
+    ladder = Ladder(first, most, seconds)
+    ends = [ladder.end(n) for n in range(ladder.count + 1)]
+    steps = np.diff(ends)
+    assert ends[-1] == seconds
+    assert steps[0] == min(first, seconds)
+    assert (steps > 0.0).all()
+    assert (steps[1:] <= 2.0 * steps[:-1] * (1 + 1e-12)).all()
+    assert steps.max() <= 2.0 * most
+
+
+def test_stages_end_when_they_should() -> None:
+    """To the last bit, and each where the surface was to be; whole cells are reached again after a part of one."""
+    march, rows = marched(data())
+    timeline = march.timeline()
+    assert timeline.count == rows[-1].step
+    for span in timeline.spans:
+        assert timeline[span.last].time == span.start + span.stage.seconds
+        assert rows[span.last].time == timeline[span.last].time
+    slide = timeline.spans[1]
+    cells = [timeline[n].position[0] / CELL for n in range(slide.before + 1, slide.last + 1)]
+    assert cells[-1] == pytest.approx(6.5, abs=1e-9)
+    assert sum(abs(c - round(c)) < 1e-9 for c in cells) >= 5
+    assert column(rows, "pressure")[-1] == pytest.approx(2e3)
+
+
+def test_steps_grow_at_rest() -> None:
+    """After a jump of the load they begin below the relaxation time; when the body has crept they are far longer."""
+    _, rows = marched(data({**PRESS, "duration": 0.1}))
+    steps = np.diff(column(rows[1:], "time"))
+    assert steps[0] <= 1e-4 * (1 + 1e-12)
+    assert steps.max() > 50 * steps[0]
+    assert len(steps) < 60
+
+
+def errors(accuracies: Sequence[float], history: Sequence[dict[str, Any]]) -> list[float]:
+    """Of the last friction, against steps by hand of a 32nd of a cell and small ones at rest."""
+    fine = [
+        {
+            **stage,
+            **({"cells_per_step": 1 / 32} if "velocity" in stage else {"time_step": {"first": 1e-6, "growth": 1.05}}),
+        }
+        for stage in history
+    ]
+    numerics = {"tolerance": 1e-8, "branch_error": 0.0}
+    exact = marched(data(*fine, numerics=numerics))[1][-1].measures.friction
+    found = [
+        marched(data(*history, numerics={**numerics, "accuracy": accuracy}))[1][-1].measures.friction
+        for accuracy in accuracies
+    ]
+    return [abs(friction / exact - 1.0) for friction in found]
+
+
+def test_error_falls_with_what_is_asked_for() -> None:
+    """A ninth of the accuracy: the error falls to less than a third, and is below the accuracy throughout. Of the
+    steps alone: the tolerance of the solver is far smaller."""
+    asked = (9e-2, 1e-2, 1.1e-3)
+    found = errors(asked, (PRESS, SLIDE))
+    assert all(error < accuracy for error, accuracy in zip(found, asked, strict=True))
+    assert found[2] < found[0] / 9
+
+
+def test_a_step_that_is_made_anew_leaves_nothing() -> None:
+    """The state after it is that of a march to which the shorter step was proposed at once: to the last bit."""
+    fast = {"model": "zener", "modulus_inf": 1e5, "branches": [{"modulus": 2e6, "relaxation_time": 3e-5}]}
+    before = {"state": "steady", "velocity": 0.01, "pressure": 1e4}
+    sudden = job({**SLIDE, "velocity": 1.0}, material=fast, initial=before, numerics={"accuracy": 1e-3})
+    tried, told = begun(sudden), begun(sudden)
+    made: list[Step] = []
+    rejected = 0
+    for step in itertools.islice(steps_to_make(tried, tried.timeline()), 12):
+        attempts, judge_of_run = [step], step.judge
+
+        def judge(one: Step, error: float) -> Step | None:
+            assert judge_of_run is not None  # noqa: B023  # it is called in this turn only
+            shorter = judge_of_run(one, error)  # noqa: B023
+            if shorter is None:
+                return None
+            attempts.append(shorter)  # noqa: B023
+            return shorter._replace(judge=judge)
+
+        tried.advance(step._replace(judge=judge) if judge_of_run else step)
+        made.append(attempts[-1]._replace(judge=None))
+        rejected += len(attempts) - 1
+    for step in made:
+        told.advance(step)
+    assert rejected > 0
+    for name, entry in told.entries().items():
+        if not name.startswith("clock/"):
+            np.testing.assert_array_equal(np.asarray(entry.value), np.asarray(tried.entries()[name].value), name)
+
+
+def test_an_elastic_body_needs_no_choice() -> None:
+    """A cell per step in sliding, one step at rest, some on a ramp; nothing is remembered of it."""
+    march, rows = marched(data(PRESS, SLIDE, LIFT, material={"model": "elastic", "shear_modulus": 1e6}))
+    assert march.chosen is None
+    assert [span.count for span in march.timeline().spans] == [1, 7, 3]
+    assert not [name for name in march.entries() if name in ChosenSteps().numbers()]
+    assert len(rows) == 1 + 1 + 11
+    ramp = job({**PRESS, "pressure": {"from": 0.0, "to": 1e4}}, material={"model": "elastic", "shear_modulus": 1e6})
+    assert ramp.timeline().count == 16
+
+
+def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
+    """No entry, no record, no judge, and no map beside those of the fixed steps."""
+    fixed = begun(job({**SLIDE, "cells_per_step": 1}))
+    assert fixed.chosen is None
+    for step in steps_to_make(fixed, fixed.timeline()):
+        assert step.judge is None
+        fixed.advance(step)
+    assert not any(name in fixed.entries() for name in ChosenSteps().numbers())
+
+
+def test_timeline_is_read_from_the_times_of_rows() -> None:
+    march, rows = marched(data())
+    times = {row.step: row.time for row in rows}
+    found = job().timeline().follow(times)
+    assert [span.last for span in found.spans] == [span.last for span in march.timeline().spans]
+    partly = job().timeline().follow({n: t for n, t in times.items() if n < 8})
+    ends = partly.spans[0].ends
+    assert isinstance(ends, ChosenEnds)
+    assert len(ends.made) == 6
+
+
+def test_bounds_of_a_stage() -> None:
+    """In sliding up to a cell and down to a thousandth; at rest up to the whole stage; on a ramp a sixteenth."""
+    grid = job().grid
+    slide, press = (bounds(stage, grid) for stage in job(SLIDE, PRESS).history)
+    assert (slide.most, slide.least) == (pytest.approx(CELL / 0.1), pytest.approx(CELL / 0.1 / 1024))
+    assert press.most == 5e-3
+    ramp = bounds(job({**PRESS, "pressure": {"from": 0.0, "to": 1.0}}).history[0], grid)
+    assert ramp.most == pytest.approx(5e-3 / 16)
+
+
+# -- runs -------------------------------------------------------------------------------------------------------------
+
+
+def run(
+    where: Path, comm: MPI.Intracomm, name: str, until: float | None = None, **sections: Any
+) -> list[dict[str, str]]:
+    """The rows of a run without their seconds, on root."""
+    output = {"directory": str(where / name), "fields": ["pressure"], "every": 7}
+    path = where / f"{name} {comm.size}.yaml"
+    if comm.rank == 0:
+        path.write_text(job(**{"output": output, **sections}).resolved())
+    comm.Barrier()
+    assert runner.run(load(path), Slab(comm, POINTS, POINTS), runner.Options(True, until=until)) == 0
+    if comm.rank:
+        return []
+    with (where / name / "measures.csv").open() as file:
+        return [{key: value for key, value in row.items() if key != "seconds"} for row in csv.DictReader(file)]
+
+
+@pytest.mark.mpi
+def test_a_run_in_pieces_has_the_same_steps(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """To the last bit, wherever it was interrupted: in a press, in a slide, in a ramp."""
+    whole = run(shared_path, comm, "whole")
+    for until in (3e-4, 5.6e-3, 7.3e-3, None):
+        pieces = run(shared_path, comm, "pieces", until)
+    assert pieces == whole
+
+
+@pytest.mark.mpi
+def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
+    """The instants are the same to the last bit, the results to rounding."""
+    found: list[list[dict[str, str]]] = []
+    for comm in communicators:
+        found.append(run(shared_path, comm, f"on {comm.size}"))
+        comm.Barrier()
+    for other in found[1:] if communicators[0].rank == 0 and found[0] else ():
+        assert [row["time"] for row in other] == [row["time"] for row in found[0]]
+        mine, theirs = ([float(row["friction"]) for row in rows] for rows in (found[0], other))
+        np.testing.assert_allclose(theirs, mine, rtol=1e-9)
+
+
+def test_going_on_beyond_the_end(tmp_path: Path) -> None:
+    """The end of the history is hit, and then the instant asked for; the fields of both are there."""
+    end = job().timeline().end
+    rows = run(tmp_path, MPI.COMM_SELF, "beyond", 1.5 * end)
+    times = [float(row["time"]) for row in rows]
+    assert times[-1] == pytest.approx(1.5 * end, rel=1e-12)
+    assert any(time == pytest.approx(end, rel=1e-12) for time in times)
