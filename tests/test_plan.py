@@ -113,6 +113,20 @@ def test_rest_that_is_cut_short_is_known(material: Json) -> None:
     assert sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6).steps == len(rows) - 1
 
 
+def test_steps_that_stages_choose_are_known() -> None:
+    """Where all of them are tried: as many as a run makes; else those that were made, and a guess of the rest."""
+    dwell, slide = {"pressure": 1e4, "duration": 1e-3}, {"pressure": 1e4, "velocity": 0.1, "distance": 1.25e-4}
+    planned = job(material=TWO, history=[dwell, slide])
+    _, rows = marched(planned)
+    slab = Slab(MPI.COMM_SELF, *planned.grid.points)
+    seen = sample(planned, slab, 1e6)
+    assert seen.steps == seen.tried == len(rows) - 1
+    assert seen.total("operator") == sum(row.operator_calls for row in rows)
+    few = sample(planned, slab, 0.0)
+    assert few.tried < len(rows) - 1
+    assert few.steps > 0
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.7, 1.0])
 @pytest.mark.parametrize("stage", [SLIDE, {**SLIDE, "time_step": {"first": 1e-6, "growth": 1.02}}, CELLS])
 def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:

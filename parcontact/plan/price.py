@@ -1,12 +1,12 @@
 """What accuracy costs: the mesh, the steps and the time of a job at other accuracies, from a trial of it at its own.
 
-Nothing more is tried. The mesh has the cells per shortest wave that the accuracy needs (`job.advice.cells_per_wave`);
-where no wave is given the part of the error that the mesh makes, which the trial saw, goes with the power of the cell
-that the budget knows (`physics.budget`). Heights from a file stay on their mesh. The part that time steps make, seen
-too, goes with the second power of the step for the exponential integrator, with the first for backward Euler, and may
-be TIME_SHARE of the accuracy; steps of a slide are a cell, a half, a quarter, ... as it needs. A step has as many
-operator calls as seen, times what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in
-proportion to N log N.
+Nothing more is tried. All parts of the error budget together keep the accuracy: the mesh may have MESH_SHARE of it,
+time steps TIME_SHARE, the solver the rest. The mesh has the cells per shortest wave that this takes
+(`job.advice.cells_per_wave`); where no wave is given the part that the mesh makes, which the trial saw, goes with the
+power of the cell that the budget knows (`physics.budget`). Heights from a file stay on their mesh. The part that time
+steps make, seen too, goes with the second power of the step for the exponential integrator, with the first for backward
+Euler; steps of a slide are a cell, a half, a quarter, ... as it needs. A step has as many operator calls as seen, times
+what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in proportion to N log N.
 """
 
 import math
@@ -26,7 +26,7 @@ from .sample import Sample, StageCost
 from .scaling import Scaling
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
-TIME_SHARE = 0.5  # of the accuracy, for the time steps; the rest is the solver's
+MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
 EDGE_ORDER = 1.0  # of the cell, in which the error of the contact area falls
 CALLS_PER_DECADE = 1.5  # for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
@@ -87,12 +87,13 @@ def _finer(job: Job, sample: Sample, accuracy: float) -> float:
     if any(isinstance(shape, HeightFile) for shape in job.surface):
         return 1.0
     error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
-    of_waves = cells_per_wave(accuracy) * max(job.grid.dx, job.grid.dy) / waves if waves else 0.0
+    share = MESH_SHARE * accuracy
+    of_waves = cells_per_wave(share) * max(job.grid.dx, job.grid.dy) / waves if waves else 0.0
     if waves and error is not None:
         return of_waves
     if error is None:
         error, order = mesh_error(sample, "area") or 0.0, EDGE_ORDER
-    factor = (error / accuracy) ** (1.0 / order) * sample.job.grid.nx / job.grid.nx
+    factor = (error / share) ** (1.0 / order) * sample.job.grid.nx / job.grid.nx
     return max(of_waves, min(max(factor, 1.0 / COARSER), FINER)) if factor else of_waves or 1.0
 
 

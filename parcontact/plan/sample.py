@@ -144,7 +144,7 @@ def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]
     numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
     march = start.first(job.model_copy(update={"numerics": numerics}), slab)
     building = time.perf_counter() - began
-    return building, _try(march, job.timeline(), seconds)
+    return building, _try(march, seconds)
 
 
 def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
@@ -179,9 +179,9 @@ def _spread(count: int) -> list[int]:
     return [index for index in turned if index < count]
 
 
-def _try(march: March, timeline: Timeline, seconds: float) -> list[StageCost]:
+def _try(march: March, seconds: float) -> list[StageCost]:
     """The first steps tell how many can be afforded; root's clock decides for all ranks."""
-    slab, began = march.scene.slab, time.perf_counter()
+    slab, began, timeline = march.scene.slab, time.perf_counter(), march.timeline()
     stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
     per_call = float("inf")
     as_run = steps_to_make(march, timeline)
@@ -195,7 +195,9 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[StageCost]:
             if slab.agree(_is_late(began, seconds, stages)):
                 break
             _make_as_run(march, step, stages)
+        _count_anew(stages, timeline)
         return stages
+    _count_anew(stages, timeline)
     for span, stage in zip(timeline.spans, stages, strict=True):
         for step, weight in chosen(timeline, range(max(span.before, march.row.step) + 1, span.last + 1), affordable):
             if slab.agree(_is_late(began, seconds, stages)):
@@ -204,6 +206,13 @@ def _try(march: March, timeline: Timeline, seconds: float) -> list[StageCost]:
             if weight:
                 stage.add(weight, cost)
     return stages
+
+
+def _count_anew(stages: list[StageCost], timeline: Timeline) -> None:
+    """Stages that choose their steps have those that they have chosen by now, and a guess of those to come."""
+    for stage, span in zip(stages, timeline.spans, strict=True):
+        if timeline.chooses and span.stage.chooses:
+            stage.steps = span.jumps + span.count
 
 
 def _is_late(began: float, seconds: float, stages: list[StageCost]) -> bool:
