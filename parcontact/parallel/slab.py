@@ -31,9 +31,11 @@ class Slab:
     Every method whose docstring says "collective" must be called by all ranks of `comm`.
     """
 
-    def __init__(self, comm: MPI.Intracomm, nx: int, ny: int, tally: Tally | None = None) -> None:
+    def __init__(
+        self, comm: MPI.Intracomm, nx: int, ny: int, tally: Tally | None = None, dealt: list[slice] | None = None
+    ) -> None:
         self.comm, self.nx, self.ny = comm, nx, ny
-        self.dealt = deal(ny, comm.size)
+        self.dealt = deal(ny, comm.size) if dealt is None else dealt
         self.rows = self.dealt[comm.rank]
         self.shape = (self.rows.stop - self.rows.start, nx)
         self.tally = Tally() if tally is None else tally

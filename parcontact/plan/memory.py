@@ -79,7 +79,7 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
         yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True)
     else:
         yield Holding("preconditioner", symbol)
-    yield Holding("solver", ContactSolver.footprint(cells, precision.itemsize))
+    yield Holding("solver", ContactSolver.footprint(*job.grid.points, precision.itemsize, ranks, rank))
     if decisions.spectrum(job).on:
         yield Holding("surface spectrum", spectrum)
     for maps in _maps(job):

@@ -8,8 +8,8 @@ with A a symmetric positive operator. It is the minimum of `f(p) = <p, A p>/2 - 
 iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C` = subtract the mean over it:
 
 1. the working set is the contact (p > 0) and the points that penetrate (g < 0): these enter by the search direction;
-2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on a few
-   cells beyond the set (`surround`);
+2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on beyond
+   the set (`surround`);
 3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is no descent;
 4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, then scaled to the mean P0;
 5. f must not rise: else the step is halved along this path and the direction is forgotten.
@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array, Slab, deal
 from . import kernels
 from .certificate import Certificate
 from .operator import Operator
@@ -152,9 +152,10 @@ class ContactSolver:
         self._surround = Surround(slab, preconditioner)
 
     @staticmethod
-    def footprint(cells: int, itemsize: int) -> int:
-        """Bytes that it holds for so many points of this rank."""
-        return (4 * itemsize + 1) * cells + Surround.footprint(cells)
+    def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int) -> int:
+        """Bytes that it holds on a rank."""
+        rows = deal(ny, ranks)[rank]
+        return (4 * itemsize + 1) * (rows.stop - rows.start) * nx + Surround.footprint(nx, ny, ranks, rank)
 
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution

@@ -19,6 +19,8 @@ from .surround import Surround
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
+GRIDS, FLOOR = 4, 1.0  # of `Surround`: where waves along the slide are far stiffer than those across, larger cells or a
+# smaller floor make sets of points come and go
 
 
 class Projected:
@@ -35,7 +37,7 @@ class Projected:
         self.slab, self.operator = slab, operator
         t, w, self.r, self.z = lent
         self.t, self.w = t[:DIRECTIONS], w[:DIRECTIONS]
-        self.surround = Surround(slab, preconditioner)
+        self.surround = Surround(slab, preconditioner, FLOOR, GRIDS)
 
     def begin(self) -> None:
         """Forget earlier changes."""

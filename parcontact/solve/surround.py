@@ -2,16 +2,16 @@
 
 A preconditioner K, the inverse of A without a contact set, makes of a residual r on a set c the correction `R K R r`
 (R: values on c). That takes r as 0 outside c, where it really goes on: the correction that is wanted moves the surface
-outside c, too. With S the sum over a square of cells around a point, points outside c take
+outside c, too. With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is; with the one
+that makes the energy `<e, K e>` the smallest it is the inverse of `R A R`. That e varies, at any distance from c, over
+lengths of about this distance. So does the mean over cells of all sizes that is taken here. With s the sum of r over a
+cell, w the number of its points that are in c, and I the linear interpolation between cells of twice the length,
 
-    e = S r/(S 1_c + FLOOR)
+    e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
 
-from those in c near by, which is 0 far away; and the transpose brings pressure that K puts outside c back into c. With
-E for the extension, `R E' K E R` is symmetric and positive, as K is. Of the iterations of a contact solve a third is
-saved.
-
-Sums over squares are made of sums over pieces of columns, which are carried from row to row. One map has the values on
-c and those outside: one kind is read while the other is written.
+from the largest cell, beyond which e is 0, down to single points, for which f = 0: a cell tells what it knows, and asks
+the larger one about the rest. The number of iterations then hardly grows with the grid. The grid is taken to repeat for
+ever, which does no harm where it does not. Maps of cells are in single precision: enough for a preconditioner.
 """
 
 from typing import Any
@@ -20,146 +20,158 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import loop
-from ..parallel.regrid import fetch
+from ..parallel import pyramid
 from ..parallel.slab import Array, Slab
 from .operator import Operator
 
-REACH = 4  # cells to each side
-SIDE = 2 * REACH + 1
-FLOOR = 0.1 * SIDE * SIDE  # so many cells of a square count as residual 0
-BLOCK = 256  # points of a row that are left out together where there is nothing to do
+FLOOR = 0.3  # of the points of a cell: so many count as having the value of the larger cell
+Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 
 
 class Surround:
-    """K on a set, extended as above; a buffer of a byte per point."""
+    """K on a set, extended as above; two maps in single precision on each grid of larger cells.
 
-    def __init__(self, slab: Slab, preconditioner: Operator) -> None:
-        self.slab, self.preconditioner = slab, preconditioner
-        self._counts = slab.empty(np.uint8)
-        self._above = [slice(max(part.start - REACH, 0), part.start) for part in slab.dealt]
-        self._below = [slice(part.stop, min(part.stop + REACH, slab.ny)) for part in slab.dealt]
+    `known` is `w/(w + f)` of each cell, for points the set itself.
+    """
+
+    def __init__(self, slab: Slab, preconditioner: Operator, floor: float = FLOOR, most: int | None = None) -> None:
+        """With another floor, and `most` grids of larger cells."""
+        self.preconditioner, self._steps = preconditioner, pyramid.steps_of(slab)[:most]
+        grids = [step.coarse for step in self._steps]
+        self._floors = [np.float32(floor * slab.points / grid.points) for grid in grids]
+        self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     @staticmethod
-    def footprint(cells: int) -> int:
-        """Bytes that it holds for so many points of this rank."""
-        return cells
+    def footprint(nx: int, ny: int, ranks: int, rank: int) -> int:
+        """Bytes that it holds on a rank."""
+        return 2 * 4 * pyramid.count_cells(nx, ny, ranks, rank)
 
     def apply(self, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
         Collective."""
-        sets = self._beside(working)
-        _extend(*sets, *self._beside(r), self._counts)
+        known: Maps = [working, *self._known]
+        maps: Maps = [r, *self._cells]
+        self._add_up(known)
+        for floor, weight in zip(self._floors, self._known, strict=True):
+            weight /= weight + floor
+        self._add_up(maps)
+        self._weigh()
+        self._interpolate(known, maps)
         self.preconditioner.apply(r, r)
-        _bring_back(*sets, *self._beside(r), *self._beside(self._counts))
+        self._interpolate_back(known, maps)
+        self._weigh()
+        self._add_up_back(maps)
 
-    def _beside(self, field: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """The rows above those of this rank, these, and the rows below."""
-        return fetch(self.slab, field, self._above), field, fetch(self.slab, field, self._below)
+    def _weigh(self) -> None:
+        """Divide by `w + f`."""
+        for floor, known, cells in zip(self._floors, self._known, self._cells, strict=True):
+            _weigh(known, floor, cells)
 
+    # -- between each grid and the next, and the transposes of that ----------------------------------------------------
 
-@loop
-def _extend(set_above, working, set_below, r_above, r, r_below, counts):
-    """Put e outside the set, and how many points of the set each square has into `counts`."""
-    nx = r.shape[1]
-    sums, points = np.zeros(nx + 2 * REACH), np.zeros(nx + 2 * REACH, np.uint8)
-    for j in range(-2 * REACH, r.shape[0]):
-        for sign, k in ((1, j + REACH), (-1, j - REACH - 1)):
-            inside, there = _row(set_above, working, set_below, k)
-            values, _ = _row(r_above, r, r_below, k)
-            for i in range(0, nx if there else 0, BLOCK):
-                here, around = slice(i, min(i + BLOCK, nx)), slice(i + REACH, min(i + BLOCK, nx) + REACH)
-                if _any(inside[here]):
-                    _count(inside[here], sign, points[around])
-                    _sum_inside(inside[here], values[here], sign, sums[around])
-        for i in range(0, nx if j >= 0 else 0, BLOCK):
-            here, around = slice(i, min(i + BLOCK, nx)), slice(i, min(i + BLOCK, nx) + 2 * REACH)
-            _count_across(points[around], counts[j, here])
-            if _any(counts[j, here]):
-                _put_outside(working[j, here], sums[around], counts[j, here], r[j, here])
+    def _add_up(self, maps: Maps) -> None:
+        for k, step in enumerate(self._steps):
+            points, cells = maps[k : k + 2]
+            _add_up(points, step.points_beside(points, 0, -1), step.above, cells[step.own])
+            step.complete(cells)
 
+    def _add_up_back(self, maps: Maps) -> None:
+        for k, step in reversed(list(enumerate(self._steps))):
+            points, cells = maps[k : k + 2]
+            _add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
 
-@loop
-def _bring_back(set_above, working, set_below, z_above, z, z_below, counts_above, counts, counts_below):
-    """Add to z on the set what the transpose of the extension makes of z outside it."""
-    nx = z.shape[1]
-    sums = np.zeros(nx + 2 * REACH)
-    for j in range(-2 * REACH, z.shape[0]):
-        for sign, k in ((1, j + REACH), (-1, j - REACH - 1)):
-            inside, there = _row(set_above, working, set_below, k)
-            values, _ = _row(z_above, z, z_below, k)
-            points, _ = _row(counts_above, counts, counts_below, k)
-            for i in range(0, nx if there else 0, BLOCK):
-                here, around = slice(i, min(i + BLOCK, nx)), slice(i + REACH, min(i + BLOCK, nx) + REACH)
-                if _any(points[here]):
-                    _sum_outside(inside[here], values[here], points[here], sign, sums[around])
-        for i in range(0, nx if j >= 0 else 0, BLOCK):
-            here, around = slice(i, min(i + BLOCK, nx)), slice(i, min(i + BLOCK, nx) + 2 * REACH)
-            if _any(working[j, here]):
-                _add_inside(working[j, here], sums[around], z[j, here])
+    def _interpolate(self, known: Maps, maps: Maps) -> None:
+        for k, step in reversed(list(enumerate(self._steps))):
+            points, cells = maps[k : k + 2]
+            _interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, known[k], points)
+
+    def _interpolate_back(self, known: Maps, maps: Maps) -> None:
+        for k, step in enumerate(self._steps):
+            weights, points, cells = known[k], maps[k], maps[k + 1]
+            around = [step.points_beside(field, 0, 1, -2, -1) for field in (weights, points)]
+            _interpolate_back(weights, around[0], points, around[1], step.above, cells[step.own])
+            step.complete(cells)
 
 
 @loop
-def _row(above, own, below, j):
-    """Row j of maps one below the other, counted from the first of `own`; and whether there is one."""
-    if j < -above.shape[0] or j >= own.shape[0] + below.shape[0]:
-        return own[:1].ravel(), False
+def _weigh(known, floor, cells):
+    for j in range(cells.shape[0]):
+        for i in range(cells.shape[1]):
+            cells[j, i] *= (1.0 - known[j, i]) / floor
+
+
+@loop
+def _row(own, beside, j):
+    """Row j, counted from the first of `own`; of those beside, the ones above are the last."""
     if j < 0:
-        return above[j + above.shape[0]], True
-    return (own[j], True) if j < own.shape[0] else (below[j - own.shape[0]], True)
-
-
-# -- parts of a row; sums over columns have REACH entries more at each end ---------------------------------------------
+        return beside[beside.shape[0] + j]
+    return own[j] if j < own.shape[0] else beside[j - own.shape[0]]
 
 
 @loop
-def _any(flags):
-    """Whether one is not 0."""
-    found = np.uint8(0)
-    for i in range(flags.size):
-        found |= np.uint8(flags[i])
-    return found != 0
+def _add_up(points, beside, above, cells):
+    """The sums over cells."""
+    pairs = points.shape[1] // 2
+    for j in range(cells.shape[0]):
+        a, b = _row(points, beside, 2 * j - above), _row(points, beside, 2 * j - above + 1)
+        out = cells[j]
+        for i in range(pairs):
+            out[i] = (a[2 * i] + b[2 * i]) + (a[2 * i + 1] + b[2 * i + 1])
+        for i in range(pairs, out.size):
+            out[i] = a[2 * i] + b[2 * i]
 
 
 @loop
-def _count(inside, sign, points):
-    for i in range(inside.size):
-        points[i] += np.uint8(sign) * np.uint8(inside[i])
+def _add_up_back(cells, beside, above, points):
+    """Add the value of each cell to its points."""
+    pairs = points.shape[1] // 2
+    for j in range(points.shape[0]):
+        cell, out = _row(cells, beside, (j + above) // 2), points[j]
+        for i in range(pairs):
+            out[2 * i] += cell[i]
+            out[2 * i + 1] += cell[i]
+        for i in range(2 * pairs, out.size):
+            out[i] += cell[i // 2]
 
 
 @loop
-def _sum_inside(inside, values, sign, sums):
-    for i in range(inside.size):
-        sums[i] += sign * values[i] if inside[i] else 0.0
+def _interpolate(cells, beside, above, known, points):
+    """Add `1 - known` times what is interpolated between cells."""
+    pairs, columns = points.shape[1] // 2, cells.shape[1]
+    line = np.empty(columns + 2, cells.dtype)
+    for j in range(points.shape[0]):
+        near = (j + above) // 2
+        other = near + 1 if (j + above) % 2 else near - 1
+        a, b = _row(cells, beside, near), _row(cells, beside, other)
+        for i in range(columns):
+            line[i + 1] = np.float32(0.75) * a[i] + np.float32(0.25) * b[i]
+        line[0], line[columns + 1] = line[columns], line[1]
+        out, weight = points[j], known[j]
+        for i in range(pairs):
+            middle = np.float32(0.75) * line[i + 1]
+            out[2 * i] += (1.0 - weight[2 * i]) * (middle + np.float32(0.25) * line[i])
+            out[2 * i + 1] += (1.0 - weight[2 * i + 1]) * (middle + np.float32(0.25) * line[i + 2])
+        for i in range(2 * pairs, out.size):
+            out[i] += (1.0 - weight[i]) * (np.float32(0.75) * line[i // 2 + 1] + np.float32(0.25) * line[i // 2])
 
 
 @loop
-def _sum_outside(inside, values, counts, sign, sums):
-    for i in range(inside.size):
-        sums[i] += 0.0 if inside[i] else sign * values[i] / (counts[i] + FLOOR)
-
-
-@loop
-def _count_across(points, counts):
-    for i in range(counts.size):
-        count = np.uint8(0)
-        for k in range(SIDE):
-            count += points[i + k]
-        counts[i] = count
-
-
-@loop
-def _put_outside(inside, sums, counts, r):
-    for i in range(r.size):
-        total = 0.0
-        for k in range(SIDE):
-            total += sums[i + k]
-        r[i] = r[i] if inside[i] else total / (counts[i] + FLOOR)
-
-
-@loop
-def _add_inside(inside, sums, z):
-    for i in range(z.size):
-        total = 0.0
-        for k in range(SIDE):
-            total += sums[i + k]
-        z[i] += total if inside[i] else 0.0
+def _interpolate_back(known, known_beside, points, beside, above, cells):
+    """What points bring to cells: `1 - known` times their values, by the weights of the interpolation."""
+    count, columns = points.shape[1], cells.shape[1]
+    line = np.zeros(2 * columns + 2, cells.dtype)
+    for j in range(cells.shape[0]):
+        first = 2 * j - above - 1
+        a, b = _row(points, beside, first), _row(points, beside, first + 1)
+        c, d = _row(points, beside, first + 2), _row(points, beside, first + 3)
+        w_a, w_b = _row(known, known_beside, first), _row(known, known_beside, first + 1)
+        w_c, w_d = _row(known, known_beside, first + 2), _row(known, known_beside, first + 3)
+        for i in range(count):
+            outer = (1.0 - w_a[i]) * a[i] + (1.0 - w_d[i]) * d[i]
+            inner = (1.0 - w_b[i]) * b[i] + (1.0 - w_c[i]) * c[i]
+            line[i + 1] = 0.25 * outer + 0.75 * inner
+        line[0], line[2 * columns + 1] = line[2 * columns], line[1]
+        out = cells[j]
+        for i in range(columns):
+            outer, inner = line[2 * i] + line[2 * i + 3], line[2 * i + 1] + line[2 * i + 2]
+            out[i] = np.float32(0.25) * outer + np.float32(0.75) * inner

@@ -1,21 +1,18 @@
-"""Projected steps and the extended preconditioner against dense algebra and whole maps."""
+"""Projected steps against dense algebra."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.solve.projected import Projected
-from parcontact.solve.surround import FLOOR, REACH, Surround
 
 Map = NDArray[np.float64]
 
 
 class Scaled:
-    """The identity times a number, on any ranks."""
+    """The identity times a number."""
 
     def __init__(self, factor: float) -> None:
         self.factor = factor
@@ -32,37 +29,6 @@ class Dense:
     def apply(self, field: Array, out: Array) -> Array:
         out[...] = (self.matrix @ field.ravel()).reshape(field.shape)
         return out
-
-
-def sums(field: Map) -> Map:
-    """Over squares of 2 REACH + 1 points, by adding shifted copies; beyond the box there is nothing."""
-    ny, nx = field.shape
-    padded, side = np.pad(field, REACH), 2 * REACH + 1
-    return np.asarray(sum(padded[j : j + ny, i : i + nx] for j in range(side) for i in range(side)))
-
-
-@pytest.mark.mpi
-@settings(max_examples=30)
-@given(
-    ny=st.integers(1, 34),
-    nx=st.sampled_from([1, 7, 14, 200]),
-    filled=st.sampled_from([0.003, 0.4]),
-    seed=st.integers(0, 99),
-)
-def test_extends_by_means_and_brings_back_by_the_transpose(ny: int, nx: int, filled: float, seed: int) -> None:
-    """`z = E^T K E r` on the set with `E r = S r/(S 1 + FLOOR)` outside; to rounding, on any ranks."""
-    random = np.random.default_rng([ny, nx, seed])
-    slab = Slab(MPI.COMM_WORLD, nx, ny)
-    c = random.random((ny, nx)) < filled
-    r = np.where(c, random.normal(size=(ny, nx)), 0.0)
-    share = sums(c.astype(float)) + FLOOR
-    e = np.where(c, r, sums(r) / share)
-    expected = 2.0 * e + sums(np.where(c, 0.0, 2.0 * e / share))
-    z = slab.empty()
-    z[...] = r[slab.rows]
-    Surround(slab, Scaled(2.0)).apply(c[slab.rows].copy(), z)
-    mine = c[slab.rows]
-    np.testing.assert_allclose(z[mine], expected[slab.rows][mine], rtol=0, atol=1e-13)
 
 
 def test_goes_where_the_residual_is_smallest() -> None:

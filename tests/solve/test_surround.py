@@ -1,0 +1,107 @@
+"""The extension of residuals against products of small matrices, on any ranks."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact.parallel.slab import Array, Slab
+from parcontact.solve.surround import FLOOR, Surround
+
+Map = NDArray[np.float64]
+SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
+
+
+class Doubling:
+    """Twice a map; it remembers what it was given."""
+
+    def apply(self, field: Array, out: Array) -> Array:
+        self.given = field.copy()
+        np.multiply(field, 2.0, out=out)
+        return out
+
+
+def adding(count: int) -> Map:
+    """Points -> cells of two, along one direction."""
+    return np.array([[float(i // 2 == cell) for i in range(count)] for cell in range((count + 1) // 2)])
+
+
+def interpolating(count: int) -> Map:
+    """Cells -> points along one direction, cyclic: 3/4 of the cell of a point, 1/4 of the nearest other one."""
+    cells = (count + 1) // 2
+    weights = np.zeros((count, cells))
+    for i in range(count):
+        weights[i, i // 2] += 0.75
+        weights[i, (i // 2 + (1 if i % 2 else -1)) % cells] += 0.25
+    return weights
+
+
+def extended(s: Map, w: Map, cell: float, floor: float) -> Map:
+    """The sums s and w over cells of so many points, extended: `(s + f I e)/(w + f)`."""
+    ny, nx = s.shape
+    if s.size == 1:
+        return np.asarray(s / (w + floor * cell))
+    down, across = adding(ny), adding(nx)
+    cells = ((ny + 1) // 2) * ((nx + 1) // 2)
+    above = extended(down @ s @ across.T, down @ w @ across.T, cell * s.size / cells, floor)
+    told = interpolating(ny) @ above @ interpolating(nx).T
+    if cell == 1.0:
+        return np.where(w > 0.0, s, told)
+    return np.asarray((s + floor * cell * told) / (w + floor * cell))
+
+
+@pytest.mark.mpi
+@settings(max_examples=30)
+@given(
+    ny=st.integers(1, 34),
+    nx=st.sampled_from([1, 7, 14, 200]),
+    filled=st.sampled_from([0.003, 0.4]),
+    seed=st.integers(0, 99),
+)
+def test_extends_by_means_over_cells_of_all_sizes(ny: int, nx: int, filled: float, seed: int) -> None:
+    """What K is given is that of products of matrices, to single precision."""
+    random = np.random.default_rng([ny, nx, seed])
+    slab, inverse = Slab(MPI.COMM_WORLD, nx, ny), Doubling()
+    c = random.random((ny, nx)) < filled
+    r = np.where(c, random.normal(size=(ny, nx)), 0.0)
+    z = slab.empty()
+    z[...] = r[slab.rows]
+    Surround(slab, inverse).apply(c[slab.rows].copy(), z)
+    if c.size > 1:
+        expected = extended(r, c.astype(float), 1.0, FLOOR)
+        np.testing.assert_allclose(inverse.given, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
+
+
+@pytest.mark.mpi
+@settings(max_examples=30)
+@given(ny=st.integers(1, 34), nx=st.sampled_from([1, 7, 14, 200]), seed=st.integers(0, 99))
+def test_brings_back_by_the_transpose(ny: int, nx: int, seed: int) -> None:
+    """`<r, E' K E s> = <E r, K E s>` for any residuals r and s on the set, to single precision."""
+    random = np.random.default_rng([ny, nx, seed])
+    slab, inverse = Slab(MPI.COMM_WORLD, nx, ny), Doubling()
+    surround = Surround(slab, inverse)
+    c = (random.random((ny, nx)) < 0.2)[slab.rows].copy()
+    r, s = (np.where(c, random.normal(size=(ny, nx))[slab.rows], 0.0) for _ in range(2))
+    z = r.copy()
+    surround.apply(c, z)
+    r_extended = inverse.given
+    z[...] = s
+    surround.apply(c, z)
+    left, right, size = slab.sum(
+        float(np.sum(r * np.where(c, z, 0.0))),
+        float(np.sum(r_extended * 2.0 * inverse.given)),
+        float(np.sum(np.abs(r_extended * 2.0 * inverse.given))),
+    )
+    assert abs(left - right) <= SINGLE * size
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("shape", [(1, 1), (5, 300), (64, 64), (33, 18)])
+def test_holds_what_it_says(shape: tuple[int, int]) -> None:
+    """To the byte, on every rank."""
+    comm = MPI.COMM_WORLD
+    slab = Slab(comm, shape[1], shape[0])
+    _held = Surround(slab, Doubling())
+    assert slab.tally["map bytes"] == Surround.footprint(shape[1], shape[0], comm.size, comm.rank)
