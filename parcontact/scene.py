@@ -30,6 +30,7 @@ from .physics.surface import Surface
 from .physics.units import Units
 from .rigid_surface import height_of, make_surface
 from .solve.contact import ContactSolver
+from .solve.surround import grids_for
 
 
 @dataclass
@@ -186,9 +187,9 @@ def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:
 
 def _solver(base: Frame, tolerance: float) -> ContactSolver:
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
-    return ContactSolver(
-        base.slab, base.half_space.operator(base.fft), _preconditioner(base), height, tolerance, limit, base.dtype
-    )
+    operators = base.half_space.operator(base.fft), _preconditioner(base)
+    grids = grids_for(base.job.grid.dx, base.job.grid.dy)
+    return ContactSolver(base.slab, *operators, height, tolerance, limit, base.dtype, grids)
 
 
 def _preconditioner(base: Frame) -> Convolution:

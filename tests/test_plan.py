@@ -65,6 +65,7 @@ JOBS: dict[str, Json] = {
     "free, energies": {"grid": {"boundary": "free"}, "material": TWO, "history": [SLIDE], "output": {"energy": True}},
     "energies": {"material": TWO, "history": [CELLS], "output": {"energy": True}},
     "single": {"material": TWO, "history": [CELLS], "numerics": {"precision": "single"}},
+    "long cells": {"grid": {"size": [1e-3, 1e-5]}, "history": [SLIDE]},
     "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed"}},
 }
 

@@ -6,7 +6,7 @@ the grid before, until there are so few cells that every rank has all of them, w
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,10 @@ def steps_of(slab: Slab) -> list["Step"]:
     return [Step(fine, coarse) for fine, coarse in pairwise(grids)]
 
 
-def count_cells(nx: int, ny: int, ranks: int, rank: int) -> int:
-    """Cells of all larger grids together that a rank has."""
+def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None) -> int:
+    """Cells of the next grids, `most` of them or all, that a rank has."""
     total = 0
-    for width, _, dealt in _larger(nx, ny, deal(ny, ranks)):
+    for width, _, dealt in islice(_larger(nx, ny, deal(ny, ranks)), most):
         part = dealt[rank if len(dealt) > 1 else 0]
         total += width * (part.stop - part.start)
     return total

@@ -23,6 +23,7 @@ from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
 from ..solve.contact import ContactSolver
+from ..solve.surround import grids_for
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,8 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
         yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True)
     else:
         yield Holding("preconditioner", symbol)
-    yield Holding("solver", ContactSolver.footprint(*job.grid.points, precision.itemsize, ranks, rank))
+    grids = grids_for(job.grid.dx, job.grid.dy)
+    yield Holding("solver", ContactSolver.footprint(*job.grid.points, precision.itemsize, ranks, rank, grids))
     if decisions.spectrum(job).on:
         yield Holding("surface spectrum", spectrum)
     for maps in _maps(job):

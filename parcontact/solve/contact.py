@@ -126,10 +126,11 @@ def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:
 
 
 class ContactSolver:
-    """Loop for contacts on one grid, and the maps that it works in: four, and two bytes per point.
+    """Loop for contacts on one grid, and the maps that it works in: four, a byte per point, and those of `Surround`.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
-    lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `dtype` of maps.
+    lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `dtype` of maps;
+    `grids` of larger cells by which a residual is extended (`surround.grids_for`).
     """
 
     def __init__(
@@ -141,6 +142,7 @@ class ContactSolver:
         tolerance: float,
         max_iterations: int,
         dtype: type[np.floating] = np.float64,
+        grids: int | None = None,
     ) -> None:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
@@ -149,13 +151,13 @@ class ContactSolver:
         self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
         self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
         self._working = slab.zeros(np.bool_)
-        self._surround = Surround(slab, preconditioner)
+        self._surround = Surround(slab, preconditioner, most=grids)
 
     @staticmethod
-    def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int) -> int:
+    def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int, grids: int | None = None) -> int:
         """Bytes that it holds on a rank."""
         rows = deal(ny, ranks)[rank]
-        return (4 * itemsize + 1) * (rows.stop - rows.start) * nx + Surround.footprint(nx, ny, ranks, rank)
+        return (4 * itemsize + 1) * (rows.stop - rows.start) * nx + Surround.footprint(nx, ny, ranks, rank, grids)
 
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution

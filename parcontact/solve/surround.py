@@ -25,7 +25,13 @@ from ..parallel.slab import Array, Slab
 from .operator import Operator
 
 FLOOR = 0.3  # of the points of a cell: so many count as having the value of the larger cell
+LONG = 16.0  # times its width: with points further apart along one direction, square cells are worse than none
 Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
+
+
+def grids_for(dx: float, dy: float) -> int | None:
+    """The most grids of larger cells to use with distances dx and dy of points; None for all that there are."""
+    return 0 if max(dx, dy) > LONG * min(dx, dy) else None
 
 
 class Surround:
@@ -38,13 +44,16 @@ class Surround:
         """With another floor, and `most` grids of larger cells."""
         self.preconditioner, self._steps = preconditioner, pyramid.steps_of(slab)[:most]
         grids = [step.coarse for step in self._steps]
-        self._floors = [np.float32(floor * slab.points / grid.points) for grid in grids]
+        self._floors = [
+            (np.float32(floor) * _lengths(slab.ny, level)[grid.rows], _lengths(slab.nx, level))
+            for level, grid in enumerate(grids, 1)
+        ]
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     @staticmethod
-    def footprint(nx: int, ny: int, ranks: int, rank: int) -> int:
+    def footprint(nx: int, ny: int, ranks: int, rank: int, most: int | None = None) -> int:
         """Bytes that it holds on a rank."""
-        return 2 * 4 * pyramid.count_cells(nx, ny, ranks, rank)
+        return 2 * 4 * pyramid.count_cells(nx, ny, ranks, rank, most)
 
     def apply(self, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
@@ -52,8 +61,8 @@ class Surround:
         known: Maps = [working, *self._known]
         maps: Maps = [r, *self._cells]
         self._add_up(known)
-        for floor, weight in zip(self._floors, self._known, strict=True):
-            weight /= weight + floor
+        for floors, weights in zip(self._floors, self._known, strict=True):
+            _compare(*floors, weights)
         self._add_up(maps)
         self._weigh()
         self._interpolate(known, maps)
@@ -64,8 +73,8 @@ class Surround:
 
     def _weigh(self) -> None:
         """Divide by `w + f`."""
-        for floor, known, cells in zip(self._floors, self._known, self._cells, strict=True):
-            _weigh(known, floor, cells)
+        for floors, known, cells in zip(self._floors, self._known, self._cells, strict=True):
+            _weigh(known, *floors, cells)
 
     # -- between each grid and the next, and the transposes of that ----------------------------------------------------
 
@@ -93,11 +102,25 @@ class Surround:
             step.complete(cells)
 
 
+def _lengths(points: int, level: int) -> NDArray[np.float32]:
+    """How many points there are of each cell along one direction: fewer in the last one."""
+    length = 1 << level
+    return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
+
+
 @loop
-def _weigh(known, floor, cells):
+def _compare(floors, lengths, weights):
+    """`w/(w + f)`, with f the product of a floor of each row and a length of each column."""
+    for j in range(weights.shape[0]):
+        for i in range(weights.shape[1]):
+            weights[j, i] /= weights[j, i] + floors[j] * lengths[i]
+
+
+@loop
+def _weigh(known, floors, lengths, cells):
     for j in range(cells.shape[0]):
         for i in range(cells.shape[1]):
-            cells[j, i] *= (1.0 - known[j, i]) / floor
+            cells[j, i] *= (1.0 - known[j, i]) / (floors[j] * lengths[i])
 
 
 @loop

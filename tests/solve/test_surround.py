@@ -38,18 +38,17 @@ def interpolating(count: int) -> Map:
     return weights
 
 
-def extended(s: Map, w: Map, cell: float, floor: float) -> Map:
+def extended(s: Map, w: Map, points: Map) -> Map:
     """The sums s and w over cells of so many points, extended: `(s + f I e)/(w + f)`."""
     ny, nx = s.shape
     if s.size == 1:
-        return np.asarray(s / (w + floor * cell))
+        return np.asarray(s / (w + FLOOR * points))
     down, across = adding(ny), adding(nx)
-    cells = ((ny + 1) // 2) * ((nx + 1) // 2)
-    above = extended(down @ s @ across.T, down @ w @ across.T, cell * s.size / cells, floor)
+    above = extended(*(down @ field @ across.T for field in (s, w, points)))
     told = interpolating(ny) @ above @ interpolating(nx).T
-    if cell == 1.0:
+    if points.max() == 1.0:
         return np.where(w > 0.0, s, told)
-    return np.asarray((s + floor * cell * told) / (w + floor * cell))
+    return np.asarray((s + FLOOR * points * told) / (w + FLOOR * points))
 
 
 @pytest.mark.mpi
@@ -70,7 +69,7 @@ def test_extends_by_means_over_cells_of_all_sizes(ny: int, nx: int, filled: floa
     z[...] = r[slab.rows]
     Surround(slab, inverse).apply(c[slab.rows].copy(), z)
     if c.size > 1:
-        expected = extended(r, c.astype(float), 1.0, FLOOR)
+        expected = extended(r, c.astype(float), np.ones(c.shape))
         np.testing.assert_allclose(inverse.given, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
 
 
