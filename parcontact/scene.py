@@ -157,6 +157,8 @@ def facts(built: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
     found = built.frame.roughness
     told = [*built.frame.told, *describe_folded_branches(built.folded, relaxation_of(built.job))]
+    if steps := built.job.about_steps:
+        told.append(f"time steps that are chosen: {steps}")
     if found is None:
         return told
     return [

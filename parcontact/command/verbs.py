@@ -82,6 +82,8 @@ def check(options: argparse.Namespace) -> int:
         print(jobs.describe(job))
         if job.included:
             print(f"\n{job.included}")
+        if job.about_steps:
+            print(f"\ntime steps that are chosen: {job.about_steps}")
         doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
         for warning in dict.fromkeys(doubts):
             print(f"warning: {warning}")

@@ -56,6 +56,12 @@ def lasting(job: Job) -> Decision:
     return Decision("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
 
 
+def chosen_steps(job: Job) -> Decision:
+    """Time steps that follow the error of the last one (`march.choosing`)."""
+    why = job.about_steps
+    return Decision("chosen time steps", bool(why) and job.remembers, why or "every stage says in which steps")
+
+
 def short_rest(job: Job) -> Decision:
     """Once nothing changes any more at rest, one step ends the stage (`stationary.py`)."""
     stage = next((span.stage.name for span in job.timeline().spans if span.rests), None)
@@ -141,7 +147,17 @@ def mixed_precision(job: Job) -> Decision:
 
 
 TABLE: tuple[Callable[[Job], Decision], ...] = (
-    *(relaxation.decide, folded_branches.decide, isolated, sliding, part_cells, lasting, short_rest, steady_start),
+    *(
+        relaxation.decide,
+        folded_branches.decide,
+        isolated,
+        sliding,
+        part_cells,
+        lasting,
+        chosen_steps,
+        short_rest,
+        steady_start,
+    ),
     *(
         approach,
         mixed_precision,

@@ -9,10 +9,8 @@ permits it.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from .history import Stage
 from .limits import one_cell
@@ -158,22 +156,34 @@ class ChosenSteps:
         ladder = Ladder(min(first, limits.most), max(min(first, limits.most), longest), left)
         return ChosenEnds(made, stops, ladder, limits)
 
-    def numbers(self) -> dict[str, NDArray[np.float64]]:
-        """As arrays, by the names that they have in a checkpoint."""
+    def numbers(self) -> dict[str, list[float] | float]:
+        """By the names that they have in a checkpoint."""
         stages = sorted(self.ends)
-        values = (
-            [float(stage) for stage in stages],
-            [float(len(self.ends[stage])) for stage in stages],
-            [end for stage in stages for end in self.ends[stage]],
-            self.next,
-        )
-        return {name: np.array(value) for name, value in zip(SYMBOLS, values, strict=True)}
+        return {
+            "clock/stages": [float(stage) for stage in stages],
+            "clock/counts": [float(len(self.ends[stage])) for stage in stages],
+            "clock/ends": [end for stage in stages for end in self.ends[stage]],
+            "clock/next": self.next,
+        }
 
-    def restored(self, saved: Mapping[str, NDArray[Any]]) -> "ChosenSteps":
-        """Those of a checkpoint; none were chosen before one that has no such arrays."""
-        if not SYMBOLS.keys() <= saved.keys():
-            return ChosenSteps(self.cells)
-        stages, counts, ends, following = (saved[name] for name in SYMBOLS)
-        parts = np.split(ends, np.cumsum(counts.astype(int))[:-1]) if counts.size else []
-        found = {int(stage): part.tolist() for stage, part in zip(stages, parts, strict=True)}
-        return ChosenSteps(self.cells, found, float(following))
+    def restored(self, saved: Mapping[str, Any]) -> "ChosenSteps":
+        """Those of a checkpoint, from its arrays; none were chosen before one that has no such arrays."""
+        found = ChosenSteps(self.cells)
+        if SYMBOLS.keys() <= saved.keys():
+            ends = iter(saved["clock/ends"].tolist())
+            for stage, count in zip(saved["clock/stages"], saved["clock/counts"], strict=True):
+                found.ends[int(stage)] = list(islice(ends, int(count)))
+            found.next = float(saved["clock/next"])
+        return found
+
+
+def describe(history: Sequence[Stage], accuracy: float, remembers: bool, cells: int) -> str:
+    """Which stages choose their own steps, how, and why; '' if none does."""
+    names = ", ".join(stage.name for stage in history if stage.chooses)
+    if not names:
+        return ""
+    if not remembers:
+        return f"{names}: an elastic body has no error of time, one cell of sliding per step, one step at rest"
+    slides = any(stage.chooses and stage.speed for stage in history)
+    limits = f", at most {cells} cell{'s' * (cells > 1)} of sliding" * slides
+    return f"{names}: steps follow the error that numerics.accuracy {accuracy:g} allows{limits}"

@@ -16,6 +16,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_val
 
 from . import advice, extension, limits, meaning, size, table
 from .chosen import ChosenSteps, most_cells
+from .chosen import describe as describe_steps
 from .fault import Fault
 from .history import Initial, Stage, Steady
 from .loading import Included
@@ -228,6 +229,12 @@ class Job(Part):
         """The steps that stages had chosen when a checkpoint with these numbers was written; none without."""
         none = ChosenSteps(most_cells(self.grid, self.surface))
         return none.restored(saved) if saved is not None else none
+
+    @property
+    def about_steps(self) -> str:
+        """Which stages choose their own time steps, how, and why; '' if none does."""
+        cells = most_cells(self.grid, self.surface)
+        return describe_steps(self.history, self.numerics.accuracy, self.remembers, cells)
 
     @property
     def remembers(self) -> bool:

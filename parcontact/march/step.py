@@ -152,7 +152,7 @@ class March:
         """The steps that stages have chosen; none where no stage chooses."""
         if self.chosen is None:
             return {}
-        return {name: Entry(numbers, 1.0, SYMBOLS[name]) for name, numbers in self.chosen.numbers().items()}
+        return {name: Entry(np.array(numbers), 1.0, SYMBOLS[name]) for name, numbers in self.chosen.numbers().items()}
 
     def _kept(self) -> Array:
         """A map for the displacement before a step, of the solver until its next solve."""

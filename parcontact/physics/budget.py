@@ -27,6 +27,7 @@ from .measures import SIDE
 
 SOLVER_FRICTION, SOLVER_AREA = 0.5, 1.0  # times the complementarity
 EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 1.7, 0.4  # times the difference of the pair
+LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least
 TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
 EQUAL_DIFFERENCE = 0.0072  # of the pair, at which a material of many branches is no worse than one of a single branch
 FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
@@ -119,7 +120,7 @@ def time_error(known: Known, seen: Seen) -> float:
     """
     if not known.exponential:
         return EULER_FRICTION * seen.difference**0.5
-    power = max(0.0, TIME_ORDER / max(seen.order, 1.0) - 1.0)
+    power = max(LEAST_POWER, TIME_ORDER / max(seen.order, 1.0) - 1.0)
     fixed = 1.0 - FIXED_EDGES * seen.area**2
     return fixed * EXPONENTIAL_FRICTION * seen.difference * (seen.difference / EQUAL_DIFFERENCE) ** power
 
