@@ -250,6 +250,17 @@ def test_rest_cut_short() -> None:
     assert [row(planned, "rest cut short").on for planned in (off, on)] == [False, True]
 
 
+def test_chosen_time_steps() -> None:
+    """Off: no step is judged and nothing is remembered of them. On: no map more, at rest."""
+    chosen = {key: value for key, value in PRESS.items() if key not in ("time_step", "cells_per_step")}
+    off, on = (job(history=[stage], material=RUBBER) for stage in (PRESS, chosen))
+    elastic = job(history=[chosen], material=ELASTIC)
+    assert [row(planned, "chosen time steps").on for planned in (off, on, elastic)] == [False, True, False]
+    marches = [marched(planned)[0] for planned in (off, on)]
+    assert [march.chosen is None for march in marches] == [True, False]
+    assert len({march.scene.slab.tally["map bytes"] for march in marches}) == 1
+
+
 def test_steady_start() -> None:
     """Off: nothing is solved before the first step."""
     start = {"state": "steady", "velocity": 0.1, "pressure": 2e3}
@@ -361,6 +372,7 @@ TESTED = {
     *(
         "isolated contact",
         "extrapolated starts",
+        "chosen time steps",
         "rest cut short",
         "steady start",
         "displacement control",
