@@ -188,6 +188,7 @@ def test_the_python_of_a_page(name: str, elsewhere: Path) -> None:
     run_code(blocks("python", name))
 
 
+@pytest.mark.filterwarnings("ignore:.*only 4 cells per shortest wave")
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook(notebook: Path, elsewhere: Path) -> None:
     """Coarser than it stands."""

@@ -87,12 +87,16 @@ class Slab:
 
     def from_root(self, field: Array | None) -> Array:
         """Collective. This rank's rows of a map in double precision that root has, of shape (ny, nx)."""
-        rows = np.empty(self.shape)
-        counts = [self.nx * (part.stop - part.start) for part in self.dealt]
-        starts = [self.nx * part.start for part in self.dealt]
-        whole = None if field is None else [np.ascontiguousarray(field, dtype=np.float64), (counts, starts), MPI.DOUBLE]
-        self.comm.Scatterv(whole, rows)
-        return rows
+        own = np.empty(self.shape)
+        counts = [part.stop - part.start for part in self.dealt]
+        starts = [part.start for part in self.dealt]
+        row = MPI.DOUBLE.Create_contiguous(self.nx).Commit()  # counts are of rows: of points they would leave 32 bits
+        try:
+            whole = None if field is None else [np.ascontiguousarray(field, dtype=np.float64), (counts, starts), row]
+            self.comm.Scatterv(whole, [own, self.shape[0], row])
+        finally:
+            row.Free()
+        return own
 
     def from_all(self, value: T) -> list[T]:
         """Collective. The value of every rank, in order, on every rank."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import warnings
 from collections.abc import Mapping, Sequence
@@ -12,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..job import log_range
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene import frame
 from ..steady_sliding import curve
 from ..steady_sliding.sliding import Point, SteadySliding
-from .jobs import Given, read
+from .jobs import Given, read, warn_of
 
 Array = NDArray[np.float64]
 Values = str | float | Sequence[float] | Array | None
@@ -27,11 +26,12 @@ Values = str | float | Sequence[float] | Array | None
 
 @dataclass(frozen=True)
 class Curve:
-    """Steady states, point by point: arrays of shape (points,), all velocities under the first pressure first.
+    """Steady states, point by point: arrays of shape (points,), of each temperature all velocities under each pressure.
 
     `velocity` [m/s], `pressure` [Pa, mean], `friction` [-], `contact_area` [share of the nominal], `force_x`, `force_y`
     [N, on the rigid surface], `approach`, `mean_gap` [m], `max_pressure` [Pa], `residual` [-, the certificate];
-    `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene.
+    `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene;
+    `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference].
 
     A point that could not be solved is NaN, and `failures` says why.
     """
@@ -47,6 +47,8 @@ class Curve:
     max_pressure: Array
     residual: Array
     power: Array
+    temperature: Array
+    shift_factor: Array
     failures: tuple[str, ...] = ()
 
 
@@ -57,47 +59,64 @@ def steady(
     job: Given,
     velocities: Values = None,
     pressures: Values = None,
+    temperatures: Values = None,
     set: Mapping[str, Any] | None = None,
     comm: MPI.Intracomm | None = None,
 ) -> Curve:
     """Steady sliding of a job's surface at velocities [m/s] under mean pressures [Pa], on every rank; collective.
 
     `job` and `set` as for `Simulation`; velocities and pressures as lists or as texts `first:last:count`, equally
-    spaced in the logarithm (default: those of the job's `steady` section, and the pressure of its first loaded stage).
-    Raises JobError, and InputError where velocities or pressures lack. Nothing is written.
+    spaced in the logarithm (default: those of the job's `steady` section, and the pressure of its first loaded stage);
+    `temperatures` [deg C] as a list, of a material that has a shift. Raises JobError, and InputError where velocities
+    or pressures lack; warns (UserWarning, on root) of what is allowed but means little. Nothing is written.
     """
-    asked = {"velocities": _numbers(velocities), "pressures": _numbers(pressures)}
+    asked = {
+        "velocities": _numbers(velocities),
+        "pressures": _numbers(pressures),
+        "temperatures": _degrees(temperatures),
+    }
     keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # a job needs no history then
     found = read(job, {**(set or {}), **keys}, comm)
     slab = Slab(comm or MPI.COMM_WORLD, *found.grid.points)
     wanted = curve.request(found, *asked.values())
-    sliding = SteadySliding(frame(found, slab))
-    points: list[tuple[float, float, Point | None]] = []
+    base = frame(found, slab)
+    warn_of(found, base)
+    sliding = SteadySliding(base)
+    points: list[Point | None] = []
     failures: list[str] = []
-    for pressure, speed in itertools.product(wanted.pressures, wanted.velocities):
+    for at in wanted.points:
         try:
-            velocity = (speed * wanted.direction[0], speed * wanted.direction[1])
-            points.append((speed, pressure, sliding.solve(velocity, pressure)))
+            if wanted.temperatures:
+                sliding.heat(at.temperature)
+            points.append(sliding.solve(wanted.velocity(at.speed), at.pressure))
         except RunError as error:
-            points.append((speed, pressure, None))
+            points.append(None)
             failures.append(str(error))
             warnings.warn(str(error), RuntimeWarning, stacklevel=2)
-    return _curve(points, tuple(failures))
+    return _curve(wanted.points, points, tuple(failures))
 
 
-def _curve(points: list[tuple[float, float, Point | None]], failures: tuple[str, ...]) -> Curve:
+def _curve(wanted: Sequence[curve.Wanted], points: Sequence[Point | None], failures: tuple[str, ...]) -> Curve:
     def all_of(name: str) -> Array:
-        return np.array([math.nan if point is None else getattr(point.measures, name) for _, _, point in points])
+        return np.array([math.nan if point is None else getattr(point.measures, name) for point in points])
 
-    branches = max((len(point.dissipated) for _, _, point in points if point), default=0)
+    branches = max((len(point.dissipated) for point in points if point), default=0)
     return Curve(
-        np.array([speed for speed, _, _ in points]),
-        np.array([pressure for _, pressure, _ in points]),
+        np.array([at.speed for at in wanted]),
+        np.array([at.pressure for at in wanted]),
         **{name: all_of(name) for name in MEASURED},
-        residual=np.array([math.nan if point is None else point.certificate.worst for _, _, point in points]),
-        power=np.array([(math.nan,) * branches if point is None else point.dissipated for _, _, point in points]),
+        residual=np.array([math.nan if point is None else point.certificate.worst for point in points]),
+        power=np.array([(math.nan,) * branches if point is None else point.dissipated for point in points]),
+        temperature=np.array([at.temperature for at in wanted]),
+        shift_factor=np.array([math.nan if point is None else point.shift_factor for point in points]),
         failures=failures,
     )
+
+
+def _degrees(values: Values) -> tuple[float, ...]:
+    if isinstance(values, str):
+        raise InputError(f"temperatures [deg C] are a number or a list of numbers, got {values!r}")
+    return _numbers(values)
 
 
 def _numbers(values: Values) -> tuple[float, ...]:

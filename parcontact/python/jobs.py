@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 from .. import job as jobs
+from .. import sanity
 from ..job import Job
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
+from ..scene import Frame
 
 Given = str | os.PathLike[str] | Mapping[str, Any] | Job
 SOMEWHERE = {"points": 2, "size": 1.0}  # a grid for what needs none
@@ -28,3 +31,10 @@ def of_parts(**parts: Any) -> Job:
     """A job of which some sections matter, on this rank alone. Raises JobError."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
     return jobs.load(rest | parts)
+
+
+def warn_of(job: Job, frame: Frame) -> None:
+    """Warn, on root, of what is allowed but means little; collective."""
+    for text in (*job.warnings, *sanity.of_surface(frame)):
+        if frame.slab.root:
+            warnings.warn(text, UserWarning, stacklevel=4)

@@ -24,6 +24,13 @@ class Row(Mapping[str, float]):
         branches = len(row.branch_dissipation)
         return cls(dict(zip(measures.columns(branches, added), measures.numbers(row, branches), strict=True)))
 
+    @classmethod
+    def of_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
+        """A row as a line of measures.csv has it, of as many branches as there is room for."""
+        cells = [float(cell or "nan") for cell in line.split(",")]
+        branches = len(cells) - len(measures.columns(0, added))
+        return cls(dict(zip(measures.columns(branches, added), cells, strict=True)))
+
     def __getitem__(self, name: str) -> float:
         return self._numbers[name]
 

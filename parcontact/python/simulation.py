@@ -21,11 +21,11 @@ from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics.entries import Entry
 from ..record import checkpoint, marker, wisdom
-from ..record.checkpoint import Contents, Facts
+from ..record.checkpoint import Contents, Facts, Table
 from ..record.fields import UNITS
 from ..run import restart, runner
 from ..steady_sliding import start
-from .jobs import Given, read
+from .jobs import Given, read, warn_of
 from .row import Row
 
 
@@ -34,7 +34,7 @@ class Simulation:
 
     Parameters: `job`, the path of a job file or a mapping like one; `set`, values by keys like `grid.points` that
     replace those of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
-    mistakes, InputError for files that do not fit it.
+    mistakes, InputError for files that do not fit it; warns (UserWarning, on root) of what is allowed but means little.
 
     Nothing is written unless the job, or `set`, names `output.directory`, and then only by `run`. Files that a mapping
     names are looked for from the working directory.
@@ -90,9 +90,11 @@ class Simulation:
 
     @property
     def row(self) -> Row:
-        """What the last step has measured; of the initial state before the first."""
-        march = self._march
+        """What the last step has measured, also one before a restart; of the initial state before the first."""
+        march, saved = self._march, self._saved
         added = tuple(name for follower in march.scene.followers.values() for name in follower.columns)
+        if saved is not None and saved.table.last and march.row.step == saved.step:
+            return Row.of_line(saved.table.last, added)
         return Row.of(march.row, added)
 
     @property
@@ -140,7 +142,9 @@ class Simulation:
         """
         march, slab = self._march, self._slab
         plain = marker.plain_job(self.job) if slab.root else {}
-        facts = Facts(march.row.step, march.row.time, plain, runner.provenance_of(self.job, slab, self._saved))
+        last = ",".join("" if value != value else repr(value) for value in self.row.values())
+        provenance = runner.provenance_of(self.job, slab, self._saved)
+        facts = Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last))
         entries = {**march.entries(), "plans/all": Entry(wisdom.gather(slab))}
         checkpoint.write(Path(path), slab, facts, entries)
 
@@ -177,6 +181,7 @@ class Simulation:
             saved = self._saved
             wisdom.recall(self.job, self._slab, saved.numbers.get("plans/all") if saved else None)
             self._march_made = start.first(self.job, self._slab, saved=saved)
+            warn_of(self.job, self._march_made.scene.frame)
         return self._march_made
 
     def __repr__(self) -> str:

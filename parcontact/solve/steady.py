@@ -30,7 +30,8 @@ from .projected import Projected
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
-MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which a solve gives up
+WAYS = ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
+MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which sets have stalled
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class SteadySolver:
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `stiffness`, the pressure on a point over the
     displacement it causes there; `height` of the surface; `tolerance` on the certificate;
-    `max_steps` of the linear solves in all; `directions` kept in each, and the `reduction` of the residual they aim at.
+    `max_steps` of the linear solves in all; `directions` kept in each.
     """
 
     def __init__(
@@ -73,12 +74,11 @@ class SteadySolver:
         tolerance: float,
         max_steps: int,
         directions: int = 10,
-        reduction: float = 0.05,
         dtype: type[np.floating] = np.float64,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.kappa = 0.1 * stiffness
-        self.height, self.tolerance, self.max_steps, self.reduction = height, tolerance, max_steps, reduction
+        self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self._linear = linear = Directions(slab, operator, preconditioner, directions, dtype)
         lent = (linear.t, linear.w, linear.r, linear.z)
         self._projected = Projected(slab, operator, preconditioner, lent, dtype)
@@ -119,15 +119,24 @@ class SteadySolver:
         return d, certificate, steps
 
     def _change_sets(self, x: Array, h: Array, mean: float, projections: int) -> SteadyContact:
-        """The active set, from the set of the pressure x."""
+        """The active set, from the set of the pressure x.
+
+        What a linear solve leaves of its residual makes wrong points of the next set, so the first way is to solve
+        well. Sets may stall still, and then the other way often leads on.
+        """
         u, slab, working, linear = self._u, self.slab, self._working, self._linear
         guess, best, since, sets, steps = np.inf, np.inf, 0, 0, 0
+        (rounds, reduction), *others = WAYS
         while True:
             total, members = slab.sum(*_restrict(working, x))
             _add(working, (mean * slab.points - total) / members, x)
             self.operator.apply(x, u)
             limit = FEW if guess > FAR else linear.count
-            steps += max(1, linear.improve(x, u, h, working, limit, self.reduction))
+            for _ in range(1 if guess > FAR else rounds):
+                made = linear.improve(x, u, h, working, limit, reduction)
+                steps += max(1, made)
+                if made < limit:
+                    break
             sets += 1
             guess = self._next_set(x, h)
             if guess <= self.tolerance:
@@ -138,6 +147,9 @@ class SteadySolver:
                 guess = certificate.worst
             since = 0 if guess < best else since + 1
             best = min(best, guess)
+            if since >= MAX_STALLED_SETS and others:
+                (rounds, reduction), *others = others
+                best, since = np.inf, 0
             if not np.isfinite(guess) or since >= MAX_STALLED_SETS or steps >= self.max_steps:
                 self._admit(x, mean)
                 d, certificate = self._certify(x, h, mean)
