@@ -2,7 +2,10 @@
 
 Each part is an estimate of a relative error (1 is all of it), found by experiment: spheres, cylinders and rough
 surfaces from 0.4 % to full contact, bodies of one to twelve branches, starts and jumps of velocity, against runs with
-finer steps, meshes and tolerances. Where nothing else is said they hold to a factor of three or so.
+finer steps, meshes and tolerances (`scripts/error_budget.py`). Of the eight scenes there, with both integrators, the
+estimate is 0.4 to 5 times the error of friction by the solver and 0.6 to 2.3 times that of area; 1.1 to 2.2 times that
+of friction by the time steps of the exponential integrator, 0.7 to 9 times by those of backward Euler, the most near
+full contact. Errors of area by time steps, mostly below 0.3 %, are estimated at 0.4 to 30 times what they are.
 
 solver: from the `complementarity` of the certificate (see `solve.contact.Certificate`).
 time: from the embedded pair (see `embedded`). Over one step the pair differs in the second order of the step, as does
@@ -25,7 +28,7 @@ from numpy.typing import NDArray
 
 from .measures import SIDE
 
-SOLVER_FRICTION, SOLVER_AREA = 0.5, 1.0  # times the complementarity
+SOLVER_FRICTION, SOLVER_AREA = 0.5, 2.0  # times the complementarity
 EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 1.7, 0.4  # times the difference of the pair
 LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least
 TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
