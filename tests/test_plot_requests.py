@@ -224,6 +224,31 @@ def test_what_cannot_be_drawn(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_one_velocity_is_no_curve(tmp_path: Path, drawn: list[Figure], capsys: pytest.CaptureFixture[str]) -> None:
+    """Over velocity a run of one has a dot; several are compared."""
+    out = ran(tmp_path, KINDS["sliding"][0].replace("velocity: -", "velocity: "))
+    assert asked(out, "--over", "velocity") == 2
+    assert "which is 0.1 m/s wherever the surface slides; --compare draws several" in capsys.readouterr().err
+    assert drawn == []
+
+
+def test_cases_of_a_sweep_are_told_apart_by_their_keys(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Those that differ among the cases that are drawn."""
+    (tmp_path / "cases").mkdir()
+    cases = [curve(tmp_path / "cases" / f"{number:03d}", POINTS[:3]) for number in range(3)]
+    rows = [
+        f"{number},{velocity},{seed},done\n" for number, (velocity, seed) in enumerate([(0.1, 1), (0.1, 2), (10, 2)])
+    ]
+    (tmp_path / "sweep.csv").write_text("case,history.1.velocity,surface.0.seed,state\n" + "".join(rows))
+    for chosen, expected in (
+        (cases[:2], ["seed 1", "seed 2"]),
+        (cases, ["velocity 0.1, seed 1", "velocity 0.1, seed 2", "velocity 10, seed 2"]),
+    ):
+        assert asked(*chosen, "--compare", "--out", tmp_path / "both.png") == 0
+        texts = drawn.pop().legends[0].get_texts()
+        assert [text.get_text() for text in texts] == [f"{name}, 1.04 kPa" for name in expected]
+
+
 def test_all_maps_that_were_saved(tmp_path: Path, drawn: list[Figure]) -> None:
     """The heights too; their mean is part of them."""
     fields = "output: {fields: [pressure, displacement, gap, height]}\n"

@@ -113,7 +113,7 @@ def test_full_contact_in_any_direction(shared_path: Path, comm: MPI.Intracomm, v
     assert sum(point.dissipated) == pytest.approx(power, rel=1e-9)
 
 
-STALLING = [(100.0, 2.5 + k / 8) for k in range(9)]  # where sets of points come and go in a long tail of the contact
+STALLING = [(100.0, speed) for speed in (2.675, 2.7, 2.825, 3.0, 3.05, 3.3, 3.45)]  # points come and go in a long tail
 
 
 @pytest.mark.parametrize(("ratio", "speed"), [(2.0, 1.0), (10.0, 0.3), (10.0, 3.0), *STALLING])

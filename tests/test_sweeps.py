@@ -11,6 +11,7 @@ import pytest
 from conftest import RunParcontact
 from mpi4py import MPI
 
+from parcontact.__main__ import main
 from parcontact.errors import RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.slab import Slab
@@ -93,6 +94,23 @@ def test_a_stop_file_ends_the_sweep_between_cases(cases: tuple[Case, ...]) -> No
     Path("out/job/stop").touch()
     assert seeds_done(cases, {}) == (3, [])
     assert not Path("out/job/stop").exists()
+
+
+def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    """As for a single job: one of another scene, or with files of others; then nothing is written."""
+    single = {"grid.points": 36, "output.directory": "there"}
+    words = [word for key, value in single.items() for word in ("--set", f"{key}={value}")]
+    text = JOB[: JOB.index("sweep:")]
+    Path("one.yaml").write_text(text)
+    assert main(["one.yaml", "--quiet", "--until", "1.0e-3", *words]) in (0, 3)
+    Path("mine").mkdir()
+    Path("mine/letter.txt").write_text("Dear")
+    before = sorted(Path(".").rglob("*"))
+    for out, told in (("there", "there holds a run of another job: grid.points"), ("mine", "it holds letter.txt")):
+        assert main(["job.yaml", "--quiet", "--out", out]) == 2
+        assert told in capsys.readouterr().err
+    assert sorted(Path(".").rglob("*")) == before
+    sweep.refuse_foreign(cases)  # the directory of its own job, which may be there already
 
 
 def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ def _each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs
     if not cases[0].settings:
         return act(cases[0].job, Slab(world, *cases[0].job.grid.points))
     limit = watch.limit(getattr(options, "wall", None))
+    on_root(world, lambda: sweep.refuse_foreign(cases))
     return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act, options.quiet, runs, limit)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.artist import Artist
@@ -16,7 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InputError
-from . import files, hdf5
+from ..job.reading import CASES
+from . import files, hdf5, sweep_table
 from .pictures import charts, histories, movie, steady, style, sweep
 from .pictures.charts import Chart
 from .pictures.maps import maps
@@ -94,6 +96,8 @@ def _picture(directory: Path, options: Options) -> Figure:
         run = Run(directory)
         title = run.job.title or title
         title = "\n".join(textwrap.wrap(title, LINE)) + ("" if run.curves else f"\n{histories.numbers(run)}")
+        if options.over == "velocity" and not (directory / steady.TABLE).is_file():
+            histories.refuse_one_velocity(run)
         found = _chosen(histories.charts(run, options.over), options)
         groups = [_panels(found, options), maps(run) if _wanted("maps", options) else []]
     if (directory / steady.TABLE).is_file() and _wanted("steady", options):
@@ -143,13 +147,35 @@ def _lines(directory: Path, options: Options) -> list[Chart]:
 
 
 def _names(directories: Sequence[Path]) -> list[str]:
-    """What tells directories apart: the last part of their paths, or as many as it takes."""
+    """What tells directories apart: of cases of one sweep their keys, else the last parts of paths."""
+    if named := _names_of_cases(directories):
+        return named
     parts = [directory.absolute().parts for directory in directories]
     for count in range(1, max(map(len, parts), default=1) + 1):
         names = ["/".join(part[-count:]) for part in parts]
         if len(set(names)) == len(names):
             return names
     return [str(directory) for directory in directories]
+
+
+def _names_of_cases(directories: Sequence[Path]) -> list[str]:
+    """`velocity 0.1, seed 2`, the keys in which cases of one sweep differ; nothing if these are not such cases."""
+    paths = [directory.absolute() for directory in directories]
+    table = paths[0].parent.parent / sweep.TABLE if paths else Path()
+    if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
+        return []
+    known = {f"{int(row['case']):03d}": row for row in sweep_table.read(table)}
+    if not all(path.name in known for path in paths):
+        return []
+    rows = [known[path.name] for path in paths]
+    keys = list(rows[0])[1 : list(rows[0]).index("state")]
+    differing = [key for key in keys if len({row[key] for row in rows}) > 1]
+    names = [", ".join(f"{key.split('.')[-1]} {_short(row[key])}" for key in differing) for row in rows]
+    return names if len(set(names)) == len(names) and all(names) else []
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _steady(directory: Path, options: Options) -> list[Panel]:

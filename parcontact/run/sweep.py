@@ -7,8 +7,10 @@ from pathlib import Path
 
 from ..errors import InputError, RunError
 from ..job import Case, Job
+from ..job.reading import CASES
 from ..parallel.slab import Slab
-from ..record import sweep_table
+from ..record import marker, sweep_table
+from ..record.directory import BESIDE, SHOWN
 from . import watch
 from .journey import AGAIN, DONE
 
@@ -31,7 +33,7 @@ def run(
     the sweep, with its code: the same command goes on with it. So do a stop file, and the end of the wall time, `limit`
     in the time of `time.time`, before a case begins. Unless `act` runs the case, its failure is not noted.
     """
-    directory, code = cases[0].job.output.directory.parent.parent, DONE
+    directory, code = _directory(cases), DONE
     for case in chosen:
         slab = slab_of(case.job)
         if reason := slab.agree(_reason_to_stop(directory, limit) if slab.root else ""):
@@ -49,6 +51,33 @@ def run(
     if slab.root and not quiet:
         print(f"results of all cases: {directory / sweep_table.TABLE}", flush=True)
     return code
+
+
+def refuse_foreign(cases: Sequence[Case]) -> None:
+    """Raise InputError where the files of others, or of another job, are in the directory of a sweep; root only."""
+    directory, first = _directory(cases), cases[0]
+    try:
+        claims = marker.read(directory)
+        entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
+    except (OSError, ValueError) as error:
+        raise InputError(f"the output directory {directory} cannot be used: {error}") from error
+    for verb, claim in claims.items():
+        if found := "; ".join(marker.differences(claim.job, marker.plain_job(first.job), marker.SCENE)):
+            raise InputError(
+                f"the output directory {directory} holds {marker.VERBS[verb]} of another job: {found}; give --out for "
+                "another directory"
+            )
+    foreign = sorted(name for name in entries if not name.startswith(".") and name not in BESIDE)
+    if foreign and not claims and not {CASES, sweep_table.TABLE} & set(foreign):
+        names = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
+        raise InputError(
+            f"the output directory {directory} is not empty and not of this program: it holds {names}; give --out for "
+            "another directory"
+        )
+
+
+def _directory(cases: Sequence[Case]) -> Path:
+    return cases[0].job.output.directory.parent.parent
 
 
 def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool) -> int:

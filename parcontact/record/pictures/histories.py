@@ -126,6 +126,16 @@ def _stages(run: Run, values: Array) -> list[tuple[str, float, float]]:
     return stages
 
 
+def refuse_one_velocity(run: Run) -> None:
+    """Raise InputError for a run that slides at one velocity: over it there is a dot, but no line."""
+    speeds = {stage.speed for stage in run.job.history if stage.speed > 0.0}
+    if len(speeds) == 1:
+        raise InputError(
+            f"{run.directory}: there is nothing to draw over velocity, which is {speeds.pop():g} m/s wherever the "
+            "surface slides; --compare draws several runs in one picture"
+        )
+
+
 def _over_velocity(run: Run) -> Abscissa:
     """The last row of each stage that slides: what has come of its velocity."""
     found = run.stages
