@@ -17,7 +17,7 @@ from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
 from .physics.prony import Prony, complex_modulus
 from .physics.roughness import EDGE, Roughness
-from .record import files, hdf5
+from .record import files, hdf5, measures
 from .steady_sliding.curve import Request
 from .theory import full_contact, persson, persson_rings
 from .theory.persson_history import Leg, Memory, follow
@@ -42,15 +42,26 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
     """The rows for a job, the initial state first; `slab` must be that of one rank.
 
     The waves are those of the job's spectrum as an unbounded surface has them (`continuum`), or those of the very
-    surface in the box (`lattice`). Raises InputError for jobs that the theory does not know.
+    surface in the box (`lattice`). Stages that choose their steps have those of the run in the job's directory, before
+    it a ladder of steps that double up to one cell (`job.chosen`). Raises InputError for jobs that the theory does not
+    know.
     """
     _refuse_unknown(job)
-    timeline = job.timeline()
+    timeline = job.timeline().follow(_times_of_run(job))
     rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
     memory = Memory(rings, _material(job))
     if job.initial.state == "steady":
         memory.slide_for_ever(job.initial.velocity)
     return _rows(job, timeline, memory, gamma)
+
+
+def _times_of_run(job: Job) -> dict[int, float]:
+    """When the steps of a run ended that the job has made, by their numbers; none before its run."""
+    path = job.output.directory / "measures.csv"
+    if not job.timeline().chooses or not path.is_file():
+        return {}
+    columns = measures.read(path)
+    return dict(zip(map(int, columns["step"]), columns["time"], strict=True))
 
 
 class SteadyInstant(NamedTuple):

@@ -120,6 +120,8 @@ def _numbers(costs: Costs) -> Iterator[str]:
         return
     names = (f"{stage.name} {seen.steps}" for stage, seen in zip(job.history, sample.stages, strict=True))
     most = "at most " if decisions.short_rest(job).on and sample.tried < sample.steps else ""
+    if decisions.chosen_steps(job).on and sample.tried < sample.steps:
+        most = "about "
     yield f"{most}{sample.steps} steps: {', '.join(names)}"
 
 

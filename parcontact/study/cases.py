@@ -111,7 +111,9 @@ def overrides(job: Job, own: Case, case: Case) -> list[str]:
     factor = case.time_step / own.time_step
     for index, stage in enumerate(job.history):
         place = f"history.{index}"
-        if stage.cells_per_step is not None:
+        if stage.chooses and stage.speed:  # what follows the accuracy has no ladder of its own
+            words += [f"{place}.time_step=null", f"{place}.cells_per_step={case.cells_per_step!r}"]
+        elif stage.cells_per_step is not None:
             words.append(f"{place}.cells_per_step={stage.cells_per_step * case.cells_per_step / own.cells_per_step!r}")
         elif isinstance(stage.time_step, GeometricStep):
             first, growth = stage.time_step.first * factor, stage.time_step.growth**factor
