@@ -23,15 +23,16 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
+SURFACE = ("tests/physics/test_surface.py", "tests/physics/test_surface_forces.py")
 PARTS = {  # files of the program, and the tests that answer for them
     "physics/body.py": ("tests/physics/test_material.py", "tests/test_viscoelastic.py"),
     "physics/energy.py": ("tests/physics/test_energy.py",),
     "physics/wake.py": ("tests/physics/test_wake.py",),
     "physics/folding.py": ("tests/physics/test_folding.py", "tests/effects/test_folded_branches.py"),
     "physics/ledger.py": ("tests/physics/test_ledger.py",),
-    "physics/loops.py": ("tests/physics/test_loops.py", "tests/physics/test_surface.py"),
+    "physics/loops.py": ("tests/physics/test_loops.py", *SURFACE),
     "physics/halfspace.py": ("tests/physics/test_halfspace.py", "tests/physics/test_love.py"),
-    "physics/surface.py": ("tests/physics/test_surface.py", "tests/physics/test_sliding.py"),
+    "physics/surface.py": (*SURFACE, "tests/physics/test_sliding.py"),
     "physics/roughness.py": ("tests/physics/test_roughness.py",),
     "parallel/fft.py": ("tests/parallel/test_fft.py",),
     "parallel/slab.py": ("tests/parallel/test_slab.py",),
