@@ -14,7 +14,7 @@ from parcontact.job import Job
 from parcontact.job.advice import cells_per_wave
 from parcontact.job.table import plain
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import SPOTS_ORDER, Summary
+from parcontact.physics.budget import SPOTS_ORDER, TIME_ORDER, Summary
 from parcontact.plan import price
 from parcontact.plan.report import Costs
 from parcontact.plan.sample import Sample, StageCost, sample
@@ -79,15 +79,14 @@ def test_fast_lengths(count: int) -> None:
     assert max(p for p in range(1, found + 1) if found % p == 0 and all(p % q for q in range(2, p))) <= 5
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2), ("backward-euler", 1)])
-def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: int) -> None:
-    """On the own mesh: nine times the error that they may make. Steps of a slide are cells, halves, quarters, ..."""
+@pytest.mark.parametrize(("integrator", "order"), [("exponential", TIME_ORDER), ("backward-euler", 1.0)])
+def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) -> None:
+    """On the own mesh: the error of steps three times as long. Steps of a slide are cells, halves, quarters, ..."""
     stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-5}
     planned = job(grid=FINE, history=[stage, SLIDE], numerics={"integrator": integrator})
-    found = price.offer(costs(planned, time=9 * price.TIME_SHARE * 0.01), 0.01)
-    cells = {2: 4, 1: 16}[order]  # steps of a cell: the power of two not below 3, or 9
+    found = price.offer(costs(planned, time=3.0**order * price.TIME_SHARE * 0.01), 0.01)
     steps = [stage.steps for stage in found.costs.scaling.samples[0].stages]
-    assert steps == [1 + {2: 300, 1: 900}[order], cells * 80]
+    assert steps == [1 + 300, 4 * 80]  # quarters of a cell: the power of two not below 3
 
 
 def test_steps_are_never_longer_than_a_cell() -> None:
@@ -108,14 +107,14 @@ def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
     seconds = [each.costs.marching(1) / each.steps for each in (one, ten)]
     assert seconds[0] == pytest.approx(1.0)
     assert seconds[1] == pytest.approx(1.5 * (240**2 * math.log(240**2 + 1)) / (80**2 * math.log(80**2 + 1)))
-    halves = price.offer(costs(planned, time=4 * price.TIME_SHARE * 0.01), 1e-2)
+    halves = price.offer(costs(planned, time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01), 1e-2)
     assert halves.costs.marching(1) / halves.steps == pytest.approx(price.BETWEEN_CELLS)
 
 
 def test_from_a_coarser_grid() -> None:
-    """What was tried on twice the cell, and so twice the step, has four times the error of the own steps."""
+    """What was tried on twice the cell, and so twice the step, has 2^1.7 times the error of the own steps."""
     own = job(grid={"points": 160, "size": 1e-3})
-    tried = costs(job(grid=FINE), time=4 * price.TIME_SHARE * 0.01).scaling.samples[0]
+    tried = costs(job(grid=FINE), time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01).scaling.samples[0]
     seen = Costs(Scaling.of(own, [tried], MACHINE), 1e30)
     assert seen.scaling.steps == 1 + 160
     assert price.offer(seen, 0.01).steps == 1 + 160  # on 80 points: halves of a cell

@@ -4,9 +4,10 @@ Nothing more is tried. All parts of the error budget together keep the accuracy:
 time steps TIME_SHARE, the solver the rest. The mesh has the cells per shortest wave that this takes
 (`job.advice.cells_per_wave`); where no wave is given the part that the mesh makes, which the trial saw, goes with the
 power of the cell that the budget knows (`physics.budget`). Heights from a file stay on their mesh. The part that time
-steps make, seen too, goes with the second power of the step for the exponential integrator, with the first for backward
-Euler; steps of a slide are a cell, a half, a quarter, ... as it needs. A step has as many operator calls as seen, times
-what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in proportion to N log N.
+steps make, seen too, goes with the power 1.7 of the step for the exponential integrator, with the first for backward
+Euler; where a slide has cells per step they are one, a half, a quarter, ... as it needs. A step has as many operator
+calls as seen, times what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in proportion
+to N log N.
 """
 
 import math
@@ -20,7 +21,7 @@ from ..job import GeometricStep, HeightFile, Job, Rough, Stage
 from ..job.advice import STEPS_PER_WAVE, cells_per_wave
 from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.table import plain
-from ..physics.budget import SPOTS_ORDER
+from ..physics.budget import SPOTS_ORDER, TIME_ORDER
 from .report import MARK, Costs, duration_text, ranks_text, unit_of
 from .sample import Sample, StageCost
 from .scaling import Scaling
@@ -142,7 +143,7 @@ def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
     times = _calls(own, job)
     if not own.history:
         return replace(sample, stages=tuple(_with_calls(stage, times) for stage in sample.stages))
-    order = 2.0 if own.numerics.integrator == "exponential" else 1.0
+    order = TIME_ORDER if own.numerics.integrator == "exponential" else 1.0
     waves = (shortest_wave(sample.job) or 1.0) / (shortest_wave(own) or 1.0)
     stages = []
     for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), own.timeline().spans, strict=True):
@@ -176,7 +177,7 @@ def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple
     longest = stage.seconds / (more * count)
     if stage.speed and (wave := shortest_wave(own)):
         longest = min(longest, wave / STEPS_PER_WAVE / stage.speed)
-    if not stage.speed or isinstance(stage.time_step, GeometricStep):
+    if not stage.speed or stage.chooses or isinstance(stage.time_step, GeometricStep):
         return math.ceil(stage.seconds / longest * (1.0 - SAME)), 1.0
     way, cell = stage.seconds * stage.speed, max(job.grid.dx, job.grid.dy)
     cells = min(1.0, 2.0 ** math.floor(math.log2(longest * stage.speed / cell) + SAME))
