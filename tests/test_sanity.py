@@ -1,27 +1,22 @@
-"""Scenes that mean nothing are told, each with its value, its limit and what to change; and no sound scene is."""
+"""Scenes that mean nothing are told, each with its value, its limit and what to change."""
 
 import math
-import random
 import re
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from conftest import RunParcontact
+from judging import RUBBER, SPHERE, job_of, of_file, rough_heights, run
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from parcontact import sanity, scene
 from parcontact.errors import InputError, RunError
-from parcontact.job import Job, JobError, load, load_cases
+from parcontact.job import Job, JobError, load
 from parcontact.job import size as size_advice
-from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 
-Json = dict[str, Any]
 SMALL = """\
 grid: {points: 64, size: 1e-3}
 surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
@@ -29,43 +24,6 @@ material: {model: elastic, shear_modulus: 1e6}
 history:
   - {pressure: 1e4}
 """
-HERE = Path(__file__).parents[1] / "jobs"
-RUBBER = {"model": "elastic", "shear_modulus": 1e6}
-SPHERE = {"shape": "sphere", "radius": 1e-2}
-
-
-def job_of(surface: Json | list[Json], history: Sequence[Json], **sections: Any) -> Job:
-    sections = {"grid": {"points": 64, "size": 1e-3}, "material": RUBBER, **sections}
-    return Job.model_validate({"surface": surface, "history": list(history), **sections})
-
-
-def of_file(path: Path, heights: NDArray[np.floating], **sections: Any) -> list[str]:
-    """What is said of heights on a box of 1 mm."""
-    np.save(path, heights)
-    grid = {"points": list(heights.shape[::-1]), "size": 1e-3}
-    job = job_of({"shape": "file", "path": str(path)}, [{"pressure": 1e4}], grid=grid, **sections)
-    return sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
-
-
-def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.floating]:
-    """Periodic heights with waves down to so many cells, rms slope 0.1 on a box of 1 mm."""
-    q = 2 * np.pi * np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points)[None, :])  # rad per cell
-    kept = (q > 0) & (q <= 2 * np.pi / shortest)
-    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
-    spectrum = np.where(kept, noise * np.maximum(q, 1e-9) ** -1.8, 0.0)
-    heights = np.fft.irfft2(spectrum, s=(points, points))
-    cell = 1e-3 / points
-    slope = np.sqrt(sum(((np.roll(heights, 1, axis) - heights) ** 2).mean() for axis in (0, 1))) / cell
-    return np.asarray(heights * 0.1 / slope)
-
-
-def run(job: Job, steps: int | None = None) -> list[str]:
-    """What is said of the contacts of a job's steps."""
-    march = March(scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points)))
-    watch, said = sanity.ContactWatch(job, job.timeline()), []
-    for step in list(job.timeline())[:steps]:
-        said += watch.judge(step.number, march.advance(step).measures)
-    return said
 
 
 # -- scenes that mean nothing -----------------------------------------------------------------------------------------
@@ -251,75 +209,3 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
     long = job_of(WAVE, [{**PRESS, "duration": 5e8, "time_step": 1e-3}], output={"fields": ["gap"], "every": 64})
     with pytest.raises(InputError, match=r"7\.812e\+09 instants of fields .* use every: 500000 or more"):
         sanity.refuse_impossible(long, long.timeline())
-
-
-# -- sound scenes -----------------------------------------------------------------------------------------------------
-
-
-OURS = sorted(path for path in HERE.rglob("*.yaml") if path.parent.name != "road")  # that one: tests/road/test_chain.py
-
-
-@pytest.mark.parametrize("path", OURS, ids=lambda path: path.stem)
-def test_no_job_of_ours_is_told(path: Path) -> None:
-    """Of a sweep, the last case: that over the size of the box begins with boxes that are told to be too small."""
-    job = load_cases(path)[-1].job
-    assert job.warnings == ()
-    if sanity.is_quickly_made(job):
-        assert sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []
-
-
-def sound(dice: random.Random, directory: Path) -> Job:
-    """A scene of rubber that a tribologist would set up: roughness, waves, a sphere, a measured road."""
-    make: Callable[[random.Random, Path], Job] = dice.choice([_road, _road, _sphere, _measured])
-    return make(dice, directory)
-
-
-def _material(dice: random.Random) -> tuple[Json, float]:
-    modulus = 10.0 ** dice.uniform(5, 8)
-    if dice.random() < 0.4:
-        return {"model": "elastic", "shear_modulus": modulus, "poisson": dice.choice([0.3, 0.45, 0.5])}, modulus
-    branches = [{"modulus": modulus / 4, "relaxation_time": 10.0**n} for n in range(-6, 1)]
-    return {"model": "zener", "modulus_inf": modulus / 4, "branches": branches}, 2 * modulus
-
-
-def _road(dice: random.Random, directory: Path) -> Job:
-    length, points = 10.0 ** dice.uniform(-5, 0), dice.choice([64, 96])
-    material, modulus = _material(dice)
-    slope = dice.uniform(0.01, 0.3)
-    short = length / points * dice.uniform(8.5, 14.0)
-    rough = {"shape": "rough", "hurst": dice.uniform(0.5, 1.0), "long_wavelength": length / 4}
-    rough |= {"short_wavelength": min(short, length / 4), "rms_slope": slope, "seed": dice.randint(0, 99)}
-    pressure = modulus * slope * dice.uniform(0.05, 0.5)
-    history: list[Json] = [{"pressure": pressure}]
-    if dice.random() < 0.5:
-        slide = {"velocity": dice.uniform(0.1, 10.0), "distance": 2 * length / points, "cells_per_step": 1}
-        history.append({"pressure": pressure, **slide})
-    return job_of(rough, history, grid={"points": points, "size": length}, material=material)
-
-
-def _sphere(dice: random.Random, directory: Path) -> Job:
-    radius = 10.0 ** dice.uniform(-4, 0)
-    material, _ = _material(dice)
-    contact = radius * dice.uniform(0.01, 0.2)
-    grid = {"points": 64, "size": contact * dice.uniform(3.0, 5.0), "boundary": "free"}
-    return job_of(
-        {"shape": "sphere", "radius": radius}, [{"approach": contact**2 / radius}], grid=grid, material=material
-    )
-
-
-def _measured(dice: random.Random, directory: Path) -> Job:
-    path = directory / f"{dice.getrandbits(32)}.npy"
-    np.save(path, rough_heights(64, dice.uniform(8.5, 16.0), dice.randint(0, 99)) + dice.uniform(-1e-3, 1e-3))
-    material, modulus = _material(dice)
-    history = [{"pressure": 0.1 * modulus * dice.uniform(0.05, 0.5)}]
-    return job_of({"shape": "file", "path": str(path)}, history, material=material)
-
-
-def test_no_sound_scene_is_told(tmp_path: Path) -> None:
-    """50 random ones, each with its heights and its steps."""
-    dice = random.Random(12)
-    for number in range(50):
-        job = sound(dice, tmp_path)
-        assert job.warnings == (), (number, job.resolved())
-        assert sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))) == [], job.resolved()
-        assert run(job) == [], (number, job.resolved())
