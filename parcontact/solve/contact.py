@@ -10,7 +10,8 @@ iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C
 1. the working set is the contact (p > 0) and the points that penetrate (g < 0): these enter by the search direction;
 2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on beyond
    the set (`surround`);
-3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is no descent;
+3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is no descent, or where much
+   of the last step was cut off;
 4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, then scaled to the mean P0;
 5. f must not rise: else the step is halved along this path and the direction is forgotten.
 
@@ -34,6 +35,7 @@ from .surround import Surround
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
+HARDLY = 1e-4  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
 LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements that are only rounding
@@ -184,11 +186,11 @@ class ContactSolver:
                 return Contact(start, self._u, iterate.d, certificate, iteration, failure)
             level = iterate.d + (excess / members if centred else 0.0)
             slope, old_product = self._turn(h, level, old_product, members, centred, other)
-            iterate, halvings = self._descend(p, h, iterate, length * slope, mean, other)
+            iterate, kept = self._descend(p, h, iterate, length * slope, mean, other)
             p, other = other, p
             kernels.residual(self._working, self._w, h, level, self._w)
             iteration += 1
-            if halvings:
+            if not kept:
                 old_product = 0.0
 
     def judge(self, h: Array, control: MeanPressure | Approach, p: Array, otherwise: str) -> Contact:
@@ -261,9 +263,9 @@ class ContactSolver:
 
     def _descend(
         self, old_p: Array, h: Array, old: Iterate, slope: float, mean: float | None, p: Array
-    ) -> tuple[Iterate, int]:
+    ) -> tuple[Iterate, bool]:
         """Step from `old_p` against `_t` to p, which leaves the old displacement in `_w`; returns the new iterate and
-        how often the step was halved."""
+        whether the step was taken as it is: not halved, and hardly cut off at 0."""
         curvature = self.slab.sum(kernels.dot(self._t, self.operator.apply(self._t, self._w)))[0]
         step = slope / curvature if curvature > 0.0 else 0.0
         for halvings in range(MAX_HALVINGS + 1):
@@ -276,7 +278,7 @@ class ContactSolver:
                 break
             self._u, self._w = self._w, self._u
             step *= 0.5
-        return new if mean is None else new.settled(), halvings
+        return new if mean is None else new.settled(), halvings == 0 and cut <= HARDLY * load
 
     def _separate(self, h: Array, p: Array) -> Contact:
         """No load: no pressure, the surface just touches the body."""
