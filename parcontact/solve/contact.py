@@ -35,7 +35,7 @@ from .surround import Surround
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
-HARDLY = 1e-4  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
+LARGE_CUT = 0.01  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
 LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements that are only rounding
@@ -265,7 +265,7 @@ class ContactSolver:
         self, old_p: Array, h: Array, old: Iterate, slope: float, mean: float | None, p: Array
     ) -> tuple[Iterate, bool]:
         """Step from `old_p` against `_t` to p, which leaves the old displacement in `_w`; returns the new iterate and
-        whether the step was taken as it is: not halved, and hardly cut off at 0."""
+        whether the step was taken as it is: not halved, and little of it cut off at 0."""
         curvature = self.slab.sum(kernels.dot(self._t, self.operator.apply(self._t, self._w)))[0]
         step = slope / curvature if curvature > 0.0 else 0.0
         for halvings in range(MAX_HALVINGS + 1):
@@ -278,7 +278,7 @@ class ContactSolver:
                 break
             self._u, self._w = self._w, self._u
             step *= 0.5
-        return new if mean is None else new.settled(), halvings == 0 and cut <= HARDLY * load
+        return new if mean is None else new.settled(), halvings == 0 and cut <= LARGE_CUT * load
 
     def _separate(self, h: Array, p: Array) -> Contact:
         """No load: no pressure, the surface just touches the body."""
