@@ -174,13 +174,51 @@ def test_timeline_is_read_from_the_times_of_rows() -> None:
 
 
 def test_bounds_of_a_stage() -> None:
-    """In sliding up to a cell and down to a thousandth; at rest up to the whole stage; on a ramp a sixteenth."""
+    """In sliding up to a cell and down to a thousandth, or to a millionth of a shorter stage; at rest up to the whole
+    stage; on a ramp a sixteenth."""
     grid = job().grid
-    slide, press = (bounds(stage, grid) for stage in job(SLIDE, PRESS).history)
+    far = {**SLIDE, "distance": 2000 * CELL}
+    slide, short, press = (bounds(stage, grid) for stage in job(far, SLIDE, PRESS).history)
     assert (slide.most, slide.least) == (pytest.approx(CELL / 0.1), pytest.approx(CELL / 0.1 / 1024))
+    assert (short.most, short.least) == (pytest.approx(CELL / 0.1), pytest.approx(CELL / 0.1 / 2**18))
+    assert short.least <= 6.5 * CELL / 0.1 / 2**20
     assert press.most == 5e-3
     ramp = bounds(job({**PRESS, "pressure": {"from": 0.0, "to": 1.0}}).history[0], grid)
     assert ramp.most == pytest.approx(5e-3 / 16)
+
+
+@pytest.mark.parametrize("tau", [1e-12, 1e12])
+@pytest.mark.parametrize("history", [(PRESS,), (PRESS, SLIDE)])
+def test_branches_that_are_all_folded(tau: float, history: tuple[dict[str, Any], ...]) -> None:
+    """Nothing then relaxes: the same contact as with given steps, to the solver's tolerance."""
+    body = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": tau}]}
+    given = [{**stage, "time_step": stage.get("duration", 1e-4)} for stage in history]
+    exact = {"tolerance": 1e-8}
+    found, expected = (marched(data(*h, material=body, numerics=exact))[1][-1] for h in (history, given))
+    assert found.time == pytest.approx(expected.time)
+    assert found.measures.approach == pytest.approx(expected.measures.approach, rel=1e-6)
+
+
+def test_creep_after_a_jump_while_hardly_sliding() -> None:
+    """A slide of a nanometre takes as many relaxation times as a stage at rest, and ends in the same contact: to 1 %,
+    the accuracy asked for."""
+    rest = {"pressure": 1e4, "duration": 5e-3}
+    still, slow = (marched(data({**rest, **more}))[1] for more in ({}, {"velocity": 1e-9}))
+    assert len(slow) > 10
+    assert slow[-1].measures.contact_area_corrected == pytest.approx(
+        still[-1].measures.contact_area_corrected, rel=1e-2
+    )
+
+
+def test_times_of_rows_long_after_the_start() -> None:
+    """A stage ends where it should also where the instants have fewer digits than its steps."""
+    late = job({**PRESS, "duration": 1e6}, {**SLIDE, "distance": 6 * CELL})
+    timeline = late.timeline()
+    assert timeline.chosen is not None
+    timeline.chosen.ends = {0: [1e6], 1: [k * CELL / 0.1 for k in range(1, 7)]}
+    times = {n: timeline[n].time for n in range(1, timeline.count + 1)}
+    found = late.timeline().follow(times)
+    assert found.count == timeline.count == 8
 
 
 # -- runs -------------------------------------------------------------------------------------------------------------

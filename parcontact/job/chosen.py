@@ -19,7 +19,7 @@ from .surface import Cylinder, Flat, Rough, Sphere, Wave
 
 SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
 HALVINGS = 10  # of a cell, in the shortest step of a surface that slides
-LEAST_SHARE = 2.0**-20  # of its duration, in the shortest step of a stage at rest
+LEAST_SHARE = 2.0**-20  # of its duration, in the shortest step of a stage
 SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/next": "s"}  # of what is remembered
 MOST_CELLS = 4  # in the longest
 WAVE_STEPS = 8  # in which the shortest wave passes, at least
@@ -54,13 +54,15 @@ def most_cells(grid: Grid, surface: Sequence[Any]) -> int:
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """In sliding from a small part of a cell to so many; at rest from a small part of the stage to all of it."""
+    """In sliding from a small part of a cell, or of a stage that is short for one, to so many; at rest from a small
+    part of the stage to all of it."""
     most = stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
     cell = one_cell(stage, grid)
     most = min(cells * cell, most)
-    return Bounds(min(cell / 2**HALVINGS, most), most)
+    halvings = max(HALVINGS, math.ceil(math.log2(cell / (LEAST_SHARE * stage.seconds))))
+    return Bounds(min(cell / 2.0**halvings, most), most)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """The instants of a history: every step follows from the job alone, so that a restart needs only a step's number."""
 
+import math
+import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -12,6 +14,7 @@ from .division import Fractions, divided
 from .history import GeometricStep, Ramp, Stage
 from .sections import Grid
 
+ROUNDINGS = 4.0  # of an instant, between two that are the same
 WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
 
@@ -198,7 +201,7 @@ class Timeline:
                 number = span.before + span.jumps + len(span.ends.made) + 1
                 if number not in times:
                     return self
-                self.chosen.ends.setdefault(index, []).append(times[number] - span.start)
+                self.chosen.ends.setdefault(index, []).append(_elapsed(span, times[number]))
                 span = self.spans[index]
         return self
 
@@ -269,6 +272,15 @@ class Timeline:
         """How many of the first steps are those of another history too, stage by stage."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
+
+
+def _elapsed(span: Span, time: float) -> float:
+    """How long after the start of a stage an instant is [s]: its end, if times have no digits to tell them apart."""
+    assert isinstance(span.ends, ChosenEnds)
+    for stop in span.ends.stops:
+        if math.isclose(time, span.start + stop, rel_tol=ROUNDINGS * sys.float_info.epsilon):
+            return stop
+    return time - span.start
 
 
 def _jumps(stage: Stage, before: tuple[str, float] | None) -> bool:

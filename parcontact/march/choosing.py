@@ -99,8 +99,8 @@ class StepChooser:
     def _level(self, span: Span, dt: float) -> float:
         """The longest of the lengths that steps may have which is no longer than dt."""
         limits, levels = self._bounds(span), self._levels(span)
-        if dt <= limits.least:
-            return limits.least
+        if dt <= limits.least or dt >= limits.most:
+            return min(max(dt, limits.least), limits.most)
         power = math.floor(levels * math.log2(dt / limits.least) + SAME_LEVEL)
         return min(limits.least * 2.0 ** (power / levels), limits.most)
 

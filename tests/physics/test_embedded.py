@@ -80,6 +80,29 @@ def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
         assert len(range(0, ny, stride)) >= min(ny, SAMPLED_ROWS)
 
 
+@pytest.mark.mpi
+@pytest.mark.parametrize("row", [0, 1, 63, 150])
+def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None:
+    """Pressure on a single row of 200: all ranks see what is on it, and find the same as if that was all the map."""
+    slab = Slab(comm, 8, 200)
+    body = ZenerBody(slab, PRONY, "exponential")
+    pair = Embedded(slab, body, DX)
+    pressure = slab.zeros()
+    if row in range(*slab.rows.indices(200)):
+        pressure[row - slab.rows.start] = 1.0
+    trial = body.begin(1e-2, Heights(slab.zeros()))
+    displacement = slab.zeros()
+    displacement[...] = 1.0
+    body.commit(trial, displacement)
+    line = Slab(MPI.COMM_SELF, 8, 1)
+    alone = ZenerBody(line, PRONY, "exponential")
+    one = alone.begin(1e-2, Heights(np.zeros((1, 8))))
+    alone.commit(one, np.ones((1, 8)))
+    expected = Embedded(line, alone, DX).look(1e-2, one, np.ones((1, 8)), np.ones((1, 8)))
+    assert expected.difference > 0.0
+    assert_allclose(pair.look(1e-2, trial, pressure, displacement).difference, expected.difference, rtol=1e-12)
+
+
 def test_nothing_pressed_and_jumps() -> None:
     """No pressure: no difference. A jump relaxes nothing, in either integrator."""
     slab = Slab(MPI.COMM_SELF, 4, 4)
