@@ -66,6 +66,7 @@ def test_info_and_a_run(outside_mpi: dict[str, str], tmp_path: Path) -> None:
     assert not found & {"numba", "scipy", "pyfftw.interfaces", "matplotlib", "xarray", "parcontact.scene"}
 
 
+@pytest.mark.filterwarnings("ignore:.*cells per shortest wave")
 def test_steps_leave_no_cycles() -> None:
     """The program looks for cycles of objects seldom, and at its end not at all."""
     steps = parcontact.Simulation(JOBS / "velocity_step.yaml", set={"grid.points": 64}).steps()
