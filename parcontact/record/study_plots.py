@@ -14,7 +14,7 @@ TITLES = {
     "area": "contact area, counted",
     "area_corrected": "contact area, corrected",
 }
-MARKS = {"mesh and time together": "o-", "mesh alone": "s--", "time alone": "^:"}
+MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
 COLOURS = {"exponential": "C0", "backward-euler": "C1"}
 BAND = 5.0  # times the upper edge of the grey band over its lower one
 LEAST = 1e-7  # smaller errors are drawn here

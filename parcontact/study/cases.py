@@ -3,21 +3,24 @@
 All meshes, cells per step and integrators are combined with each other. For each integrator the mesh is also refined
 alone, with the time steps of the finest mesh. Tolerance, precision and kernel are changed one at a time, on the mesh
 next to the job's own. A rough surface of one seed has the same waves on every mesh.
+
+Stages that choose their own steps do so in every case, unless there is a ladder of cells per step: it takes their
+place where the surface slides.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 
 from ..errors import InputError
-from ..job import AUTO, GeometricStep, HeightFile, Job, Study
+from ..job import AUTO, GeometricStep, HeightFile, Job, Stage, Study
 
 
 @dataclass(frozen=True)
 class Case:
-    """One combination: points along x, cells per step (of its own mesh), and the numerics."""
+    """One combination: points along x, cells per step (of its own mesh; None if steps are chosen), and the numerics."""
 
     mesh: int
-    cells_per_step: float
+    cells_per_step: float | None
     integrator: str
     tolerance: float
     precision: str
@@ -25,8 +28,8 @@ class Case:
 
     @property
     def time_step(self) -> float:
-        """In lengths of the box."""
-        return self.cells_per_step / self.mesh
+        """In lengths of the box; of steps that are chosen that of a cell, about which they are."""
+        return (self.cells_per_step or 1.0) / self.mesh
 
     @property
     def effort(self) -> float:
@@ -34,9 +37,15 @@ class Case:
         return self.mesh**2 / self.time_step
 
     def __str__(self) -> str:
-        cells = f"{self.cells_per_step:.4g} cell{'s' if self.cells_per_step > 1.0 else ''} per step"
         rest = [f"tolerance {self.tolerance:g}", self.precision, self.kernel]
-        return ", ".join([f"mesh {self.mesh}", cells, self.integrator, *rest])
+        return ", ".join([f"mesh {self.mesh}", self.steps, self.integrator, *rest])
+
+    @property
+    def steps(self) -> str:
+        """Their length in words."""
+        if self.cells_per_step is None:
+            return "auto steps"
+        return f"{self.cells_per_step:.4g} cell{'s' if self.cells_per_step > 1.0 else ''} per step"
 
 
 NAMES = tuple(field.name for field in fields(Case))
@@ -44,13 +53,17 @@ NAMES = tuple(field.name for field in fields(Case))
 
 @dataclass(frozen=True)
 class Ladders:
-    """What is refined, from the coarsest to the finest; one value where the job asks for none."""
+    """What is refined, from the coarsest to the finest; one value where the job asks for none.
+
+    `shared` is the relative error that all cases may have alike: the accuracy for which steps are chosen, else 0.
+    """
 
     meshes: tuple[int, ...]
-    cells: tuple[float, ...]
+    cells: tuple[float | None, ...]
     integrators: tuple[str, ...]
     study: Study
     own: Case
+    shared: float = 0.0
 
     def cases(self) -> list[Case]:
         """All of them, each once, the cheapest first."""
@@ -59,7 +72,7 @@ class Ladders:
         for case in [case for case in found if case.mesh == finest and case.cells_per_step == self.cells[0]]:
             found |= dict.fromkeys(at_time_step(case, mesh) for mesh in self.meshes)
         found |= dict.fromkeys(self._one_at_a_time())
-        return sorted(found, key=lambda case: (case.effort, astuple(case)))
+        return sorted(found, key=lambda case: (case.effort, str(astuple(case))))
 
     def _together(self) -> Iterator[Case]:
         for integrator in self.integrators:
@@ -79,7 +92,9 @@ class Ladders:
 
 
 def at_time_step(case: Case, mesh: int) -> Case:
-    """The same time step on another mesh."""
+    """The same time step on another mesh; steps that are chosen are so there too."""
+    if case.cells_per_step is None:
+        return replace(case, mesh=mesh)
     return replace(case, mesh=mesh, cells_per_step=case.cells_per_step * mesh / case.mesh)
 
 
@@ -95,11 +110,14 @@ def ladders(job: Job) -> Ladders:
     for mesh in study.mesh:
         if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:
             raise InputError(f"study.mesh: {mesh} points along x are no whole number along y in this box")
-    own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), 1.0)
+    own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
+    if own is None and (study.cells_per_step or not _sliding(job)):
+        own = 1.0
     case = Case(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
-    cells = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
-    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case)
+    cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
+    shared = numerics.accuracy if _sliding(job) and not study.cells_per_step else 0.0
+    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case, shared)
 
 
 def overrides(job: Job, own: Case, case: Case) -> list[str]:
@@ -109,15 +127,42 @@ def overrides(job: Job, own: Case, case: Case) -> list[str]:
     words += ["output.branch_dissipation=false"]
     words += [f"numerics.{name}={getattr(case, name)}" for name in ("integrator", "tolerance", "precision", "kernel")]
     factor = case.time_step / own.time_step
+    replaced = _sliding(job) if job.study and job.study.cells_per_step else []
     for index, stage in enumerate(job.history):
         place = f"history.{index}"
-        if stage.chooses and stage.speed:  # what follows the accuracy has no ladder of its own
+        if stage in replaced:
             words += [f"{place}.time_step=null", f"{place}.cells_per_step={case.cells_per_step!r}"]
         elif stage.cells_per_step is not None:
-            words.append(f"{place}.cells_per_step={stage.cells_per_step * case.cells_per_step / own.cells_per_step!r}")
+            cells = stage.cells_per_step * factor * case.mesh / own.mesh
+            words.append(f"{place}.cells_per_step={cells!r}")
         elif isinstance(stage.time_step, GeometricStep):
             first, growth = stage.time_step.first * factor, stage.time_step.growth**factor
             words.append(f"{place}.time_step={{first: {first!r}, growth: {growth!r}}}")
         elif stage.time_step is not None and stage.time_step != AUTO:
             words.append(f"{place}.time_step={stage.time_step * factor!r}")
     return words
+
+
+def _sliding(job: Job) -> list[Stage]:
+    """The stages of a slide that choose their own steps."""
+    return [stage for stage in job.history if stage.chooses and stage.speed]
+
+
+def about_chosen_steps(job: Job) -> list[str]:
+    """Sentences on the stages whose steps are chosen in every case, so that no ladder shows what they add."""
+    chosen = [stage for stage in job.history if stage.chooses]
+    sliding = [] if job.study and job.study.cells_per_step else _sliding(job)
+    rest = [stage for stage in chosen if not stage.speed]
+    lines = []
+    if sliding:
+        lines.append(
+            f"{_names(sliding)}: time steps are chosen in every case, for numerics.accuracy = "
+            f"{job.numerics.accuracy:g}; a ladder study.cells_per_step would show what they add to the errors"
+        )
+    if rest:
+        lines.append(f"{_names(rest)}: time steps at rest are chosen in every case, they have no cells per step")
+    return lines
+
+
+def _names(stages: Sequence[Stage]) -> str:
+    return ", ".join(dict.fromkeys(stage.name for stage in stages))

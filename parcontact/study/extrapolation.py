@@ -22,7 +22,8 @@ BISECTIONS = 80
 
 @dataclass(frozen=True)
 class Limit:
-    """The limit of a sequence, the order in which it is approached (NaN if none was found), and its uncertainty."""
+    """The limit of a sequence, the order in which it is approached (NaN if none was found), and its uncertainty (NaN if
+    nothing is known of it)."""
 
     value: float
     order: float
@@ -33,13 +34,14 @@ def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
     """The limit for size 0 of values at decreasing sizes; at least two of them.
 
     Two values, or values that do not come nearer to each other from one side, have the finest one as their limit and
-    the larger of the last two differences as its uncertainty.
+    the larger of the last two differences as its uncertainty: NaN where they do not differ at all, as nothing is then
+    known of their error.
     """
     last = abs(values[-1] - values[-2])
     order = _order(sizes[-3:], values[-3:]) if len(values) > 2 else math.nan
     if math.isnan(order):
         before = abs(values[-2] - values[-3]) if len(values) > 2 else last
-        return Limit(values[-1], math.nan, max(last, before))
+        return Limit(values[-1], math.nan, max(last, before) or math.nan)
     value = _limit(sizes, values, order)
     doubts = [abs(_limit(sizes, values, max(order + more, LEAST_ORDER)) - value) for more in (-DOUBT, DOUBT)]
     doubts.append(LEAST_DOUBT * last)

@@ -10,7 +10,7 @@ from ..parallel.slab import Slab
 from ..record import files, marker, study_plots
 from ..record.directory import Directory
 from . import outcome, table, verdict
-from .cases import Case, Ladders, ladders, overrides
+from .cases import Case, Ladders, about_chosen_steps, ladders, overrides
 from .outcome import Outcome
 
 DONE, AGAIN = 0, 3  # exit codes
@@ -30,7 +30,7 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
         plain = marker.plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
-        study = _Study(refined, jobs, directory, slab, quiet)
+        study = _Study(refined, jobs, directory, slab, quiet, about_chosen_steps(job))
         stop = directory.stop_file
         ended = study.run(lambda: signals.stop or (slab.root and stop.exists()))
         if not ended:
@@ -45,7 +45,16 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
 class _Study:
     """The cases, and what has come out of them so far."""
 
-    def __init__(self, refined: Ladders, jobs: dict[Case, Job], directory: Directory, slab: Slab, quiet: bool) -> None:
+    def __init__(
+        self,
+        refined: Ladders,
+        jobs: dict[Case, Job],
+        directory: Directory,
+        slab: Slab,
+        quiet: bool,
+        notes: Sequence[str],
+    ) -> None:
+        self.notes = notes
         self.refined, self.jobs, self.slab, self.quiet = refined, jobs, slab, quiet
         self.path = directory.path / "study.csv"
         self.prints = {case: _fingerprint(one) for case, one in jobs.items()}
@@ -91,7 +100,7 @@ class _Study:
         reference = verdict.references(self.refined, ordered)
         errors = {case: verdict.errors(found, reference) for case, found in ordered.items()}
         table.write(self.path, self.prints, ordered, errors)
-        lines = [str(found) for found in verdict.limits(self.refined, ordered)]
+        lines = [*self.notes, *map(str, verdict.limits(self.refined, ordered))]
         lines += verdict.sentences(ordered, reference, self.slab.comm.size)
         files.write(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
         proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
@@ -129,7 +138,8 @@ class _Study:
 
 def _short(case: Case) -> str:
     """Its settings as they fit into a picture."""
-    return f"{case.mesh}, {case.cells_per_step:.3g} cells\n{case.tolerance:g} {case.precision}"
+    steps = "auto" if case.cells_per_step is None else f"{case.cells_per_step:.3g} cells"
+    return f"{case.mesh}, {steps}\n{case.tolerance:g} {case.precision}"
 
 
 def _fingerprint(job: Job) -> str:

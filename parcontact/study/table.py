@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..job import AUTO
 from ..record import files
 from . import cases, outcome
 from .cases import Case
@@ -42,7 +43,7 @@ def write(
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for case, result in outcomes.items():
-        settings = [getattr(case, name) for name in cases.NAMES]
+        settings = [AUTO if (value := getattr(case, name)) is None else value for name in cases.NAMES]
         results = [getattr(result, name) for name in outcome.NAMES]
         missed = [errors[case][name] if errors else "" for name in QUANTITIES]
         writer.writerow([wanted[case], *settings, *results, *missed])
@@ -52,4 +53,6 @@ def write(
 def _value(name: str, text: str) -> Any:
     if name in WORDS:
         return text
+    if text == AUTO:
+        return None
     return int(text) if name in COUNTS else float(text)

@@ -10,6 +10,7 @@ from .outcome import QUANTITIES, Outcome
 
 TARGETS = (0.05, 0.03, 0.01, 0.003)
 NEEDED = ("mu_max", "mu_dyn", "area_corrected")  # what the sentences hold the settings to
+TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
 Outcomes = Mapping[Case, Outcome]
 
 
@@ -24,35 +25,44 @@ class Found:
 
     @property
     def relative(self) -> float:
-        """The uncertainty over the limit."""
+        """The uncertainty over the limit; NaN if nothing is known of it."""
         return self.limit.uncertainty / abs(self.limit.value) if self.limit.value else math.inf
 
     def __str__(self) -> str:
         order = "no order found" if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
         name = f"{self.quantity} with {self.integrator}, {self.ladder}"
+        if math.isnan(self.limit.uncertainty):
+            return f"{name}: {self.limit.value:.6g} in the last cases, which do not differ: its error is not known"
         return f"{name}: {self.limit.value:.6g} +- {100 * self.relative:.2g} %, {order}"
 
 
 def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Case]]]:
     """Cases that differ in one thing, from coarse to fine: mesh and time together, mesh alone, time alone; with the
-    sizes that belong to them."""
+    sizes that belong to them. With steps that are chosen there is the mesh only."""
     usual = [
         case
         for case in outcomes
         if case.integrator == integrator and (case.tolerance, case.precision, case.kernel) == _rest(ladders.own)
     ]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
-    together = sorted((c for c in usual if math.isclose(c.cells_per_step, coarse)), key=lambda case: case.mesh)
+    together = sorted((c for c in usual if _alike(c.cells_per_step, coarse)), key=lambda case: case.mesh)
+    if coarse is None:
+        return {CHOSEN: ([1.0 / c.mesh for c in together], together)} if len(together) > 1 else {}
     step = coarse / finest
     mesh = sorted((c for c in usual if math.isclose(c.time_step, step)), key=lambda case: case.mesh)
-    time = sorted((c for c in usual if c.mesh == finest), key=lambda case: -case.cells_per_step)
-    time = [case for case in time if any(math.isclose(case.cells_per_step, cells) for cells in ladders.cells)]
+    time = sorted((c for c in usual if c.mesh == finest), key=lambda case: -case.time_step)
+    time = [case for case in time if any(_alike(case.cells_per_step, cells) for cells in ladders.cells)]
     found = {
-        "mesh and time together": ([1.0 / c.mesh for c in together], together),
+        TOGETHER: ([1.0 / c.mesh for c in together], together),
         "mesh alone": ([1.0 / c.mesh for c in mesh], mesh),
-        "time alone": ([c.time_step for c in time], time),
+        TIME: ([c.time_step for c in time], time),
     }
     return {name: pair for name, pair in found.items() if len(pair[1]) > 1}
+
+
+def _alike(one: float | None, other: float | None) -> bool:
+    """Whether they are the same cells per step; None for steps that are chosen."""
+    return one == other if one is None or other is None else math.isclose(one, other)
 
 
 def _rest(case: Case) -> tuple[float, str, str]:
@@ -74,18 +84,22 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
     """The best limit of each quantity: along mesh and time together, with any of the cells per step, the least
     uncertain one that has an order; without a ladder of meshes along time alone.
 
-    Without a ladder of either it is the most expensive case, and nothing is known of its error.
+    Without a ladder of either, or where it makes no difference, it is the most expensive case, and nothing is known of
+    its error. Of what all cases share nothing shows in a limit: it is known to `ladders.shared` at best.
     """
-    found = [one for one in limits(ladders, outcomes) if one.ladder == "time alone"]
+    found = [one for one in limits(ladders, outcomes) if one.ladder == TIME]
     if len(ladders.meshes) > 1:
         each = [replace(ladders, cells=(cells,)) for cells in ladders.cells]
-        found = [one for part in each for one in limits(part, outcomes) if one.ladder == "mesh and time together"]
+        found = [one for part in each for one in limits(part, outcomes) if one.ladder in (TOGETHER, CHOSEN)]
     dearest = max(outcomes, key=lambda case: (case.effort, -case.tolerance, case.precision == "double"))
     best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in QUANTITIES}
     for quantity in QUANTITIES:
         choices = [one for one in found if one.quantity == quantity and one.limit.value]
         if choices:
-            best[quantity] = min(choices, key=lambda one: (math.isnan(one.limit.order), one.relative)).limit
+            limit = min(
+                choices, key=lambda one: (math.isnan(one.relative), math.isnan(one.limit.order), one.relative)
+            ).limit
+            best[quantity] = replace(limit, uncertainty=max(limit.uncertainty, ladders.shared * abs(limit.value)))
     return best
 
 
@@ -123,7 +137,8 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     """For each target: the cheapest settings that reach it in all quantities, and how long they take."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
-    doubt = max((abs(one.uncertainty / one.value) for name, one in reference.items() if name in NEEDED and one.value))
+    doubts = [abs(one.uncertainty / one.value) for name, one in reference.items() if name in NEEDED and one.value]
+    doubt = max((doubt for doubt in doubts if not math.isnan(doubt)), default=math.nan)
     lines = []
     for target in TARGETS:
         enough = [case for case in outcomes if error[case] <= target]
@@ -133,7 +148,9 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
             text += f"{case}; {outcomes[case].cpu_seconds:.3g} s of CPU time on {_ranks(ranks)}"
         else:
             text += f"none of these settings; the best, {best}, are at {100 * error[best]:.2g} %"
-        if not doubt <= target:
+        if math.isnan(doubt):
+            text += " (nothing is known of the error of the reference)"
+        elif doubt > target:
             text += f" (the reference itself is only known to {100 * doubt:.2g} %)"
         lines.append(text)
     return lines

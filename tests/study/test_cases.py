@@ -7,7 +7,7 @@ import pytest
 
 from parcontact.errors import InputError
 from parcontact.job import Job, load
-from parcontact.study.cases import Case, Ladders, ladders, overrides
+from parcontact.study.cases import Case, Ladders, about_chosen_steps, ladders, overrides
 
 TEXT = """
 grid: {points: [64, 32], size: [1.0e-3, 5.0e-4]}
@@ -105,3 +105,32 @@ def test_defaults_of_a_study(path: Path) -> None:
     """One ladder is enough; the rest is the job's own, with the cells per step of its first stage that has them."""
     _, found = refined(path, "{mesh: 32}")
     assert found.cases() == [Case(32, 2.0, "exponential", 5e-3, "double", "spectral")]
+
+
+def chosen(path: Path, study: str) -> tuple[Job, Ladders]:
+    """The job, its second slide choosing its own steps, and a press before that does too."""
+    path.write_text(
+        TEXT.replace(", cells_per_step: 2", "").replace("time_step: {first: 1.0e-6, growth: 1.2}", "time_step: auto")
+    )
+    return refined(path, study)
+
+
+def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
+    """Eight cells of sliding in 2, 4 and 8 steps; at rest steps are chosen, which is said."""
+    job, found = chosen(path, "{cells_per_step: [4, 2, 1]}")
+    jobs = [load(path, overrides(job, found.own, case)) for case in found.cases()]
+    assert [case.steps for case in found.cases()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
+    assert [one.timeline().spans[2].count for one in jobs] == [2, 4, 8]
+    assert all(one.history[0].chooses for one in jobs)
+    (line,) = about_chosen_steps(job)
+    assert line == "stage 1: time steps at rest are chosen in every case, they have no cells per step"
+
+
+def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
+    """They say so, and on every mesh there is one case, not another with the time step of the finest mesh."""
+    job, found = chosen(path, "{mesh: [32, 64], tolerance: [1e-3]}")
+    cases = found.cases()
+    assert [(case.mesh, case.steps) for case in cases] == [(32, "auto steps"), (64, "auto steps"), (64, "auto steps")]
+    assert all(load(path, overrides(job, found.own, case)).history[2].chooses for case in cases)
+    assert "study.cells_per_step would show" in about_chosen_steps(job)[0]
+    assert found.shared == 0.01

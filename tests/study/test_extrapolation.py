@@ -32,10 +32,18 @@ def test_two_powers_stay_within_the_uncertainty() -> None:
     assert 0.0 < abs(found.value - 3.0) < found.uncertainty < 0.01
 
 
-@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.0, 1.0), (1.0, 1.1, 1.5), (1.0, 1.5)])
+@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.1, 1.5), (1.0, 1.5)])
 def test_what_does_not_converge(values: tuple[float, ...]) -> None:
     """No order: the finest value, and the larger of the last two differences as what is not known."""
     found = extrapolate([0.5**k for k in range(len(values))], values)
     assert math.isnan(found.order)
     steps = [abs(b - a) for a, b in pairwise(values)]
     assert (found.value, found.uncertainty) == (values[-1], max(steps[-2:]))
+
+
+@pytest.mark.parametrize("values", [[2.0, 2.0], [2.0, 2.0, 2.0], [1.0, 2.0, 2.0, 2.0]])
+def test_values_that_do_not_differ_tell_nothing_of_their_error(values: list[float]) -> None:
+    found = extrapolate([2.0**-k for k in range(len(values))], values)
+    assert found.value == 2.0
+    assert math.isnan(found.order)
+    assert math.isnan(found.uncertainty)

@@ -129,6 +129,24 @@ def test_front_and_sentences() -> None:
     assert lines[3].endswith("(the reference itself is only known to 0.4 %)")
 
 
+def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
+    """Three cases with the same numbers: no sentence has an error of zero. Steps that are chosen bound what is known by
+    the accuracy for which they are."""
+    path = tmp_path / "wave.yaml"
+    path.write_text(WAVE.replace("[exponential, backward-euler]", "[exponential]"))
+    refined = ladders(load(path))
+    same = dict.fromkeys(refined.cases(), make(1.0, 0.1))
+    assert all("its error is not known" in str(one) for one in verdict.limits(refined, same))
+    lines = verdict.sentences(same, verdict.references(refined, same), 1)
+    assert all(line.endswith("(nothing is known of the error of the reference)") for line in lines)
+    path.write_text(path.read_text().replace(", cells_per_step: 1}", "}").replace(", cells_per_step: [1, 0.5]", ""))
+    refined = ladders(load(path))
+    found = {case: make(1.0, 1.0 / case.mesh**4) for case in refined.cases()}
+    reference = verdict.references(refined, found)
+    assert reference["mu_max"].uncertainty == 0.01 * reference["mu_max"].value
+    assert verdict.sentences(found, reference, 1)[-1].endswith("(the reference itself is only known to 1 %)")
+
+
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
