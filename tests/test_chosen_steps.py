@@ -269,3 +269,14 @@ def test_going_on_beyond_the_end(tmp_path: Path) -> None:
     times = [float(row["time"]) for row in rows]
     assert times[-1] == pytest.approx(1.5 * end, rel=1e-12)
     assert any(time == pytest.approx(end, rel=1e-12) for time in times)
+
+
+def test_a_body_without_load_has_an_error_too() -> None:
+    """What it remembers of its load relaxes while nothing touches: steps are shorter where more is asked for."""
+    lifted = {"name": "lifted", "pressure": 0.0, "duration": 5e-3}
+    counts = []
+    for accuracy in (0.1, 1e-3):
+        march, rows = marched(data(PRESS, lifted, numerics={"accuracy": accuracy, "tolerance": 1e-4}))
+        assert rows[-1].measures.contact_area == 0.0
+        counts.append(march.timeline().spans[1].count)
+    assert counts[1] > 2 * counts[0]

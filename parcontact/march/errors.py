@@ -43,7 +43,9 @@ class Errors:
         if self._pair is not None:
             look = self._pair.look(step.dt, trial, contact.p, contact.u)
         if measures.contact_area == 0.0:
-            return Estimate(None, 0.0)
+            if step.judge is not None and self._pair is not None:
+                look = self._pair.look_without_load(step.dt, trial)
+            return Estimate(None, time_error(self.known, Seen(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)))
         seen = Seen(
             contact.certificate.complementarity,
             look.difference,

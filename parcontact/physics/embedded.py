@@ -58,6 +58,19 @@ class Embedded:
             return Look(0.0, 0.0)
         return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, math.sqrt(slope / load) / (2.0 * self.dx), order)
 
+    def look_without_load(self, dt: float, trial: Trial) -> Look:
+        """At a step just committed in which nothing presses: the difference over the displacement, both as rms;
+        collective."""
+        material = self.material
+        decay, gain, order = self._difference(dt, trial.alpha)
+        everywhere, u = np.ones_like(material.u), material.u
+        parts = trial.heights.parts
+        sums = loops.embedded(
+            material.branches, decay, material.increment, gain, everywhere, u, *parts, self._first, self.stride
+        )
+        _, apart, size, _ = self.slab.sum(*sums)
+        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, order)
+
     def _difference(self, dt: float, alpha: float) -> tuple[Array, float, float]:
         """What h_k and du weigh in e, over alpha, and the order of the latter's part; those of the last dt are kept."""
         if self._apart is None or self._apart[0] != dt:
