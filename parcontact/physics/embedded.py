@@ -63,11 +63,8 @@ class Embedded:
         collective."""
         material = self.material
         decay, gain, order = self._difference(dt, trial.alpha)
-        everywhere, u = np.ones_like(material.u), material.u
-        parts = trial.heights.parts
-        sums = loops.embedded(
-            material.branches, decay, material.increment, gain, everywhere, u, *parts, self._first, self.stride
-        )
+        maps = (material.branches, decay, material.increment, gain, np.ones_like(material.u), material.u)
+        sums = loops.embedded(*maps, *trial.heights.parts, -self.slab.rows.start % self.stride, self.stride)
         _, apart, size, _ = self.slab.sum(*sums)
         return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, order)
 
