@@ -26,9 +26,9 @@ STEPS = 40  # of the slide whose time is taken
 
 
 def job(**changes: Any) -> dict[str, Any]:
-    """The job without its interface, and with other sections; its files are those of this directory."""
+    """The job without its interface, at one temperature, with other sections; its files are those of this directory."""
     data = yaml.safe_load((HERE / "road.yaml").read_text())
-    del data["interface"], data["output"]
+    del data["interface"], data["output"], data["steady"]["temperatures"]
     data["surface"]["path"] = str(HERE / data["surface"]["path"])
     data["material"] = {"include": str(HERE / "materials" / "compound.yaml")}
     return {**data, **changes}

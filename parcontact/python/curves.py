@@ -67,8 +67,9 @@ def steady(
 
     `job` and `set` as for `Simulation`; velocities and pressures as lists or as texts `first:last:count`, equally
     spaced in the logarithm (default: those of the job's `steady` section, and the pressure of its first loaded stage);
-    `temperatures` [deg C] as a list, of a material that has a shift. Raises JobError, and InputError where velocities
-    or pressures lack; warns (UserWarning, on root) of what is allowed but means little. Nothing is written.
+    `temperatures` [deg C] as a list, of a material that has a shift (default: those of that section). Raises JobError,
+    and InputError where velocities or pressures lack; warns (UserWarning, on root) of what is allowed but means little.
+    Nothing is written.
     """
     asked = {
         "velocities": _numbers(velocities),
