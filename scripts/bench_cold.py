@@ -1,0 +1,91 @@
+"""Parts `fft` and `solve` of scripts/bench.py: a transform, and cold elastic solves, ours and those of others."""
+
+import argparse
+import statistics
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+from bench_lines import Line, Map, compare, interleave
+from bench_peers import cold_peers
+from mpi4py import MPI
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.fftw import pyfftw
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.roughness import Roughness
+from parcontact.solve import cold
+from parcontact.solve.contact import ContactSolver, MeanPressure
+
+LOAD = 0.05  # mean pressure over E*, for 11 % of contact at a slope of 1
+MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
+ERROR = 1e-7  # of pressures
+TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.25)]
+
+
+def fft(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
+    heights, out = (pyfftw.zeros_aligned((points, points), "float64", n=64) for _ in range(2))
+    waves = pyfftw.zeros_aligned((points, points // 2 + 1), "complex128", n=64)
+    forward = pyfftw.FFTW(heights, waves, (0, 1), "FFTW_FORWARD", ("FFTW_MEASURE",))
+    backward = pyfftw.FFTW(waves, out, (0, 1), "FFTW_BACKWARD", ("FFTW_MEASURE", "FFTW_DESTROY_INPUT"))
+    heights[...] = np.random.default_rng(1).random(heights.shape)
+    bare = {"FFTW alone": lambda: (forward.execute(), backward.execute())}
+    ours = {name: pair(Slab(MPI.COMM_SELF, points, points), name) for name in ("float64", "float32")}
+    yield from compare("fft", interleave({**bare, **ours}, rounds), "FFTW alone")
+
+
+def pair(slab: Slab, dtype: str) -> Callable[[], object]:
+    """A forward and a backward transform of a random map."""
+    transform, heights, out = FFT(slab, dtype=dtype), slab.empty(dtype), slab.zeros(dtype)
+    heights[...] = np.random.default_rng(1).random(slab.shape)
+    return lambda: transform.backward(transform.forward(heights), out)
+
+
+class Cold:
+    """Cold elastic solves of one surface: Hurst 0.8, from a quarter of the box to eight cells, rms slope 1."""
+
+    def __init__(self, points: int, comm: MPI.Intracomm = MPI.COMM_SELF) -> None:
+        self.slab = Slab(comm, points, points)
+        fft = FFT(self.slab)
+        waves = Roughness(0.8, 0.25, 0.25, 8 / points, 1, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
+        self.heights: Map = np.asarray(fft.backward(waves, self.slab.zeros()), dtype=np.float64)
+        low, high = self.slab.reduce((), [-float(self.heights.min()), float(self.heights.max())])
+        self.height, self.fft = low + high, fft
+
+    def solver(self, tolerance: float, single: bool = False, slab: Slab | None = None) -> ContactSolver:
+        """With K in single precision, or for a coarser grid."""
+        fft = self.fft if slab is None else FFT(slab, measured=False)
+        other = FFT(fft.slab, dtype=np.float32, measured=fft.measured) if single else fft
+        half = HalfSpace((1.0, 1.0))
+        return ContactSolver(fft.slab, half.operator(fft), half.inverse(other), self.height, tolerance, 500)
+
+    def solve(self, solver: ContactSolver) -> Map:
+        start, load = np.zeros_like(self.heights), MeanPressure(LOAD * MODULUS)
+        cold.prepare(solver, self.heights, load, start, lambda slab, tolerance: self.solver(tolerance, slab=slab))
+        return np.asarray(solver.solve(self.heights, load, start).p)
+
+
+def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
+    surface = Cold(points)
+    reference = surface.solve(surface.solver(1e-11))
+    ways: dict[str, Callable[[], object]] = {}
+    for name, single in (("double", False), ("mixed", True)):
+        for tolerance in TOLERANCES:
+            solver = surface.solver(tolerance, single)
+            calls = surface.slab.tally["operator"]
+            error = distance(surface.solve(solver), reference)
+            if error <= ERROR:
+                break
+        yield Line("solve", f"{name}: operator calls", surface.slab.tally["operator"] - calls, "")
+        yield Line("solve", f"{name}: pressure error", error, "")
+        ways[name] = partial(surface.solve, solver)
+    times = interleave(ways, rounds)
+    yield from compare("solve", times, "double")
+    if asked.peers is not None:
+        ours = statistics.median(times["double"])
+        yield from cold_peers(asked.peers, surface.heights, reference / MODULUS, LOAD, ERROR, ours)
+
+
+def distance(p: Map, reference: Map) -> float:
+    return float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
