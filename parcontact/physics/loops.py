@@ -31,9 +31,8 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
         for k in range(count):
             a, b, c = decay[k], gain[k], weight[k]
             for i in range(nx):
-                value = a * branches[k, j, i] + b * buffer[j, i]
-                branches[k, j, i] = value
-                effective[i] += c * value
+                branches[k, j, i] = a * branches[k, j, i] + b * buffer[j, i]
+                effective[i] += c * branches[k, j, i]  # as it is kept: rounded in single precision
         buffer[j, :] = effective
 
 
