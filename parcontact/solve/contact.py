@@ -10,8 +10,8 @@ iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C
 1. the working set is the contact (p > 0) and the points that penetrate (g < 0): these enter by the search direction;
 2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on beyond
    the set (`surround`);
-3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is no descent, or where much
-   of the last step was cut off;
+3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is much less of a descent,
+   or where much of the last step was cut off;
 4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, then scaled to the mean P0;
 5. f must not rise: else the step is halved along this path and the direction is forgotten.
 
@@ -35,6 +35,7 @@ from .surround import Surround
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
+LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
 LARGE_CUT = 0.01  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
@@ -256,7 +257,7 @@ class ContactSolver:
         sum_z, sum_t, sum_old, r_z, old_z, r_t = self.slab.sum(*sums)
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)
         beta = max(0.0, (r_z - old_z + mean_z * sum_old) / old_product) if old_product > 0.0 else 0.0
-        if r_z + beta * r_t <= 0.0:
+        if r_z + beta * r_t <= LEAST_DESCENT * r_z:
             beta = 0.0
         kernels.turn(self._working, z, beta, mean_z + beta * mean_t, self._t)
         return r_z + beta * r_t, r_z
