@@ -89,7 +89,7 @@ def compare(data: Json, integrator: str, finer: int) -> dict[str, tuple[float, f
     own, exact, finest = (
         march(data, tolerance * share, fine, integrator) for share, fine in ((1.0, 1), (SMALL, 1), (SMALL, finer))
     )
-    late = [row for row in own if row.time > 0.35 * own[-1].time and row.measures.friction > 0.0]
+    late = [row for row in own if row.time > 0.35 * own[-1].time and row.errors and row.errors.friction]
     times = np.array([row.time for row in late])
     found = {}
     for measure, name in (("friction", "friction"), ("area", "contact_area_corrected")):

@@ -167,6 +167,25 @@ def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:
     assert (row["state"], row["seconds"], row["mu_max"], row["contact_area"]) == ("begun", "0.75", "", "0.2")
 
 
+def test_errors_are_those_of_the_slide(cases: tuple[Case, ...]) -> None:
+    """For which its friction and area stand: neither of the press before it nor of the rest after it."""
+    first = cases[0].job
+    press = first.history[0].model_copy(update={"velocity": (0.0, 0.0), "distance": None, "duration": 1.0})
+    slide = press.model_copy(update={"velocity": (1e-3, 0.0)})
+    changed = cases[0]._replace(job=first.model_copy(update={"history": (press, slide, press)}))
+    changed.job.output.directory.mkdir(parents=True)
+    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,error_area"
+    errors = [("", ""), ("0.9", "0.8"), ("0.02", "0.03"), ("0.01", "0.04"), ("0.7", "0.6")]
+    instants = [(0.0, 0.0), (1.0, 0.0), (1.5, 5e-4), (2.0, 1e-3), (3.0, 1e-3)]
+    lines = [
+        f"{step},{time},{distance},0.1,0.2,1e-5,1.0,{friction},{area}"
+        for step, ((time, distance), (friction, area)) in enumerate(zip(instants, errors, strict=True))
+    ]
+    (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
+    sweep_table.write(Path("out/job"), (changed,))
+    assert [table()[0][name] for name in ("error_friction", "error_area")] == ["0.02", "0.04"]
+
+
 def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:
     for case in cases[:2]:
         directory = case.job.output.directory

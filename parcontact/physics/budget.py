@@ -17,10 +17,13 @@ mesh: of friction from the cells per shortest wave of a rough surface, or per ra
     area from the correction itself. Where there is a run on half the mesh, both from their difference to it.
 
 Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
-wrong with pressures then counts more, by about the root of the ratio.
+wrong with pressures then counts more, by about the root of the ratio. Pressures that are wrong by the complementarity
+may have tangential forces of that share of the slopes: measured at rest, where a sphere and a wave have no friction, it
+was 0.05 to 0.7 of that. Friction that is no larger has no budget: there is no number of which to be wrong by a share.
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import asdict, astuple, dataclass, fields, replace
 from typing import Any
 
@@ -40,7 +43,9 @@ WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 CORRECTED_ORDER = 1.0  # of the corrected area
 EDGES, STRAIGHT_EDGES = 0.25, 2.0  # of the correction of the area; along edges that follow the grid
-AT_ONCE = 1e-200  # s: what a step weighs that lasts no time
+ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
+AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
+LEAST_WAY = 1e-60  # m: smaller weights are those of rest
 ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
 
 
@@ -66,11 +71,12 @@ REMEDIES = {
     "folded": "a smaller numerics.branch_error",
     "mesh": "a finer grid",
 }
+SMALLER = "a smaller numerics.accuracy"  # where it has chosen the setting
 
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Of one instant. Friction is None where there is none."""
+    """Of one instant. Friction is None where there is none, or no more than the solver's noise."""
 
     friction: Parts | None
     area: Parts
@@ -107,7 +113,8 @@ class Seen:
 
 def estimate(known: Known, seen: Seen, points: int) -> ErrorBudget:
     """The budget of a step on a grid of so many points."""
-    return ErrorBudget(_friction(known, seen, points) if seen.friction > 0.0 else None, _area(known, seen))
+    noise = seen.slope * max(seen.complementarity, ROUNDING)
+    return ErrorBudget(_friction(known, seen, points) if seen.friction > noise else None, _area(known, seen))
 
 
 def _friction(known: Known, seen: Seen, points: int) -> Parts:
@@ -167,9 +174,10 @@ def _area(known: Known, seen: Seen) -> Parts:
 
 
 class Summary:
-    """Budgets of many steps, each for as long as it lasted; friction also in proportion to it.
+    """Budgets of many steps, each for as far as the surface slid in it; friction also in proportion to it.
 
-    Steps that last no time count only where none does. `numbers` are its sums, shape (10,), from which another begins.
+    Where nothing slides they count for as long as they last, and steps that last no time only where none does: a long
+    rest does not dilute what a slide says. `numbers` are its sums, shape (10,), from which another begins.
     """
 
     def __init__(self, numbers: NDArray[np.float64] | None = None) -> None:
@@ -180,21 +188,21 @@ class Summary:
         """The weight, and the weighted sum of each part, of friction and then of area."""
         return self._sums.ravel()
 
-    def add(self, budget: ErrorBudget, friction: float, seconds: float) -> None:
-        """One step."""
-        seconds = seconds or AT_ONCE
+    def add(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> None:
+        """One step of so many seconds, in which the surface slid so far [m]."""
+        far = slid or seconds * AT_REST or AT_ONCE
         for sums, parts, weight in zip(self._sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
-                sums += weight * seconds * np.array([1.0, *astuple(parts)])
+                sums += weight * far * np.array([1.0, *astuple(parts)])
 
     @property
     def friction(self) -> Parts | None:
-        """The mean over time, None where nothing has slid."""
+        """The mean over the way, None where nothing has slid, or without friction."""
         return self._mean(0)
 
     @property
     def area(self) -> Parts | None:
-        """The mean over time, None where nothing has touched."""
+        """The mean over the way, over time where nothing has slid; None where nothing has touched."""
         return self._mean(1)
 
     def _mean(self, index: int) -> Parts | None:
@@ -207,21 +215,23 @@ class Summary:
         parts = {name: asdict(each) | {"total": each.total} for name, each in found.items() if each is not None}
         return {"accuracy": accuracy, **parts}
 
-    def lines(self, accuracy: float) -> list[str]:
-        """Sentences for run.log, with what to change where more is wrong than `accuracy` allows."""
+    def lines(self, accuracy: float, chosen: Collection[str] = ()) -> list[str]:
+        """Sentences for run.log, with what to change where more is wrong than `accuracy` allows; it has `chosen` the
+        settings behind these parts."""
         found = (("friction", self.friction), ("contact area, corrected,", self.area))
+        way = "the distance slid" if self._sums[1, 0] > LEAST_WAY else "time"
         return [
-            f"{name} is wrong by about {describe(parts)}{_advice(parts, accuracy)}"
+            f"{name} is wrong by about {describe(parts)}, in the mean over {way}{_advice(parts, accuracy, chosen)}"
             for name, parts in found
             if parts is not None
         ]
 
 
-def _advice(parts: Parts, accuracy: float) -> str:
+def _advice(parts: Parts, accuracy: float, chosen: Collection[str]) -> str:
     if parts.total <= accuracy:
         return ""
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
-    return f", more than numerics.accuracy = {accuracy:g}: try {REMEDIES[worst]}"
+    return f", more than numerics.accuracy = {accuracy:g}: try {SMALLER if worst in chosen else REMEDIES[worst]}"
 
 
 def describe(parts: Parts) -> str:

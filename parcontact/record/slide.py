@@ -51,6 +51,11 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
     return Slide(float(friction[highest]), float(distance[highest] - start), *means)
 
 
+def rows(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> list[int]:
+    """The numbers of the rows of the slide that have been made in it, from the column `time`."""
+    return [int(index) for index in _during(history, np.asarray(columns["time"], float))[1:]]
+
+
 _COLUMNS = ("distance", "friction", "contact_area")
 
 

@@ -15,8 +15,8 @@ from . import files, measures, slide
 
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
-WORST = ("residual", "error_friction", "error_area")  # the largest in any row
-COLUMNS = ("state", *RESULTS, *WORST, "seconds", *(f"theory_{name}" for name in RESULTS))
+ERRORS = ("error_friction", "error_area")  # the largest of the slide, or of the last row without one
+COLUMNS = ("state", *RESULTS, "residual", *ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
 SEED = "seed"  # the last word of keys over whose values means are taken
 FAILURE = ".failure"  # why a case has failed
 
@@ -62,7 +62,9 @@ def _row(case: Case) -> dict[str, Any]:
             row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
         if columns["time"] and not prefix:
             row["seconds"] = math.fsum(columns["seconds"])
-            row |= {name: _largest(columns[name]) for name in WORST if name in columns}
+            row["residual"] = _largest(columns["residual"])
+            rows = slide.rows(case.job.history, columns) if found else [-1]
+            row |= {name: _largest([columns[name][at] for at in rows]) for name in ERRORS if name in columns}
     return row
 
 

@@ -16,7 +16,7 @@ from ..record import checkpoint, wisdom
 from ..record.checkpoint import Facts
 from ..record.directory import Directory
 from ..record.recorder import Recorder
-from .errors_so_far import ErrorsSoFar
+from .errors_so_far import ErrorsSoFar, chosen_by_accuracy
 from .restart import Origin
 from .watch import Watch
 
@@ -180,7 +180,7 @@ class Journey:
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
-        for line in self.errors.summary.lines(self.job.numerics.accuracy):
+        for line in self.errors.summary.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
             console.say(line)
         if self.stop:
             of = f"about {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))

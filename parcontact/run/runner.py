@@ -97,7 +97,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 if code != DONE:
                     return Ended(code, marching)
                 saved = origin.contents.numbers if origin else None
-                errors = ErrorsSoFar(marching.row.time, saved, half)
+                errors = ErrorsSoFar(marching.row, saved, half)
                 told = set(sanity.ODD_CONTACTS if options.beside else ())
                 contacts = sanity.ContactWatch(job, timeline, told)
                 journey = Journey(

@@ -52,7 +52,7 @@ def test_radius_of_a_spot() -> None:
 
 
 def test_summary() -> None:
-    """Means over time, of friction in proportion to it; in sentences."""
+    """Without a slide means over time, of friction in proportion to it; in sentences."""
     summary = Summary()
     summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
     summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
@@ -68,20 +68,47 @@ def test_summary() -> None:
     assert area.startswith("contact area, corrected, is wrong by about ")
     assert area.endswith(", more than numerics.accuracy = 0.012: try a finer grid")
     assert Summary().lines(0.012) == []
+    assert ", in the mean over time, more than" in area
+    assert summary.lines(0.012, ["mesh"])[1].endswith(": try a smaller numerics.accuracy")
+
+
+def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
+    """A slide of 1 mm, then an hour at rest under other errors: the slide's, but for nothing."""
+    summary, slide = Summary(), estimate(KNOWN, SEEN, 10_000)
+    rest = estimate(KNOWN, Seen(5e-2, 0.1, 2.0, 0.02, 0.01, 0.1, 0.05), 10_000)
+    summary.add(rest, 0.0, 1e-3)
+    summary.add(slide, 0.02, 1e-2, slid=1e-3)
+    summary.add(rest, 0.01, 3600.0)
+    assert summary.friction is not None
+    assert summary.area is not None
+    assert slide.friction is not None
+    assert astuple(summary.friction) == pytest.approx(astuple(slide.friction), rel=1e-12)
+    assert astuple(summary.area) == pytest.approx(astuple(slide.area), rel=1e-12)
+    assert all(", in the mean over the distance slid" in line for line in summary.lines(0.012))
+
+
+@pytest.mark.parametrize(("friction", "known"), [(1e-18, False), (1.9e-5, False), (2.1e-5, True)])
+def test_friction_that_is_noise_has_no_budget(friction: float, known: bool) -> None:
+    """Pressures wrong by 1e-3 on slopes of 0.02 may have tangential forces of 2e-5 of the load; area has its budget."""
+    budget = estimate(KNOWN, Seen(1e-3, 4e-4, 2.0, 0.02, friction, 0.1, 0.095), 10_000)
+    assert (budget.friction is not None) == known
+    assert budget.area.total > 0.0
+    if budget.friction:
+        assert budget.friction.solver <= 0.5 * 1e-3**0.5
 
 
 def test_summary_goes_on() -> None:
     """From the sums of another, as if there had been one; as plain data it has parts that add up."""
     one, other = Summary(), Summary()
     for summary in (one, other):
-        summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
+        summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
     on = Summary(other.numbers)
     for summary in (one, on):
-        summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
+        summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0, 2e-4)
     assert on.facts(0.01) == one.facts(0.01)
     friction = on.facts(0.01)["friction"]
     assert friction.pop("total") == pytest.approx(sum(friction.values()))
-    assert other.numbers[0] == pytest.approx(0.06)  # not changed by the one that went on from them
+    assert other.numbers[0] == pytest.approx(0.02 * 3e-4)  # not changed by the one that went on from them
 
 
 def test_steps_that_last_no_time_count_where_none_does() -> None:
