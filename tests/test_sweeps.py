@@ -206,3 +206,27 @@ def test_nothing_runs_with_a_mistake_in_any_case(
     assert done.returncode == 2
     assert done.stderr == "job.yaml:9:27: surface.seed must be a whole number of zero or more, got -3\n"
     assert not (tmp_path / "out").exists()
+
+
+def test_a_warning_of_many_cases_is_told_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+    """With the cases that it holds for; run.log of each has its own. One case alone tells its own as any run does."""
+    (tmp_path / "job.yaml").write_text(COARSE)
+    done = run_parcontact(["job.yaml", "--quiet"])
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+    coarse = [line for line in told if "cells per shortest wave" in line]
+    assert [line.rpartition(" (")[2] for line in coarse] == ["cases 0-1, 3)"], done.stderr
+    text = coarse[0].removeprefix("warning: ").rpartition(" (")[0]
+    logs = [(tmp_path / f"out/job/cases/{name}/run.log").read_text() for name in ("000", "001", "002", "003")]
+    assert [f"warning: {text}" in log for log in logs] == [True, True, False, True]
+    alone = run_parcontact(["job.yaml", "--quiet", "--case", "1", "--restart", "never"])
+    assert f"warning: {text}\n" in alone.stderr
+
+
+COARSE = """
+grid: {points: 16, size: 1.0e-3}
+surface: {shape: rough, hurst: 0.8, long_wavelength: 1.0e-3, short_wavelength: 2.5e-4, rms_slope: 0.01, seed: 1}
+material: {model: elastic, shear_modulus: 1.0e6}
+history: [{pressure: 1.0e4}]
+sweep: [{surface.seed: [1, 2, 3, 4], surface.short_wavelength: [2.5e-4, 2.5e-4, 5.0e-4, 2.5e-4]}]
+"""

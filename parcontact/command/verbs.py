@@ -10,13 +10,13 @@ from . import ranks
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from ..job import Case, Job
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
 
-    Act = Callable[[Job, Slab], int]
+    Act = Callable[[Job, Slab, Collection[str]], int]
 
 OF_A_CURVE = ("velocities", "pressures", "temperatures")
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: stopped early, run again
@@ -26,29 +26,36 @@ def run(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..run import runner
 
-    chosen = runner.Options(options.quiet, options.restart, options.until, options.wall)
-
-    def act(job: Job, slab: Slab) -> int:
-        return runner.run(job, slab, chosen) if job.history else _curve(options, job, slab)
+    def act(job: Job, slab: Slab, told: Collection[str]) -> int:
+        chosen = runner.Options(options.quiet, options.restart, options.until, options.wall, told=told)
+        return runner.run(job, slab, chosen) if job.history else _curve(options, job, slab, told)
 
     return _each_case(options, world, act)
 
 
 def steady(options: argparse.Namespace) -> int:
-    return _each_case(options, ranks.start(), lambda job, slab: _curve(options, job, slab))
+    return _each_case(options, ranks.start(), lambda job, slab, told: _curve(options, job, slab, told))
 
 
 def _each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
-    """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective."""
+    """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective.
+
+    The third argument of `act` are the warnings that were shown before, once for all cases.
+    """
     from ..parallel.slab import Slab
     from ..run import sweep, watch
 
     cases, chosen = on_root(world, lambda: _cases(options))
     if not cases[0].settings:
-        return act(cases[0].job, Slab(world, *cases[0].job.grid.points))
+        return act(cases[0].job, Slab(world, *cases[0].job.grid.points), ())
     limit = watch.limit(getattr(options, "wall", None))
     on_root(world, lambda: sweep.refuse_foreign(cases))
-    return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act, options.quiet, runs, limit)
+    told = on_root(world, lambda: sweep.warn_once(chosen)) if runs and len(chosen) > 1 else ()
+
+    def act_on_case(job: Job, slab: Slab) -> int:
+        return act(job, slab, told)
+
+    return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act_on_case, options.quiet, runs, limit)
 
 
 def _cases(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:
@@ -59,7 +66,7 @@ def _cases(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]
     return cases, jobs.choose(cases, options.case)
 
 
-def _curve(options: argparse.Namespace, job: Job, slab: Slab) -> int:
+def _curve(options: argparse.Namespace, job: Job, slab: Slab, told: Collection[str]) -> int:
     from .. import prediction
     from ..steady_sliding import curve
 
@@ -67,7 +74,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab) -> int:
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    code = curve.run(job, slab, wanted, options.quiet, options.restart)
+    code = curve.run(job, slab, wanted, options.quiet, options.restart, told)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code
@@ -143,7 +150,7 @@ def theory(options: argparse.Namespace) -> int:
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
 
-    def act(job: Job, slab: Slab) -> int:
+    def act(job: Job, slab: Slab, told: Collection[str]) -> int:
         alone = Slab(MPI.COMM_SELF, *job.grid.points)
         path = on_root(
             world, lambda: prediction.write(job, prediction.predict(job, alone, options.gamma, options.waves))

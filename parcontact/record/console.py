@@ -50,10 +50,11 @@ class Console:
             with suppress(OSError):
                 os.write(self._log, f"{stamp},{int(now % 1.0 * 1000):03d} {printable(text)}\n".encode())
 
-    def warn(self, text: str) -> None:
-        """A message that is shown even to those who asked for quiet."""
+    def warn(self, text: str, told: bool = False) -> None:
+        """A message that is shown even to those who asked for quiet, unless they were told before."""
         self.log(f"warning: {text}")
-        self._write(f"warning: {printable(text)}", sys.stderr)
+        if not told:
+            self._write(f"warning: {printable(text)}", sys.stderr)
 
     def step(self, row: Row) -> None:
         """One line per step."""
@@ -112,7 +113,7 @@ class Silence:
 
     def log(self, text: str) -> None: ...
 
-    def warn(self, text: str) -> None: ...
+    def warn(self, text: str, told: bool = False) -> None: ...
 
     def step(self, row: Row) -> None: ...
 

@@ -1,5 +1,6 @@
 """A run from a job to its output directory: it begins or goes on, saves what it remembers, and ends well."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -33,7 +34,8 @@ from .watch import Watch
 class Options:
     """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
-    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene.
+    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. The warnings that a
+    user was `told` before go into run.log only.
     """
 
     quiet: bool = False
@@ -42,6 +44,7 @@ class Options:
     wall: float | None = None
     stop_file: Path | None = None
     beside: bool = False
+    told: Collection[str] = ()
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
             for text in header.lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
             for text in (*doubts, *warnings, *recorder.warnings):
-                recorder.console.warn(text)
+                recorder.console.warn(text, told=text in options.told)
             limit = watch.limit(options.wall) if slab.root else None
             facts = Facts(0, 0.0, plain, provenance, claim.id)
             with Signals().noted() as signals:

@@ -53,6 +53,32 @@ def run(
     return code
 
 
+def warn_once(cases: Sequence[Case]) -> list[str]:
+    """Warn of what is doubtful about the jobs of cases, each text once with the cases that it holds for; root only.
+
+    Returns the texts.
+    """
+    found: dict[str, list[int]] = {}
+    for case in cases:
+        for text in dict.fromkeys(case.job.warnings):
+            found.setdefault(text, []).append(case.number)
+    for text, numbers in found.items():
+        which = "all cases" if len(numbers) == len(cases) else f"case{'s' * (len(numbers) > 1)} {_ranges(numbers)}"
+        print(f"warning: {text} ({which})", file=sys.stderr, flush=True)
+    return list(found)
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Ascending numbers as `0, 2-5`."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+
+
 def refuse_foreign(cases: Sequence[Case]) -> None:
     """Raise InputError where the files of others, or of another job, are in the directory of a sweep; root only."""
     directory, first = _directory(cases), cases[0]

@@ -1,7 +1,7 @@
 """Friction curves: steady sliding solved directly at many velocities and pressures, into steady.csv and a picture."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
@@ -81,10 +81,11 @@ def _pressures(job: Job) -> tuple[float, ...]:
     return ()
 
 
-def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto") -> int:
+def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto", told: Collection[str] = ()) -> int:
     """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
 
-    A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`.
+    A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
+    the warnings that were `told` before are not shown again.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -101,7 +102,7 @@ def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto
         columns = wanted.waves, bool(wanted.temperatures)
         table = _on_root(slab, lambda: CurveTable(directory.path, sliding, *columns, quiet))
         if table:
-            table.warn(doubts)
+            table.warn([text for text in doubts if text not in told])
         maps = _maps(job, slab, wanted, directory)
         try:
             with Signals().noted() as signals:
