@@ -12,6 +12,7 @@ from marching import begun, column, marched
 from mpi4py import MPI
 from test_restart import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
 
+from parcontact.march import rest
 from parcontact.march.loop import run
 from parcontact.march.rest import SHARE, remaining, steps_to_make
 from parcontact.march.step import March
@@ -60,11 +61,14 @@ def test_an_elastic_body_is_solved_once() -> None:
     assert not any(row.remark for row in found)
 
 
-def test_a_relaxed_body_jumps_to_the_end() -> None:
-    """When less than a share of the tolerance is left of its creep, exp(-t/tau) with tau of some ms; later for less."""
+def test_a_relaxed_body_jumps_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """When less than a share is left of its creep, of a creep time of some ms; later for less: by that time for each
+    factor e, in steps of 20 %. The solver is far more exact than the shares, here 1e-2 and 1e-4, so that its error,
+    which is far larger on the edge of contact than its certificate, has no part in it."""
     ends = []
-    for tolerance in (1e-3 / SHARE, 1e-5 / SHARE):
-        march, found = marched(job(DWELL, numerics={"tolerance": tolerance}))
+    for share in (1e-2, 1e-4):
+        monkeypatch.setattr(rest, "SHARE", share / TIGHT)
+        march, found = marched(job(DWELL, numerics={"tolerance": TIGHT}))
         total = len(march.scene.job.timeline())
         assert [row.step for row in found[:-1]] == list(range(len(found) - 1))
         assert found[-1].step == total
@@ -73,7 +77,7 @@ def test_a_relaxed_body_jumps_to_the_end() -> None:
         assert found[-1].remark == passed + "at rest under a constant load nothing changes by more than the tolerance"
         ends.append(found[-2].time)
     assert 5e-3 < ends[0] < 0.03
-    assert 1.3 < ends[1] / ends[0] < 2.5  # ln(1e5) / ln(1e3), in steps of 20 %
+    assert 2e-3 < (ends[1] - ends[0]) / np.log(1e2) < 5e-3
 
 
 NEVER: list[tuple[str, dict[str, Any]]] = [
