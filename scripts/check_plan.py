@@ -99,7 +99,7 @@ def plan(path: Path) -> dict[int, tuple[float, float, float]]:
     """MB of maps, MB of memory and seconds by number of ranks."""
     words = [BIN / "parcontact", "plan", path, "--ranks", "1,2", "--seconds", str(SECONDS)]
     said = subprocess.run(words, cwd=path.parent, env=environment(), capture_output=True, text=True, check=True).stdout
-    rows = re.findall(r"^ +(\d+) +(\S+) +(\S+) .* (\S+) s$", said, re.MULTILINE)
+    rows = re.findall(r"^ +(\d+) +([\d.]+) +([\d.]+) .* (\S+) s$", said, re.MULTILINE)
     return {int(ranks): (float(held), float(resident), float(seconds)) for ranks, held, resident, seconds in rows}
 
 

@@ -55,7 +55,10 @@ def columns(out: Path, *names: str) -> list[Series]:
 
 @pytest.mark.mpi
 def test_the_mesh_part_is_the_difference(comm: MPI.Intracomm, shared_path: Path) -> None:
-    """Of another run with the same time steps, made here on its own, over 2^p - 1; the other parts are as they were."""
+    """Of another run with the same time steps, made here on its own, over 2^p - 1; the other parts are as they were.
+
+    Friction at rest may be noise, of which there is no estimate, with the check or without.
+    """
     half = [PRESS, {**SLIDE, "cells_per_step": 0.5}]
     assert run(data(), shared_path / "checked", comm) == 0
     assert run(data(check=False), shared_path / "plain", comm) == 0
@@ -72,7 +75,10 @@ def test_the_mesh_part_is_the_difference(comm: MPI.Intracomm, shared_path: Path)
         (friction, area), coarse, (WAVES_ORDER, CORRECTED_ORDER), errors, estimates, estimated, strict=True
     ):
         apart = np.abs(values - other) / values / (2.0**order - 1.0)
-        assert error - estimate + mesh == pytest.approx(apart, abs=1e-12)
+        known = ~np.isnan(estimate)
+        assert known[-16:].all()  # the slide
+        assert np.array_equal(~np.isnan(error), known)
+        assert (error - estimate + mesh)[known] == pytest.approx(apart[known], abs=1e-12)
 
 
 def mesh_part(friction: Series) -> Series:

@@ -495,7 +495,9 @@ def test_tolerance_of_friction() -> None:
 @pytest.mark.mpi
 @pytest.mark.parametrize("velocity", [0.3, [0.0, 0.3]])
 def test_memory(comm: MPI.Intracomm, velocity: Any) -> None:
-    """At most one map of a rank's rows per branch and 14 more, counted and traced, beside the blocks of transforms."""
+    """At most one map of a rank's rows per branch and 14 more, counted and traced, beside the blocks of transforms
+    and the larger cells of the preconditioner: two maps of 4 bytes on 1/4 + 1/16 + ... of the points, of which several
+    ranks have the largest cells all, less than half a map in all."""
     data = rough(1024, [slide(1024, 2, velocity=velocity)], numerics={"tolerance": 0.1})
     data["material"] = {**TYRE, "branches": TYRE["branches"][:2]}  # type: ignore[index]
     blocks = 4 * BLOCK_BYTES
@@ -509,7 +511,7 @@ def test_memory(comm: MPI.Intracomm, velocity: Any) -> None:
     maps = 8 * march.scene.slab.shape[0] * 1024
     assert len(rows) == 4
     assert march.scene.slab.tally["map bytes"] <= 16 * maps + blocks
-    assert peak <= 16 * maps + blocks
+    assert peak <= 16.5 * maps + blocks
 
 
 @pytest.mark.mpi
