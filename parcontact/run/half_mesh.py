@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..job import Job, Rough
+from ..job.chosen import SAME_TIME
 from ..job.table import plain
 from ..job.timeline import Timeline
 from ..parallel.slab import Slab
@@ -23,7 +24,6 @@ from ..record.row import Row
 
 DIRECTORY = "half_mesh"  # below that of the run
 COLUMNS = ("time", "friction", "contact_area_corrected")
-SAME_TIME = 1e-9  # relative
 
 
 def job_on_half_mesh(job: Job) -> Job:
