@@ -15,7 +15,7 @@ from parcontact.__main__ import main
 from parcontact.errors import RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.slab import Slab
-from parcontact.record import sweep_table
+from parcontact.record import info_directory, sweep_table
 from parcontact.run import sweep
 
 JOB = """\
@@ -138,6 +138,9 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         spread = sum((value - sum(values) / 3) ** 2 for value in values) / 2
         assert float(mean["mu_dyn_std"]) == pytest.approx(spread**0.5, rel=1e-9)
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
+    case = here / "cases" / "001"
+    for text in ((case / "run.log").read_text(), info_directory.describe(case)[0]):
+        assert f"last three quarters of its 0.0005 m, is {float(rows[1]['mu_dyn']):.6g}\n" in text
 
 
 def test_tables_are_written_by_one_program_at_a_time(cases: tuple[Case, ...]) -> None:

@@ -10,8 +10,9 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from . import checkpoint, hdf5, marker, measures, sweep_table
+from . import checkpoint, hdf5, marker, measures, slide, sweep_table
 from .marker import Claim
+from .resolved import RESOLVED, shown_job
 
 MEAN_OF = ("friction", "contact_area")
 
@@ -61,6 +62,8 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     last = {name: columns[name][-1] for name in ("pressure", *MEAN_OF, "approach")}
     yield "  last row: " + ", ".join(f"{name} {value:.6g}" for name, value in last.items())
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
+    if (directory / RESOLVED).exists():
+        yield from (f"  {text}" for text in slide.describe(shown_job(directory / RESOLVED).history, columns))
 
 
 def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -5,7 +5,8 @@ paper (Sec. 3.1), mu_max is the highest friction of the slide, and mu_dyn the me
 distance. That is not yet the friction of steady sliding, which may take a longer slide (`parcontact steady` finds it).
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from ..job import Stage
 
 DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
 SAME_INSTANT = 1e-9  # relative: instants this close are the same
+ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
 
 
 class Slide(NamedTuple):
@@ -51,9 +53,33 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
     return Slide(float(friction[highest]), float(distance[highest] - start), *means)
 
 
-def rows(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> list[int]:
-    """The numbers of the rows of the slide that have been made in it, from the column `time`."""
-    return [int(index) for index in _during(history, np.asarray(columns["time"], float))[1:]]
+def errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """The largest relative errors of friction and contact area that the rows of the slide have, or the last row where
+    nothing has slid; nan where none is known. By the names of their columns, as far as these are there."""
+    rows = _during(history, np.asarray(columns["time"], float))[1:].tolist() if measure(history, columns) else [-1]
+    return {name: largest(columns[name][row] for row in rows) for name in ERRORS if name in columns}
+
+
+def largest(values: Iterable[float]) -> float:
+    """Of those that are known, else nan."""
+    return max((value for value in values if value == value), default=math.nan)
+
+
+def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
+    """Sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing has slid."""
+    found = measure(history, columns)
+    if found is None:
+        return
+    distance = np.asarray(columns["distance"], float)[_during(history, np.asarray(columns["time"], float))]
+    yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}, after {found.mu_max_distance:.4g} m of it"
+    length = f"{distance[-1] - distance[0]:.4g} m"
+    yield f"mu_dyn, the mean friction over the last three quarters of its {length}, is {found.mu_dyn:.6g}"
+    yield f"the mean contact area over the same is {found.contact_area:.6g}"
+    known = {name: value for name, value in errors(history, columns).items() if value == value}
+    if known:
+        what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
+        told = ", ".join(f"{what[name]} {100 * value:.2g} %" for name, value in known.items())
+        yield f"largest errors of the steps of the slide: {told}"
 
 
 _COLUMNS = ("distance", "friction", "contact_area")

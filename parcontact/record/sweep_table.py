@@ -15,8 +15,7 @@ from . import files, measures, slide
 
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
-ERRORS = ("error_friction", "error_area")  # the largest of the slide, or of the last row without one
-COLUMNS = ("state", *RESULTS, "residual", *ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
+COLUMNS = ("state", *RESULTS, "residual", *slide.ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
 SEED = "seed"  # the last word of keys over whose values means are taken
 FAILURE = ".failure"  # why a case has failed
 
@@ -62,15 +61,9 @@ def _row(case: Case) -> dict[str, Any]:
             row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
         if columns["time"] and not prefix:
             row["seconds"] = math.fsum(columns["seconds"])
-            row["residual"] = _largest(columns["residual"])
-            rows = slide.rows(case.job.history, columns) if found else [-1]
-            row |= {name: _largest([columns[name][at] for at in rows]) for name in ERRORS if name in columns}
+            row["residual"] = slide.largest(columns["residual"])
+            row |= slide.errors(case.job.history, columns)
     return row
-
-
-def _largest(values: Sequence[float]) -> float:
-    """Of those that are known."""
-    return max((value for value in values if value == value), default=math.nan)
 
 
 def _state(case: Case) -> str:

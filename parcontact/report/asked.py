@@ -5,7 +5,7 @@ from pathlib import Path
 from .. import job as jobs
 from ..errors import InputError
 from ..job import Job, table
-from ..record.pictures.run import shown_job
+from ..record.resolved import shown_job
 from .parts import Section, Table
 
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # told by other sections

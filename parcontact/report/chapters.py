@@ -6,7 +6,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..record import measures, plots
 from ..record.pictures.charts import Series
-from ..record.pictures.run import RESOLVED, STEADY_RESOLVED
+from ..record.resolved import RESOLVED, STEADY_RESOLVED
 from . import asked, log, material, origin, results, road
 from .parts import Chapter, Section, of_chart, of_file
 

@@ -1,10 +1,11 @@
 """A march through its timeline, with what is done on the way: it is recorded, saved, stopped if asked to."""
 
 import time
+from contextlib import suppress
 from dataclasses import replace
 
 from .. import sanity, scene
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..job.chosen import reached
 from ..job.timeline import Timeline
 from ..march import loop
@@ -12,7 +13,7 @@ from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..physics.entries import Entry
-from ..record import checkpoint, wisdom
+from ..record import checkpoint, measures, slide, wisdom
 from ..record.checkpoint import Facts
 from ..record.directory import Directory
 from ..record.recorder import Recorder
@@ -177,9 +178,17 @@ class Journey:
         counts = ", ".join(f"{name} {count}" for name, count in sorted(self.slab.tally.items()))
         self.console.log(f"counts on root: {counts}")
 
+    def _tell_slide(self) -> None:
+        """What sweeps collect of a run; a table that cannot be read now ends no run."""
+        if self.slab.root and any(stage.speed for stage in self.job.history):
+            with suppress(OSError, InputError):
+                for text in slide.describe(self.job.history, measures.read(self.directory.path / "measures.csv")):
+                    self.console.say(text)
+
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
+        self._tell_slide()
         for line in self.errors.summary.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
             console.say(line)
         if self.stop:

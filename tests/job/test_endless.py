@@ -8,7 +8,7 @@ import pytest
 from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.job.timeline import Timeline
-from parcontact.record.pictures.run import shown_job
+from parcontact.record.resolved import shown_job
 
 from .texts import SMALL, job_of, with_stage
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from parcontact.job import Stage
-from parcontact.record.slide import mean_over_end, measure
+from parcontact.record.slide import describe, mean_over_end, measure
 
 REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
 CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}
@@ -68,3 +68,16 @@ def test_what_comes_after_the_slide_is_not_of_it() -> None:
 )
 def test_no_slide(history: list[dict[str, Any]], table: dict[str, list[float]]) -> None:
     assert measure(stages(*history), table) is None
+
+
+def test_sentences_about_a_slide() -> None:
+    """Each number with what it is; errors as far as they are known, the largest of the slide alone."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
+    table["error_friction"] = [float("nan"), 0.5, 0.02, 0.03, float("nan"), 0.01]
+    assert list(describe(stages(REST, CLIMB, SETTLE), table)) == [
+        "mu_max, the highest friction of the slide, is 4, after 1 m of it",
+        "mu_dyn, the mean friction over the last three quarters of its 4 m, is 2.33333",
+        "the mean contact area over the same is 0.233333",
+        "largest errors of the steps of the slide: friction 3 %",
+    ]
+    assert not list(describe(stages(REST), table))

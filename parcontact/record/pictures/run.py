@@ -3,25 +3,19 @@
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from ...errors import InputError
-from ...job import Job, yamltext
 from ...job.timeline import Timeline
 from ...parallel.slab import Array
-from .. import hdf5, measures
+from .. import measures
+from ..resolved import RESOLVED, STEADY_RESOLVED, shown_job
 
 Panel = Callable[[Axes], None]
-RESOLVED = "job.resolved.yaml"
-SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady")  # versions differ in other sections
-STEADY_RESOLVED = "steady.resolved.yaml"
-FILES = ("file", "topography")  # shapes that come from files
 
 MEASURED = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
@@ -137,18 +131,3 @@ def box(directory: Path) -> float:
             grid = shown_job(directory / name).grid
             return grid.lx * grid.ly if grid.boundary == "free" else 0.0
     return 0.0
-
-
-def shown_job(path: Path) -> Job:
-    """What pictures show of the resolved job; its files of heights need not be there any more."""
-    try:
-        data = yamltext.parse(path.read_bytes(), str(path)).data
-        data = {name: data[name] for name in SHOWN if name in data}
-        data["surface"] = [{"shape": "flat"} if _comes_from_a_file(shape) else shape for shape in data["surface"]]
-        return Job.model_validate(data)
-    except (OSError, KeyError, TypeError, ValidationError) as error:
-        raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
-
-
-def _comes_from_a_file(shape: dict[str, Any]) -> bool:
-    return shape["shape"] in FILES or "spectrum" in shape

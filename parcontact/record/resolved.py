@@ -1,0 +1,30 @@
+"""The job that a run has left in its directory with every default: as far as pictures and texts show it."""
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import InputError
+from ..job import Job, yamltext
+from . import hdf5
+
+RESOLVED = "job.resolved.yaml"
+STEADY_RESOLVED = "steady.resolved.yaml"
+SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady")  # versions differ in other sections
+FILES = ("file", "topography")  # shapes that come from files
+
+
+def shown_job(path: Path) -> Job:
+    """What pictures show of the resolved job; its files of heights need not be there any more."""
+    try:
+        data = yamltext.parse(path.read_bytes(), str(path)).data
+        data = {name: data[name] for name in SHOWN if name in data}
+        data["surface"] = [{"shape": "flat"} if _comes_from_a_file(shape) else shape for shape in data["surface"]]
+        return Job.model_validate(data)
+    except (OSError, KeyError, TypeError, ValidationError) as error:
+        raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
+
+
+def _comes_from_a_file(shape: dict[str, Any]) -> bool:
+    return shape["shape"] in FILES or "spectrum" in shape
