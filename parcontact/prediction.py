@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -17,14 +18,15 @@ from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
 from .physics.prony import Prony, complex_modulus
 from .physics.roughness import EDGE, Roughness
-from .record import files, hdf5, measures
+from .record import files, hdf5, measures, theory_settings
+from .record.theory_settings import TheorySettings
 from .steady_sliding.curve import Request
 from .theory import full_contact, persson, persson_rings
 from .theory.persson_history import Leg, Memory, follow
 from .theory.persson_rings import Rings
 
 COLUMNS = ("time", "distance", "pressure", "friction", "contact_area")
-FILE, STEADY_FILE = "theory.csv", "steady_theory.csv"
+STEADY_FILE = "steady_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
 
@@ -106,27 +108,42 @@ def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> I
 
 def write_steady(job: Job, wanted: Request) -> Path:
     """The prediction for a curve as steady_theory.csv beside it, in whose picture it is then; returns the picture."""
-    _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, predict_steady(job, wanted))
+    path = job.output.directory / STEADY_FILE
+    with _told_where(path):
+        _write(path, SteadyInstant._fields, predict_steady(job, wanted))
     from .record import plots  # matplotlib is slow to import, and for pictures only
 
     return plots.draw_steady(job.output.directory / "steady.csv")
 
 
-def write(job: Job, rows: Iterator[Instant]) -> Path:
-    """The rows as theory.csv in the output directory of the job; returns its path."""
-    return _write(job.output.directory / FILE, COLUMNS, rows)
+def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
+    """The rows as theory.csv in the output directory of the job, with theory.yaml beside it; returns the table's path.
+
+    The settings are never those of another table: older ones are removed before, and new ones written after it.
+    """
+    path = job.output.directory / theory_settings.TABLE
+    with _told_where(path):
+        (path.parent / theory_settings.FILE).unlink(missing_ok=True)
+        _write(path, COLUMNS, rows)
+        theory_settings.write(path.parent, settings)
+    return path
 
 
-def _write(path: Path, columns: Sequence[str], rows: Iterator[Any]) -> Path:
+def _write(path: Path, columns: Sequence[str], rows: Iterator[Any]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with files.replaced(path) as file:
+        file.write(f"{','.join(columns)}\n".encode())
+        for row in rows:
+            file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
+
+
+@contextmanager
+def _told_where(path: Path) -> Iterator[None]:
+    """A path that cannot be written is an InputError that names it."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(path) as file:
-            file.write(f"{','.join(columns)}\n".encode())
-            for row in rows:
-                file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
+        yield
     except OSError as error:
         raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
-    return path
 
 
 def _refuse_unknown(job: Job) -> None:

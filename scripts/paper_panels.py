@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import Job
-from parcontact.record import measures, sweep_table
+from parcontact.record import measures, sweep_table, theory_settings
 from parcontact.record.pictures import style
 
 WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
@@ -33,6 +33,12 @@ def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray
 def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
     figure = Figure(figsize=(WIDTH, 0.15 + height * count), layout="constrained")
     return figure, figure.subplots(count, 1, squeeze=False)[:, 0]
+
+
+def explain(axes: Axes, *directories: Path, **look: Any) -> None:
+    """The legend of a panel, with the settings of the theory if they are known and the same in all directories."""
+    settings = theory_settings.shared(directories)
+    axes.legend(**look, title=f"theory: {settings}" if settings else None)
 
 
 def moduli(job: Job) -> tuple[float, float]:

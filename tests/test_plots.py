@@ -10,7 +10,7 @@ from drawing import ELASTIC, KINDS, LOADS, SLIDE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
-from parcontact.record import plots
+from parcontact.record import plots, theory_settings
 from parcontact.record.pictures import units
 
 
@@ -55,6 +55,10 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
         assert np.allclose(np.array(found["theory"].get_xdata())[0], 0.0)
         assert "simulation" in found
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
+    theory_settings.write(out, theory_settings.TheorySettings(0.5, "lattice"))
+    plots.plot([out])
+    labels = [line.get_label() for line in drawn[1].axes[0].get_lines()]
+    assert "theory (γ = 0.5, lattice)" in labels
 
 
 def test_a_directory_above_that_of_a_run(tmp_path: Path) -> None:

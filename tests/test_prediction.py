@@ -6,17 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from conftest import RunParcontact
 from marching import JOBS, PRONY, SLS, column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
-from parcontact import prediction
+from parcontact import __version__, prediction
 from parcontact.__main__ import main
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
+from parcontact.record import theory_settings
+from parcontact.record.theory_settings import TheorySettings
 from parcontact.theory import full_contact
 
 ROUGH: dict[str, Any] = {
@@ -149,13 +152,38 @@ def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
         table = list(csv.DictReader(file))
     assert tuple(table[0]) == prediction.COLUMNS
     assert float(table[-1]["distance"]) == pytest.approx(4.32e-4)
-    assert [path.name for path in (tmp_path / "here").iterdir()] == ["theory.csv"]
+    assert {path.name for path in (tmp_path / "here").iterdir()} == {"theory.csv", "theory.yaml"}
+    assert yaml.safe_load((tmp_path / "here" / "theory.yaml").read_text()) == {
+        "gamma": 1.0,
+        "waves": "continuum",
+        "program": f"parcontact {__version__}",
+    }
+
+
+def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
+    """A table that could not be written leaves none of the one before; legends name settings that all cases share."""
+    ran, other = (job(output={"directory": str(tmp_path / name)}) for name in ("ran", "other"))
+    first, second = TheorySettings(0.5, "lattice"), TheorySettings(0.6, "lattice")
+    for one in (ran, other):
+        prediction.write(one, iter([]), first)
+    paths = [one.output.directory for one in (ran, other)]
+    assert theory_settings.read(paths[0]) == first
+    assert theory_settings.name_of_lines(paths) == "theory (γ = 0.5, lattice)"
+    prediction.write(other, iter([]), second)
+    assert theory_settings.name_of_lines(paths) == "theory"
+    table = (paths[0] / "theory.csv").read_bytes()
+    with pytest.raises(ZeroDivisionError):
+        prediction.write(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]
+    assert (paths[0] / "theory.csv").read_bytes() == table
+    assert theory_settings.read(paths[0]) is None
 
 
 def test_a_directory_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"theory.csv cannot be written"):
-        prediction.write(job(output={"directory": str(tmp_path / "file" / "x")}), iter([]))
+        prediction.write(
+            job(output={"directory": str(tmp_path / "file" / "x")}), iter([]), TheorySettings(0.45, "lattice")
+        )
 
 
 def test_gamma_is_a_share(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ from . import ranks
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Collection, Sequence
+    from pathlib import Path
 
     from ..job import Case, Job
     from ..parallel.mpi import MPI
@@ -149,12 +150,16 @@ def theory(options: argparse.Namespace) -> int:
     from .. import prediction
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
+    from ..record.theory_settings import TheorySettings
 
     def act(job: Job, slab: Slab, told: Collection[str]) -> int:
         alone = Slab(MPI.COMM_SELF, *job.grid.points)
-        path = on_root(
-            world, lambda: prediction.write(job, prediction.predict(job, alone, options.gamma, options.waves))
-        )
+
+        def write() -> Path:
+            rows = prediction.predict(job, alone, options.gamma, options.waves)
+            return prediction.write(job, rows, TheorySettings(options.gamma, options.waves))
+
+        path = on_root(world, write)
         if slab.root and not options.quiet:
             print(f"Persson's theory, gamma {options.gamma:g}, {options.waves} of waves: {path}", flush=True)
         return DONE

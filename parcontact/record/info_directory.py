@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from . import checkpoint, hdf5, marker, measures, slide, sweep_table
+from . import checkpoint, hdf5, marker, measures, slide, sweep_table, theory_settings
 from .marker import Claim
 from .resolved import RESOLVED, shown_job
 
@@ -26,7 +26,7 @@ def describe(directory: Path) -> tuple[str, bool]:
     if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
         raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
     lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
-    for part in (_run, _curve, _checkpoints, _fields, _sweep, _study):
+    for part in (_run, _theory, _curve, _checkpoints, _fields, _sweep, _study):
         try:
             lines += part(directory, claims)
         except InputError as error:
@@ -64,6 +64,14 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
     if (directory / RESOLVED).exists():
         yield from (f"  {text}" for text in slide.describe(shown_job(directory / RESOLVED).history, columns))
+
+
+def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    table = directory / theory_settings.TABLE
+    if table.exists():
+        settings = theory_settings.read(directory)
+        of = f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings"
+        yield f"  Persson's theory: {len(measures.read(table)['time'])} rows, {of}"
 
 
 def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

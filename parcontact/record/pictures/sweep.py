@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...parallel.slab import Array
-from .. import sweep_table
+from .. import sweep_table, theory_settings
 from ..sweep_table import SEED
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
@@ -23,7 +23,6 @@ MAX_COLORS = len(style.COLORS)
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 SHOWN = (("friction", "friction coefficient", ("mu_max", "mu_dyn")), ("area", FRACTION, ("contact_area",)))
 LABELS = {"mu_max": "highest", "mu_dyn": "dynamic", "contact_area": "simulation"}
-THEORY = "theory"
 
 Rows = Sequence[dict[str, Any]]
 
@@ -35,10 +34,12 @@ def charts(directory: Path) -> list[Chart]:
     if not keys:
         return []
     key, *others = keys
-    found = []
+    theory, found = theory_settings.name_of_lines(sorted(directory.glob("cases/*"))), []
     for panel, title, names in SHOWN:
         wanted = [(label, part, name) for label, part in _parts(rows, others) for name in names]
-        series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.COLORS[k % MAX_COLORS])]
+        series = [
+            line for k, one in enumerate(wanted) for line in _lines(*one, key, theory, style.COLORS[k % MAX_COLORS])
+        ]
         if series:
             values = np.concatenate([one.x for one in series])
             wide = values.min() > 0.0 and values.max() >= WIDE * values.min()
@@ -75,7 +76,7 @@ def _parts(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
         yield f", {units.text(value, UNITS.get(word, ''))}", [row for row in rows if row[others[0]] == value]
 
 
-def _lines(label: str, rows: Rows, name: str, key: str, color: str) -> Iterator[Series]:
+def _lines(label: str, rows: Rows, name: str, key: str, of_theory: str, color: str) -> Iterator[Series]:
     """Means as a line with its points, all cases as small dots, and the theory."""
     x, y, theory = (_numbers(rows, column) for column in (key, name, f"theory_{name}"))
     if (there := np.isfinite(y)).any():
@@ -84,7 +85,7 @@ def _lines(label: str, rows: Rows, name: str, key: str, color: str) -> Iterator[
         if at.size < there.sum():
             yield Series("", x[there], y[there], {"marker": "_", "linestyle": "none", "color": color})
     if (there := np.isfinite(theory)).any():
-        yield Series(THEORY + label, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
+        yield Series(of_theory + label, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:
