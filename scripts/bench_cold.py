@@ -2,15 +2,16 @@
 
 import argparse
 import statistics
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 from bench_lines import Line, Map, compare, interleave
-from bench_peers import cold_peers
+from bench_peers import ASPHER_COLD, TAMAAS_COLD, Task, compare_peers
 from mpi4py import MPI
 
-from parcontact.parallel.fft import FFT
+from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -21,6 +22,7 @@ from parcontact.solve.contact import ContactSolver, MeanPressure
 LOAD = 0.05  # mean pressure over E*, for 11 % of contact at a slope of 1
 MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
 ERROR = 1e-7  # of pressures
+PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
 TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.25)]
 
 
@@ -33,6 +35,19 @@ def fft(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
     bare = {"FFTW alone": lambda: (forward.execute(), backward.execute())}
     ours = {name: pair(Slab(MPI.COMM_SELF, points, points), name) for name in ("float64", "float32")}
     yield from compare("fft", interleave({**bare, **ours}, rounds), "FFTW alone")
+    yield from planning(points)
+
+
+def planning(points: int) -> Iterator[Line]:
+    """Of both transforms: the first time on a machine, and with FFTW's wisdom of that time, which runs keep."""
+    before = export_wisdom()
+    pyfftw.forget_wisdom()
+    for name in ("the first time", "again"):
+        began = time.process_time()
+        FFT(Slab(MPI.COMM_SELF, points, points))
+        yield Line("fft", f"planning, {name}", 1e3 * (time.process_time() - began), "ms")
+        import_wisdom(export_wisdom())  # forgets plans, too: those of the next run are made from what is kept
+    import_wisdom(before)
 
 
 def pair(slab: Slab, dtype: str) -> Callable[[], object]:
@@ -43,12 +58,15 @@ def pair(slab: Slab, dtype: str) -> Callable[[], object]:
 
 
 class Cold:
-    """Cold elastic solves of one surface: Hurst 0.8, from a quarter of the box to eight cells, rms slope 1."""
+    """Cold elastic solves of one surface: Hurst 0.8, from a quarter of the box to eight cells, rms slope 1.
 
-    def __init__(self, points: int, comm: MPI.Intracomm = MPI.COMM_SELF) -> None:
-        self.slab = Slab(comm, points, points)
+    The box has the length 1 along x, and that of so many `boxes` along y.
+    """
+
+    def __init__(self, points: int, comm: MPI.Intracomm = MPI.COMM_SELF, boxes: int = 1) -> None:
+        self.slab, self.size = Slab(comm, points, boxes * points), (1.0, float(boxes))
         fft = FFT(self.slab)
-        waves = Roughness(0.8, 0.25, 0.25, 8 / points, 1, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
+        waves = Roughness(0.8, 0.25, 0.25, 8 / points, 1, rms_slope=1.0).spectrum(fft, self.size)
         self.heights: Map = np.asarray(fft.backward(waves, self.slab.zeros()), dtype=np.float64)
         low, high = self.slab.reduce((), [-float(self.heights.min()), float(self.heights.max())])
         self.height, self.fft = low + high, fft
@@ -57,13 +75,18 @@ class Cold:
         """With K in single precision, or for a coarser grid."""
         fft = self.fft if slab is None else FFT(slab, measured=False)
         other = FFT(fft.slab, dtype=np.float32, measured=fft.measured) if single else fft
-        half = HalfSpace((1.0, 1.0))
+        half = HalfSpace(self.size)
         return ContactSolver(fft.slab, half.operator(fft), half.inverse(other), self.height, tolerance, 500)
 
-    def solve(self, solver: ContactSolver) -> Map:
-        start, load = np.zeros_like(self.heights), MeanPressure(LOAD * MODULUS)
+    def start(self, solver: ContactSolver) -> Map:
+        """From nested grids."""
+        start = np.zeros_like(self.heights)
+        load = MeanPressure(LOAD * MODULUS)
         cold.prepare(solver, self.heights, load, start, lambda slab, tolerance: self.solver(tolerance, slab=slab))
-        return np.asarray(solver.solve(self.heights, load, start).p)
+        return start
+
+    def solve(self, solver: ContactSolver) -> Map:
+        return np.asarray(solver.solve(self.heights, MeanPressure(LOAD * MODULUS), self.start(solver)).p)
 
 
 def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
@@ -83,8 +106,8 @@ def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]
     times = interleave(ways, rounds)
     yield from compare("solve", times, "double")
     if asked.peers is not None:
-        ours = statistics.median(times["double"])
-        yield from cold_peers(asked.peers, surface.heights, reference / MODULUS, LOAD, ERROR, ours)
+        given = {"heights": surface.heights, "reference": reference / MODULUS, "load": LOAD, "wanted": ERROR}
+        yield from compare_peers(asked.peers, "solve", PEERS, given, statistics.median(times["double"]))
 
 
 def distance(p: Map, reference: Map) -> float:

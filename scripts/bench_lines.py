@@ -24,15 +24,18 @@ class Line:
 
 
 def interleave(
-    ways: Mapping[str, Callable[[], object]], rounds: int, clock: Callable[[], float] = time.process_time
+    ways: Mapping[str, Callable[[], object]],
+    rounds: int,
+    clock: Callable[[], float] = time.process_time,
+    before: int = 1,
 ) -> dict[str, list[float]]:
-    """Seconds of each way in every round, in turns; all are done once before."""
+    """Seconds of each way in every round, in turns; all are done once, or so many times, `before`."""
     times: dict[str, list[float]] = {name: [] for name in ways}
-    for count in range(rounds + 1):
+    for count in range(before + rounds):
         for name, way in ways.items():
             began = clock()
             way()
-            if count:
+            if count >= before:
                 times[name].append(clock() - began)
     return times
 

@@ -2,22 +2,55 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from bench_lines import Line, Map
+from bench_lines import Line
 
-LIMIT = 420.0  # seconds, all tolerances of one program together; then it took more than the last try
+LIMIT = 420  # CPU seconds of one program, all tolerances together
 HEADERS = "cmeel-eigen"  # has the headers that aspher is compiled with
+SEARCH = """\
+import json, resource, sys, time
+import numpy as np
+resource.setrlimit(resource.RLIMIT_CPU, ({limit}, {limit} + 5))
+given = np.load(sys.argv[1])
+heights, load = given["heights"], float(given["load"])
+{attempt}
+def tried(exponent):
+    print(json.dumps({{"began": time.process_time()}}), flush=True)
+    seconds, error = attempt(10.0**exponent)
+    print(json.dumps({{"seconds": seconds, "error": error}}), flush=True)
+    return error <= given["wanted"]
+exponent = float(given["exponent"])
+if tried(exponent):
+    while tried(exponent := exponent + 0.5):
+        pass
+else:
+    while not tried(exponent := exponent - 0.5) and exponent > -14.0:
+        pass
+"""
+COLD = """
+def attempt(tolerance):
+    began = time.process_time()
+    p = solve(tolerance)
+    seconds = time.process_time() - began
+    reference = given["reference"]
+    return seconds, float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
+"""
 TAMAAS = """\
 import tamaas as tm
 tm.initialize(1)
 tm.set_log_level(tm.LogLevel.error)
+"""
+TAMAAS_COLD = f"""{TAMAAS}
 def solve(tolerance):
     model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
     model.E, model.nu = 1.0, 0.0
@@ -25,8 +58,8 @@ def solve(tolerance):
     solver.max_iter = 20000
     solver.solve(load)
     return model.traction
-"""
-ASPHER = """\
+{COLD}"""
+ASPHER_COLD = f"""\
 import aspher
 def solve(tolerance):
     gap = heights.max() - heights
@@ -34,76 +67,126 @@ def solve(tolerance):
         heights.shape[0], gap, load, coarsest=64, tol=tolerance, coarse_tol=1e-3, backend="periodic"
     )
     return np.asarray(found.pressure).reshape(heights.shape)
-"""
-SEARCH = """\
-import json, sys, time
-import numpy as np
-heights, reference = np.load(sys.argv[1]), np.load(sys.argv[2])
-load, wanted = float(sys.argv[3]), float(sys.argv[4])
-{solve}
-for quarter_decades in range(18, 60, 2):
-    began = time.process_time()
-    p = solve(10.0 ** (-0.25 * quarter_decades))
-    seconds = time.process_time() - began
-    error = float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
-    print(json.dumps({{"seconds": seconds, "error": error}}), flush=True)
-    if error <= wanted:
-        break
+{COLD}"""
+TAMAAS_SLIDING = f"""{TAMAAS}
+def attempt(tolerance):
+    model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
+    model.nu, model.E = 0.5, 3.0  # a shear modulus of 1: with another one its long-term modulus is wrong
+    times = given["relaxation_times"].tolist()
+    modulus, dt = float(given["modulus"]), 1.0 / len(heights)
+    solver = tm.MaxwellViscoelastic(model, heights.copy(), tolerance, dt, [modulus] * len(times), times)
+    solver.max_iter = 20000
+    seconds, errors, exact = [], [], given["friction"]
+    for step, friction in enumerate([np.nan, *exact]):
+        solver.time_step = dt if step else 1e-12  # the load is there at once
+        solver.surface[...] = np.roll(heights, step, axis=1).ravel()
+        began = time.process_time()
+        solver.solve(load)
+        seconds.append(time.process_time() - began)
+        p = model.traction
+        found = -float((p * np.roll(given["slope"], step, axis=1)).mean() / p.mean())
+        errors.append(abs(found / friction - 1.0))
+    half = len(errors) // 2 + 1
+    return float(np.median(seconds[half:])), max(errors[half:])
 """
 
 
-def cold_peers(directory: Path, heights: Map, reference: Map, load: float, error: float, ours: float) -> Iterator[Line]:
-    """CPU seconds of each to the pressure error, over `ours`; a program that cannot be installed is left out."""
-    for name, install, code in (("tamaas", _install_tamaas, TAMAAS), ("aspher", _install_aspher, ASPHER)):
-        python = directory / name / "bin" / "python"
+@dataclass(frozen=True)
+class Task:
+    """Work for a program: its `code` defines `attempt(tolerance) -> (seconds, error)`, with what is `given` to it; the
+    search begins at the tolerance `10**exponent`."""
+
+    program: str
+    code: str
+    exponent: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a program took [s] by the loosest tolerance with which its error was small enough; or, if it did not get
+    there, the longest try."""
+
+    reached: bool
+    seconds: float
+    error: float
+
+
+def compare_peers(
+    directory: Path, part: str, tasks: tuple[Task, ...], given: Mapping[str, Any], ours: float
+) -> Iterator[Line]:
+    """CPU seconds of each to the error `given["wanted"]`, over `ours`; one that fails is left out."""
+    for task in tasks:
         try:
-            if not python.exists():
-                subprocess.run([sys.executable, "-m", "venv", directory / name], check=True)
-                install(python)
-            tries = _search(python, code, heights, reference, load, error)
-        except subprocess.CalledProcessError as failure:
-            print(f"{name} is left out: {failure}")
+            found = _search(_installed(directory, task.program), task, given)
+        except (subprocess.CalledProcessError, OSError) as failure:
+            print(f"{part}: {task.program} is left out: {_last_line(failure)}")
             continue
-        yield from _told(name, tries, error, ours)
+        least = "" if found.reached else ", error not reached in time: more than"
+        if found.reached:
+            yield Line(part, f"{task.program}: error", found.error, "")
+        yield Line(part, f"{task.program}{least}", 1e3 * found.seconds, "ms")
+        yield Line(part, f"{task.program} over ours{least}", found.seconds / ours, "")
 
 
-def _told(name: str, tries: list[dict[str, float]], error: float, ours: float) -> Iterator[Line]:
-    if not tries:
-        yield Line("solve", f"{name} over double: more than", LIMIT / ours, "")
-        return
-    last = tries[-1]
-    reached = "" if last["error"] <= error else ", not reached in time"
-    yield Line("solve", f"{name}: pressure error{reached}", last["error"], "")
-    yield Line("solve", name, 1e3 * last["seconds"], "ms")
-    yield Line("solve", f"{name} over double{': more than' if reached else ''}", last["seconds"] / ours, "")
+def _last_line(failure: subprocess.CalledProcessError | OSError) -> str:
+    said = (getattr(failure, "stderr", None) or str(failure)).strip().splitlines()
+    return said[-1] if said else str(failure)
 
 
-def _search(python: Path, code: str, heights: Map, reference: Map, load: float, error: float) -> list[dict[str, float]]:
-    """What it took at smaller and smaller tolerances, until the error is reached or the time is over."""
+def _search(python: Path, task: Task, given: Mapping[str, Any]) -> Found:
+    """At smaller and smaller tolerances until the error is reached, or larger and larger ones until it is not."""
     with tempfile.TemporaryDirectory() as where:
-        files = [Path(where, "heights.npy"), Path(where, "reference.npy")]
-        for file, field in zip(files, (heights, reference), strict=True):
-            np.save(file, field)
-        words = list(map(str, (python, "-c", SEARCH.format(solve=code), *files, load, error)))
+        file = Path(where, "given.npz")
+        np.savez(file, exponent=task.exponent, **given)
+        words = [str(python), "-c", SEARCH.format(attempt=task.code, limit=LIMIT), str(file)]
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        try:
-            done = subprocess.run(
-                words, check=True, capture_output=True, text=True, env=environment, timeout=LIMIT
-            ).stdout
-        except subprocess.TimeoutExpired as late:
-            done = late.stdout.decode() if isinstance(late.stdout, bytes) else late.stdout or ""
-    return [json.loads(line) for line in done.splitlines() if line.startswith("{")]
+        done = subprocess.run(words, capture_output=True, text=True, env=environment)
+    if done.returncode not in (0, -signal.SIGXCPU):
+        raise subprocess.CalledProcessError(done.returncode, task.program, done.stdout, done.stderr)
+    return _judge([json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")], given["wanted"])
+
+
+def _judge(said: list[dict[str, float]], wanted: float) -> Found:
+    good = [one for one in said if one.get("error", np.inf) <= wanted]
+    if good:
+        cheapest = min(good, key=lambda one: one["seconds"])
+        return Found(True, cheapest["seconds"], cheapest["error"])
+    tries = [one["seconds"] for one in said if "seconds" in one]
+    began = [one["began"] for one in said if "began" in one]
+    unfinished = [LIMIT - began[-1]] if len(began) > len(tries) else []
+    return Found(False, max(tries + unfinished), np.inf)
+
+
+# -- environments ------------------------------------------------------------------------------------------------------
+
+
+def _installed(directory: Path, program: str) -> Path:
+    """The Python of a program's own environment, which is made if it is not there."""
+    place = directory / program
+    python, done = place / "bin" / "python", place / "installed"
+    if not done.exists():
+        _call(sys.executable, "-m", "venv", "--clear", place)
+        INSTALL[program](python)
+        done.touch()
+    return python
 
 
 def _install_tamaas(python: Path) -> None:
-    subprocess.run([python, "-m", "pip", "install", "-q", "tamaas"], check=True)
+    _call(python, "-m", "pip", "install", "-q", "tamaas")
 
 
 def _install_aspher(python: Path) -> None:
     """From source, with headers that another package has."""
     with tempfile.TemporaryDirectory() as where:
-        subprocess.run([python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS], check=True)
+        _call(python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS)
         zipfile.ZipFile(next(Path(where).glob("*.whl"))).extractall(where)
         include = Path(where, "cmeel.prefix", "include", "eigen3")
-        environment = {**os.environ, "CPATH": str(include)}
-        subprocess.run([python, "-m", "pip", "install", "-q", "aspher"], check=True, env=environment)
+        _call(python, "-m", "pip", "install", "-q", "aspher", more={"CPATH": str(include)})
+
+
+def _call(*words: object, more: Mapping[str, str] | None = None) -> None:
+    command = list(map(str, words))
+    subprocess.run(command, check=True, capture_output=True, text=True, env={**os.environ, **(more or {})})
+
+
+INSTALL: dict[str, Callable[[Path], None]] = {"tamaas": _install_tamaas, "aspher": _install_aspher}

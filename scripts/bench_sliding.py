@@ -3,13 +3,14 @@
 import argparse
 import statistics
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from bench_backward_euler import beside_peers
 from bench_cold import pair
 from bench_lines import Line, Map, interleave
+from bench_slid import slid
 from mpi4py import MPI
 
 from parcontact import job as jobs
@@ -24,6 +25,7 @@ from parcontact.steady_sliding.sliding import SteadySliding
 DEFAULT, EXACT = 5e-3, 5e-5  # tolerances of a job that gives none, and of one to compare with
 LARGER = (0.1, 0.05, 0.02, 0.01)
 ERROR = 1e-3  # of friction
+FEWEST = 8  # steps: the first ones are not like the others
 SLIDING = """\
 grid: {{points: {points}, size: 1.0e-3}}
 surface: {{shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: {short!r}, rms_slope: 0.02, seed: 1}}
@@ -41,10 +43,17 @@ def sliding_job(points: int, steps: int, tolerance: float = DEFAULT) -> jobs.Job
         return jobs.load(path)
 
 
-def slide(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
+def slide(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
+    """With twelve branches, and beside peers with eight."""
+    yield from _slide_a_compound(points, rounds)
+    if asked.peers is not None:
+        yield from beside_peers(points, asked.peers)
+
+
+def _slide_a_compound(points: int, rounds: int) -> Iterator[Line]:
     """Means over the second half of the steps: at the default tolerance, and at the largest one with which friction is
     nowhere wrong by more than ERROR."""
-    steps = 4 * rounds
+    steps = max(4 * rounds, FEWEST)
     half = steps // 2
     exact = _friction(slid(sliding_job(points, steps, EXACT))[1][half:])
     for tolerance in (DEFAULT, *LARGER):
@@ -66,19 +75,6 @@ def slide(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
 
 def _friction(rows: list[Row]) -> Map:
     return np.array([row.measures.friction for row in rows])
-
-
-def slid(planned: jobs.Job) -> tuple[March, list[Row], list[float]]:
-    """A run, its rows, and when each was done."""
-    march = March(scene.build(planned, Slab(MPI.COMM_SELF, *planned.grid.points)))
-    seen, clock = list[Row](), list[float]()
-
-    def note(now: March) -> None:
-        seen.append(now.row)
-        clock.append(time.process_time())
-
-    run(march, [note])
-    return march, seen, clock
 
 
 def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:

@@ -29,9 +29,9 @@ SMALL = {
     "ablation": Small(["--points", "128", "--rounds", "1", "--picture", "PICTURE"], r"at equal iterations", TIMED),
     "bench_checkpoint": Small(["--points", "64", "--rounds", "1", "--branches", "2"], r"ratio \d", TIMED),
     "bench": Small(
-        ["--points", "64", "--rounds", "2", "--json", "bench.json"],
+        ["--points", "64", "--rounds", "1", "--json", "bench.json"],
         r"(?s)double: operator calls +[23]\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
-        r"curve: the most of them +\d\d[. ].*2 ranks over .*planned",
+        r"curve: the most of them +\d\d[. ].*info.*in all.*planned.*each branch.*solve: speed of 2 ranks",
     ),
     "check_plan": Small(
         ["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED
