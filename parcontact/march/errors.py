@@ -1,15 +1,46 @@
-"""The error budget of a step: what the step shows, with what is known of the run."""
+"""The error budget of a step: what the step shows, with what is known of the run.
 
-from dataclasses import dataclass
+What the embedded pair shows changes slowly while steps are alike: then it is looked at in every few of them only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from ..job import Rough
 from ..job.timeline import Step
 from ..physics.body import Trial, ZenerBody
 from ..physics.budget import ErrorBudget, Known, Seen, estimate, time_error
 from ..physics.embedded import Embedded, Look
+from ..physics.entries import Entry
 from ..physics.measures import Measures
 from ..scene import Scene
 from ..solve.contact import Contact
+
+NAME = "budget/look"  # in a checkpoint
+NO_LOOK = Look(0.0, 0.0)
+ALIKE_STEPS = 4  # of one stage and one length, to which one look at the embedded pair applies at most
+
+
+@dataclass(frozen=True)
+class LastLook:
+    """At the embedded pair, in a step of this stage and length [s]; it stands for so many steps `so_far`."""
+
+    stage: float = -1.0
+    dt: float = 0.0
+    so_far: float = 0.0
+    look: Look = NO_LOOK
+
+    def stands_for(self, step: Step) -> bool:
+        """Whether what it has shown applies to one more step."""
+        return (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < ALIKE_STEPS
+
+    @property
+    def numbers(self) -> list[float]:
+        """As a checkpoint has them."""
+        return [self.stage, self.dt, self.so_far, *astuple(self.look)]
 
 
 @dataclass(frozen=True)
@@ -22,7 +53,7 @@ class Estimate:
 
 
 class Errors:
-    """Estimates of the steps of one scene; allocates nothing."""
+    """Estimates of the steps of one scene; allocates nothing, remembers the last look."""
 
     def __init__(self, scene: Scene) -> None:
         grid, material, self.slab = scene.job.grid, scene.material, scene.slab
@@ -34,14 +65,14 @@ class Errors:
             scene.job.numerics.integrator == "exponential",
         )
         self._slope_unit = scene.units.height / scene.units.length
+        self._pressure_unit = scene.units.pressure
         cell = grid.dx / scene.units.length
         self._pair = Embedded(self.slab, material, cell) if isinstance(material, ZenerBody) else None
+        self._last = self._before = LastLook()
 
     def of(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Estimate:
         """That of a step just committed; collective."""
-        look = Look(0.0, 0.0)
-        if self._pair is not None:
-            look = self._pair.look(step.dt, trial, contact.p, contact.u)
+        look = self._look(step, trial, contact, measures)
         if measures.contact_area == 0.0:
             if step.judge is not None and self._pair is not None:
                 look = self._pair.look_without_load(step.dt, trial)
@@ -56,3 +87,30 @@ class Errors:
             measures.contact_area_corrected,
         )
         return Estimate(estimate(self.known, seen, self.slab.points), time_error(self.known, seen))
+
+    def take_back(self) -> None:
+        """Forget the look at a step that is made anew."""
+        self._last = self._before
+
+    def entries(self) -> dict[str, Entry]:
+        """The last look, for a checkpoint; none of a body without a memory."""
+        return {} if self._pair is None else {NAME: Entry(np.array(self._last.numbers))}
+
+    def restore(self, numbers: Mapping[str, Any]) -> None:
+        """Go on from the arrays of a checkpoint; one that has no look is followed by a new one."""
+        if NAME in numbers:
+            stage, dt, so_far, *look = numbers[NAME].tolist()
+            self._last = LastLook(stage, dt, so_far, Look(*look))
+
+    def _look(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Look:
+        """What the pair shows of a step, or of the one like it that was looked at last; collective."""
+        self._before = self._last
+        if self._pair is None or measures.contact_area == 0.0:
+            self._last = LastLook()
+        elif self._last.stands_for(step):
+            self._last = replace(self._last, so_far=self._last.so_far + 1.0)
+        else:
+            load = measures.pressure * self.slab.points / (trial.alpha * self._pressure_unit)
+            look = self._pair.look(step.dt, trial, contact.p, contact.u, load, measures.contact_area)
+            self._last = LastLook(float(step.stage), step.dt, 1.0, look)
+        return self._last.look

@@ -100,11 +100,12 @@ class March:
 
     def entries(self) -> dict[str, Entry]:
         """Everything remembered after the last step, by names `part/name`; maps are the run's own, not copies."""
-        return {**state.entries(self.scene, self.state), **self._chosen_entries()}
+        return {**state.entries(self.scene, self.state), **self._chosen_entries(), **self._errors.entries()}
 
     def restore(self, contents: Contents) -> None:
         """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
         restored = state.restore(self.scene, self.state, contents)
+        self._errors.restore(contents.numbers)
         if self.chosen is not None:
             self.chosen = self.scene.job.chosen_steps(contents.numbers)
         self.begin_with(replace(restored, row=self._complete(restored.row)))
@@ -146,6 +147,7 @@ class March:
         shorter = step.judge(step, self.scene.slab.agree(error.step))
         if shorter is not None and isinstance(self.scene.material, ZenerBody):
             self.scene.material.take_back(self._kept())
+            self._errors.take_back()
         return shorter
 
     def _chosen_entries(self) -> dict[str, Entry]:

@@ -91,25 +91,38 @@ def edges(p, above, cyclic):
 def embedded(branches, decay, increment, gain, p, u, heights, offset, first, stride):
     """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, and of p
     times the squared difference of the heights on both sides, those of `heights(i - offset)`, cyclic.
+
+    Points without pressure are passed over: each run of those with pressure is looked at for itself.
     """
     count, ny, nx = branches.shape
     load, apart, size, slope = 0.0, 0.0, 0.0, 0.0
-    start = offset % nx
-    here, e = np.empty(nx, heights.dtype), np.empty(nx, p.dtype)
+    back = (-1 - offset) % nx
+    e = np.empty(nx, p.dtype)
     for j in range(first, ny, stride):
-        here[start:] = heights[j, : nx - start]
-        here[:start] = heights[j, nx - start :]
-        for i in range(nx):
-            e[i] = gain * increment[j, i]
-        for k in range(count):
-            for i in range(nx):
-                e[i] += decay[k] * branches[k, j, i]
-        for i in range(nx):
-            rise = here[i + 1 if i + 1 < nx else 0] - here[i - 1]
-            load += p[j, i]
-            apart += p[j, i] * e[i] * e[i]
-            size += p[j, i] * u[j, i] * u[j, i]
-            slope += p[j, i] * rise * rise
+        end = 0
+        while end < nx:
+            start = end
+            while start < nx and not p[j, start] > 0.0:
+                start += 1
+            end = start
+            while end < nx and p[j, end] > 0.0:
+                end += 1
+            here, moved, flat, run = p[j, start:end], increment[j, start:end], u[j, start:end], e[start:end]
+            for i in range(here.size):
+                run[i] = gain * moved[i]
+            for k in range(count):
+                branch = branches[k, j, start:end]
+                for i in range(here.size):
+                    run[i] += decay[k] * branch[i]
+            for i in range(here.size):
+                load += here[i]
+                apart += here[i] * run[i] * run[i]
+                size += here[i] * flat[i] * flat[i]
+            for i in range(start, end):
+                left = i + back if i + back < nx else i + back - nx
+                right = left + 2 if left + 2 < nx else (left + 2) % nx
+                rise = heights[j, right] - heights[j, left]
+                slope += p[j, i] * rise * rise
     return load, apart, size, slope
 
 
