@@ -11,6 +11,8 @@
     traffic  what passes through memory in a cold iteration and in a sliding step, loop by loop, counted on one rank
     scale    a transform, a cold solve and a sliding step on two ranks, over one, by part; and what memory lets at most
     memory   bytes of a run as they are planned and held, and in maps
+    sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
+    large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
 
 Operator calls are those on the finest grid, coarser ones counted by their share of its points. Times of one process are
 CPU times, those of `march`, `scale` and `start` wall times. What is compared takes turns, round by round; shown are the
@@ -34,6 +36,7 @@ from bench_lines import Line
 from bench_march import march
 from bench_program import start
 from bench_scale import on_two_ranks, scale, show_inside, traffic
+from bench_sizes import large, sizes
 from bench_sliding import held, slide, steady
 
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
@@ -45,6 +48,8 @@ PARTS = {
     "start": start,
     "traffic": traffic,
     "memory": held,
+    "sizes": sizes,
+    "large": large,
 }
 ON_TWO_RANKS = {"march": march, "scale": scale}
 

@@ -31,10 +31,10 @@ def tried(exponent):
     return error <= given["wanted"]
 exponent = float(given["exponent"])
 if tried(exponent):
-    while tried(exponent := exponent + 0.5):
+    while tried(exponent := exponent + 0.25):
         pass
 else:
-    while not tried(exponent := exponent - 0.5) and exponent > -14.0:
+    while not tried(exponent := exponent - 0.25) and exponent > -14.0:
         pass
 """
 COLD = """

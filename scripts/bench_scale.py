@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from bench_cold import LOAD, MODULUS, Cold, pair
+from bench_cold import Cold, pair
 from bench_lines import Line
 from bench_meter import TRANSFORM, Meter
 from bench_sliding import sliding_job
@@ -23,7 +23,6 @@ from parcontact.march.rest import steps_to_make
 from parcontact.march.step import March
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
-from parcontact.solve.contact import MeanPressure
 
 WARM = 6  # first steps of a slide, which are not like the others
 SMALL = 0.05  # maps an iteration: loops that pass over less are told together
@@ -58,9 +57,9 @@ def traffic(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
     with Meter().in_place() as meter:
         surface = Cold(points)
         solver = surface.solver(TOLERANCE)
-        start, load = surface.start(solver), MeanPressure(LOAD * MODULUS)
+        start = surface.start(solver)
         meter.clear()
-        iterations = solver.solve(surface.heights, load, start).iterations
+        iterations = surface.go_on(solver, start).iterations
         yield from _passes("a cold iteration", meter, iterations, points)
         slide = Slide(points, MPI.COMM_SELF)
         for _ in range(WARM):
