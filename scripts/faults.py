@@ -26,6 +26,7 @@ from typing import Any
 
 import disturbances
 import h5py
+import outside
 from mpi4py import MPI
 
 from parcontact.errors import InputError
@@ -77,10 +78,13 @@ class Campaign:
 
     def start(self, out: Path) -> subprocess.Popen[str]:
         command = [BIN / "mpirun", "-n", str(self.ranks), BIN / "parcontact", self.job, "--quiet", "--out", out]
-        # MPI has left marks in the environment of this process that would confuse mpirun.
-        clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
         return subprocess.Popen(
-            list(map(str, command)), env=clean, stdout=self.log, stderr=self.log, text=True, start_new_session=True
+            list(map(str, command)),
+            env=outside.environment(),
+            stdout=self.log,
+            stderr=self.log,
+            text=True,
+            start_new_session=True,
         )
 
     def run(self, out: Path) -> int:

@@ -32,6 +32,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
+import outside
 from hostile_jobs import write_job
 from mpi4py import MPI
 
@@ -105,11 +106,16 @@ def run_process(path: Path, ranks: int) -> Iterator[str]:
     mpirun = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks > 1 else []
     before = listing(path.parent)
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
     command = [*mpirun, sys.executable, "-m", "parcontact", path.name, "--quiet", "--wall", "20", "--out", "out"]
     try:
         done = subprocess.run(
-            command, cwd=path.parent, env=clean, capture_output=True, text=True, timeout=WALL_SECONDS, errors="replace"
+            command,
+            cwd=path.parent,
+            env=outside.environment(),
+            capture_output=True,
+            text=True,
+            timeout=WALL_SECONDS,
+            errors="replace",
         )
     except subprocess.TimeoutExpired:
         yield f"hangs on {ranks} ranks"

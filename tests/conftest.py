@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +14,8 @@ import hypothesis
 import pytest
 from _pytest.config import create_terminal_writer
 from mpi4py import MPI
+
+from parcontact import __main__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,16 +48,28 @@ def shared_path(tmp_path: Path) -> Path:
     return WORLD.bcast(tmp_path)
 
 
+Main = Callable[..., tuple[int, str, str]]
+
+
 class RunParcontact(Protocol):
     def __call__(
         self, args: Sequence[str | Path], ranks: int = 1, cwd: Path | None = None, timeout: float = 240.0
     ) -> subprocess.CompletedProcess[str]: ...
 
 
+def environment_outside_mpi() -> dict[str, str]:
+    """The environment without the marks that MPI has left in it, which would confuse another mpirun.
+
+    An mpirun whose ranks have ended with an error ends at once, too: it would give each 3 s and again 3 s to do so.
+    """
+    clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    return clean | {"OMPI_MCA_odls_base_sigkill_timeout": "0", "PRTE_MCA_odls_base_sigkill_timeout": "0"}
+
+
 @pytest.fixture
 def outside_mpi() -> dict[str, str]:
-    """The environment without the marks that MPI has left in it, which would confuse another mpirun."""
-    return {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    """The environment of a process outside MPI."""
+    return environment_outside_mpi()
 
 
 @pytest.fixture
@@ -76,6 +90,22 @@ def run_parcontact(tmp_path: Path, outside_mpi: dict[str, str]) -> RunParcontact
             out, err = process.communicate(timeout=30.0)
             pytest.fail(f"{' '.join(command)} took more than {timeout:g} s\n{out}\n{err}")
         return subprocess.CompletedProcess(command, process.returncode, out, err)
+
+    return run
+
+
+@pytest.fixture
+def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Main:
+    """The command line in this process: exit code, output, errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str | Path) -> tuple[int, str, str]:
+        try:
+            code = __main__.main([str(word) for word in words])
+        except SystemExit as error:
+            code = int(error.code or 0)
+        said = capsys.readouterr()
+        return code, said.out, said.err
 
     return run
 

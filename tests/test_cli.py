@@ -3,7 +3,7 @@
 import csv
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from conftest import RunParcontact
+from conftest import Main, RunParcontact
 
-from parcontact import __main__
 from parcontact.command.values import wall_seconds
 from parcontact.run import watch
 
@@ -28,24 +27,6 @@ JOB: dict[str, Any] = {
     ],
 }
 STEPS = 9  # a jump, 4 of pressing, 4 of sliding
-
-Main = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Main:
-    """The command line in this process: exit code, output, errors."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words: str | Path) -> tuple[int, str, str]:
-        try:
-            code = __main__.main([str(word) for word in words])
-        except SystemExit as error:
-            code = int(error.code or 0)
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return run
 
 
 def job(path: Path, **changes: Any) -> Path:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from conftest import WORLD
+from conftest import WORLD, environment_outside_mpi
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
 
@@ -21,10 +21,10 @@ JOB = """
 grid: {points: [32, 24], size: [1.0e-3, 0.75e-3]}
 surface: [{shape: wave, amplitude: 2.0e-6, waves: [3, 2]}, {shape: wave, amplitude: 1.0e-6, waves: [-2, 3]}]
 material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0e-3}]}
-history: [{pressure: 1.0e5, velocity: 0.1, distance: 3.125e-4, cells_per_step: 0.025}]
+history: [{pressure: 1.0e5, velocity: 0.1, distance: 3.125e-4, cells_per_step: 0.0625}]
 output: {fields: [pressure], every: 7}
 checkpoint: {every: 5}
-"""  # 400 steps and a jump
+"""  # 160 steps and a jump
 SECONDS = 15.0  # in which a run that was hit must have ended
 BAD_INPUT, AGAIN = 2, 3
 
@@ -39,10 +39,9 @@ class Runs:
     def start(self, out: Path, ranks: int = 2, program: Sequence[str] = ("-m", "parcontact")) -> subprocess.Popen[str]:
         launch = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks > 1 else []
         command = [*launch, sys.executable, *program, "job.yaml", "--quiet", "--out", str(out)]
-        clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-        pipe = subprocess.PIPE
+        pipe, outside = subprocess.PIPE, environment_outside_mpi()
         process = subprocess.Popen(
-            command, cwd=self.where, env=clean, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+            command, cwd=self.where, env=outside, stdout=pipe, stderr=pipe, text=True, start_new_session=True
         )
         self.started.append(process)
         return process

@@ -1,6 +1,7 @@
 """The plan of a job: memory to the byte, steps that stand for others, scaling; counts are checked, never times."""
 
 import re
+import shutil
 import subprocess
 import time
 from dataclasses import replace
@@ -13,7 +14,7 @@ import pytest
 from marching import begun, marched
 from mpi4py import MPI
 
-from parcontact import __main__, scene
+from parcontact import __main__, private, scene
 from parcontact.command import words
 from parcontact.effects import decisions
 from parcontact.job import Job
@@ -388,6 +389,9 @@ def test_steady_states_beside_a_history() -> None:
 def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:
     """As a user reads it, for the steady section of a job with a history; by two processes too."""
     monkeypatch.chdir(tmp_path)
+    compiled = private.directory("compiled")
+    assert compiled is not None
+    shutil.copytree(compiled, tmp_path / "cache" / "parcontact" / "compiled")  # processes need not compile anew
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     planned = job(grid={"points": 20}, steady={"velocities": [1e-2, 0.1]})
     (tmp_path / "job.yaml").write_text(planned.resolved())

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from conftest import environment_outside_mpi
 from mpi4py import MPI
 
 from parcontact import private
@@ -112,9 +113,10 @@ def common() -> Iterator[Path]:
 
 def as_nobody(words: list[str | Path], cwd: Path, home: Path | None, **more: str) -> subprocess.CompletedProcess[str]:
     """A command of a user who may write nowhere but in `cwd`."""
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_", "XDG_"))}
-    clean = {key: value for key, value in clean.items() if key != "HOME"} | more
-    environment = clean | ({} if home is None else {"HOME": str(home)})
+    clean = {
+        key: value for key, value in environment_outside_mpi().items() if key != "HOME" and not key.startswith("XDG_")
+    }
+    environment = clean | more | ({} if home is None else {"HOME": str(home)})
     command = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", *map(str, words)]
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120.0)
 
@@ -223,7 +225,7 @@ def test_plans_that_somebody_prepared_are_not_read(cache: Path, tmp_path: Path) 
 
 def test_mpirun_without_a_home() -> None:
     """It takes the user's own, never a directory that others may fill."""
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    clean = environment_outside_mpi()
     clean.pop("HOME")
     words: list[str | Path] = [BIN / "mpirun", "-n", "1", sys.executable, "-c", "import os; print(os.environ['HOME'])"]
     said = subprocess.run(words, env=clean, capture_output=True, text=True)

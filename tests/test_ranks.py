@@ -112,7 +112,7 @@ def test_all_ranks_see_the_same_row(path: Path, comm: MPI.Intracomm) -> None:
     assert len({repr((other.measures, other.iterations, other.certificate)) for other in comm.allgather(row)}) == 1
 
 
-@pytest.mark.parametrize("grid", ["even", "odd, free", "few rows"])
+@pytest.mark.parametrize("grid", ["odd, free", "few rows"])
 def test_files_of_five_ranks(path: Path, tmp_path: Path, run_parcontact: "RunParcontact", grid: str) -> None:
     """As a user runs it, against this process alone."""
     settings = [word for override in GRIDS[grid] for word in ("--set", override)]

@@ -16,6 +16,7 @@ TITLES = {
 }
 MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
 COLOURS = {"exponential": "C0", "backward-euler": "C1"}
+ALIKE = 1.01  # ratio of errors below which one number is all that their axis has to show
 BAND = 5.0  # times the upper edge of the grey band over its lower one
 LEAST = 1e-7  # smaller errors are drawn here
 FALL = 0.7  # of the error from one corner of the front to the next that is named
@@ -120,10 +121,13 @@ def _work_precision(path: Path, points: Mapping[str, Sequence[Point]]) -> Path:
     for column, (quantity, found) in enumerate(drawn.items()):
         for row, (cost, label) in enumerate(costs):
             axes = grid[row][column]
-            for integrator, colour in COLOURS.items():
-                mine = [one for one in found if one.integrator == integrator]
-                axes.scatter(*_places(mine, cost), s=14, color=colour, label=integrator if mine else None)
             axes.set(xscale="log", yscale="log", xlabel=label)
+            errors = [error for error in _places(found, cost)[1] if math.isfinite(error)]
+            if max(errors) < ALIKE * min(errors):
+                axes.set_ylim(0.5 * min(errors), 2.0 * max(errors))
+            for integrator, colour in COLOURS.items():
+                if mine := [one for one in found if one.integrator == integrator]:
+                    axes.scatter(*_places(mine, cost), s=14, color=colour, label=integrator)
             axes.grid(alpha=0.3)
             axes.margins(x=0.22, y=0.08)
             _per_cents(axes)

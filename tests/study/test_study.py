@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import RunParcontact
+from conftest import Main, RunParcontact
 from mpi4py import MPI
 
 from parcontact.job import load
@@ -152,13 +152,13 @@ def rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_goes_on_case_by_case(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_path: Path) -> None:
     """Stopped by the file `stop`, the same command goes on with what lacks, on another number of ranks too."""
     job = tmp_path / "wave.yaml"
     job.write_text(WAVE.replace("[32, 64, 128]", "[32, 64]").replace(", backward-euler", ""))
-    whole = run_parcontact(["study", job, "--out", "whole"])
-    assert whole.returncode == 0, whole.stderr
-    assert "for 5 %: mesh" in whole.stdout
+    code, out, err = main("study", job, "--out", "whole")
+    assert code == 0, err
+    assert "for 5 %: mesh" in out
     table = rows(tmp_path / "whole" / "study.csv")
     assert len(table) == 4
     assert all(float(row["error_mu_dyn"]) < 0.1 for row in table)
@@ -166,8 +166,8 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, tmp_path: Path) -> 
         assert (tmp_path / "whole" / name).stat().st_size > 100
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "stop").touch()
-    stopped = run_parcontact(["study", job])
-    assert (stopped.returncode, "stopped after 0 of 4 cases" in stopped.stdout) == (3, True), stopped.stderr
+    code, out, err = main("study", job)
+    assert (code, "stopped after 0 of 4 cases" in out) == (3, True), err
     kept = (tmp_path / "whole" / "study.csv").read_text().splitlines(keepends=True)
     (tmp_path / "out" / "study.csv").write_text("".join(kept[:3]))
     again = run_parcontact(["study", job], ranks=2)
@@ -176,8 +176,8 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, tmp_path: Path) -> 
     for ours, theirs in zip(rows(tmp_path / "out" / "study.csv"), table, strict=True):
         for name in ("mu_max", "mu_dyn", "area_corrected"):  # of one solve to 1e-7 each
             assert float(ours[name]) == pytest.approx(float(theirs[name]), rel=1e-5)
-    changed = run_parcontact(["study", job, "--set", "material.modulus_inf=3e5"])
-    assert "4 cases, 0 of them are there already" in changed.stdout
+    changed = main("study", job, "--set", "material.modulus_inf=3e5")[1]
+    assert "4 cases, 0 of them are there already" in changed
 
 
 def test_a_case_that_cannot_be(run_parcontact: RunParcontact, tmp_path: Path) -> None:
