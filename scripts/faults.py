@@ -35,6 +35,7 @@ from parcontact.record import checkpoint
 
 BIN = Path(sys.executable).parent
 PATIENCE = 60.0  # seconds after which a run that was hit hangs
+DISTANCE = 3.5e-4  # m
 JOB = """
 title: a run that is killed
 grid: {points: [96, 90], size: [1.0e-3, 0.9375e-3]}
@@ -49,7 +50,7 @@ material:
     - {modulus: 1.0e6, relaxation_time: 1.0e-2}
 history:
   - {name: press, pressure: 1.0e5, duration: 1.0e-3, time_step: {first: 1.0e-5, growth: 1.5}}
-  - {name: slide, pressure: 1.0e5, velocity: 0.3, distance: 3.5e-4, cells_per_step: 0.25}
+  - {name: slide, pressure: 1.0e5, velocity: 0.3, distance: DISTANCE, cells_per_step: 0.25}
 output: {fields: [pressure, gap], every: 10, energy: true}
 checkpoint: {every: 4, keep: 2}
 numerics: {tolerance: 1.0e-3}
@@ -61,13 +62,13 @@ class Campaign:
 
     seconds = PATIENCE  # of an undisturbed run
 
-    def __init__(self, where: Path, ranks: int, seed: int) -> None:
+    def __init__(self, where: Path, ranks: int, seed: int, shorter: int) -> None:
         self.where, self.ranks = where, ranks
         self.random = random.Random(seed)
         self.count: Counter[str] = Counter()
         self.bad: list[str] = []
         self.job = where / "job.yaml"
-        self.job.write_text(JOB)
+        self.job.write_text(JOB.replace("DISTANCE", repr(DISTANCE / shorter)))
         self.whole = where / "whole"
         self.log = (where / "output.txt").open("w")
         began = time.monotonic()
@@ -270,6 +271,7 @@ def arguments() -> argparse.Namespace:
         ("--backs", 10, "runs that must fall back to an older checkpoint"),
         ("--fills", 10, "runs on a disk that is too small (root only)"),
         ("--ranks", 2, "ranks of each run"),
+        ("--shorter", 1, "times as short a slide"),
         ("--seed", 0, "of all that is chosen"),
     ):
         parser.add_argument(name, type=int, default=value, help=what)
@@ -280,7 +282,7 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     chosen = arguments()
     where = Path(tempfile.mkdtemp(prefix="faults-"))
-    campaign, began = Campaign(where, chosen.ranks, chosen.seed), time.monotonic()
+    campaign, began = Campaign(where, chosen.ranks, chosen.seed, chosen.shorter), time.monotonic()
     campaign.damage(chosen.flips)
     trials: list[Callable[[], None]] = [partial(campaign.fall_back, trial) for trial in range(chosen.backs)]
     trials += [partial(campaign.fill, trial) for trial in range(chosen.fills if os.geteuid() == 0 else 0)]

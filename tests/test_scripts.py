@@ -42,7 +42,9 @@ SMALL = {
     "error_budget": Small(["64", "4"], r"(?s)rough, exp .*estimates are 0\.\d+ to \d\.?\d* times the true errors"),
     "folded_branches": Small(["64"], r"(?m)^ +0\.001 +5 "),
     "convergence": Small(["32", "64"], r"order +-?[\d.]+ +2\.\d\d +1\.[5-9]"),
-    "faults": Small(["--trials", "1", "--around", "1", "--flips", "4", "--backs", "1", "--fills", "0"], r""),
+    "faults": Small(
+        ["--trials", "1", "--around", "1", "--flips", "4", "--backs", "1", "--fills", "0", "--shorter", "4"], r""
+    ),
     "fuzz_jobs": Small(["--jobs", "40", "--processes", "1"], r"(?m)^40 jobs: 0 with faults; "),
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^2\d pages in pages"),
