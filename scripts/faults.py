@@ -79,14 +79,8 @@ class Campaign:
 
     def start(self, out: Path) -> subprocess.Popen[str]:
         command = [BIN / "mpirun", "-n", str(self.ranks), BIN / "parcontact", self.job, "--quiet", "--out", out]
-        return subprocess.Popen(
-            list(map(str, command)),
-            env=outside.environment(),
-            stdout=self.log,
-            stderr=self.log,
-            text=True,
-            start_new_session=True,
-        )
+        words, env = list(map(str, command)), outside.environment()
+        return subprocess.Popen(words, env=env, stdout=self.log, stderr=self.log, text=True, start_new_session=True)
 
     def run(self, out: Path) -> int:
         process = self.start(out)
