@@ -3,7 +3,6 @@
 import csv
 import fcntl
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,9 +13,11 @@ from mpi4py import MPI
 from parcontact.__main__ import main
 from parcontact.errors import RunError
 from parcontact.job import Case, Job, load_cases
+from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
+from parcontact.plan import side_by_side, trial
 from parcontact.record import info_directory, sweep_table
-from parcontact.run import sweep
+from parcontact.run import sweep, watch
 
 JOB = """\
 grid: {points: 34, size: 1.0e-3}
@@ -44,7 +45,7 @@ def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> list[di
 
 
 def go(cases: tuple[Case, ...], act: Callable[[Job, Slab], int]) -> int:
-    return sweep.run(cases, cases, lambda job: Slab(MPI.COMM_SELF, *job.grid.points), act, quiet=True)
+    return sweep.run(cases, cases, Groups(MPI.COMM_SELF), lambda job, slab, _: act(job, slab), sweep.Manner(quiet=True))
 
 
 def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, list[int]]:
@@ -77,16 +78,16 @@ def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> Non
 def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:
     begun: list[int] = []
 
-    def slab_of(job: Job) -> Slab:
-        return Slab(MPI.COMM_SELF, *job.grid.points)
-
-    def act(job: Job, slab: Slab) -> int:
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
         begun.append(1)
         return 0
 
-    assert sweep.run(cases, cases, slab_of, act, limit=time.time() + 1.0) == 3
-    assert not begun
-    assert capsys.readouterr().out == "stopped before case 0: the wall time is nearly used up; run again to go on\n"
+    for seconds, code in ((1.0, 3), (60.0, 0)):
+        manner = sweep.Manner(limit=watch.limit(watch.age() + seconds, {}))
+        assert sweep.run(cases[:2], cases[:2], Groups(MPI.COMM_SELF), act, manner) == code
+        assert len(begun) == (0 if code else 2)
+    said = capsys.readouterr().out.splitlines()[0]
+    assert said == "stopped before case 0: the wall time is nearly used up; run again to go on"
 
 
 def test_a_stop_file_ends_the_sweep_between_cases(cases: tuple[Case, ...]) -> None:
@@ -94,6 +95,65 @@ def test_a_stop_file_ends_the_sweep_between_cases(cases: tuple[Case, ...]) -> No
     Path("out/job/stop").touch()
     assert seeds_done(cases, {}) == (3, [])
     assert not Path("out/job/stop").exists()
+
+
+@pytest.mark.mpi
+def test_groups_of_ranks_take_cases_by_turns(
+    shared_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each unfinished case is done by one group, as many by each; a failure is told and does not stop the others, and
+    what stops one before a case stops all, and is removed only then."""
+    monkeypatch.chdir(shared_path)
+    world = MPI.COMM_WORLD
+    if world.rank == 0:
+        (shared_path / "job.yaml").write_text(JOB)
+    world.Barrier()
+    cases, groups = load_cases("job.yaml"), Groups(world, 2)
+    begun: list[int] = []
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        number = int(job.output.directory.name)
+        begun.append(number)
+        assert slab.comm.size == sum(rank * groups.count // world.size == groups.number for rank in range(world.size))
+        shown = [shows(f"step {number}: {text}") for text in ("odd", "odd", *["rare"] * (number == 5))]
+        assert any(shown) == (groups.count == 1 and number in (0, 5))
+        if number == 3:
+            raise RunError("it fell over")
+        return 0
+
+    assert sweep.run(cases, cases, groups, act) == 1
+    assert groups.from_all(begun) == [list(range(6))[number :: groups.count] for number in range(groups.count)]
+    said = capsys.readouterr()
+    told = "".join(world.allgather(said.err)).splitlines()
+    assert "parcontact: case 3: it fell over" in told
+    assert sum(line.endswith(": odd (cases 0-5)") for line in told) == 1
+    assert ("warning: step 5: rare (case 5)" in told) == (groups.count > 1)  # else it was shown at once
+    assert ("case 4: done\n" in "".join(world.allgather(said.out))) == (groups.count > 1)
+    if world.rank == 0:
+        assert [row["state"] for row in table()] == ["-", "-", "-", "failed", "-", "-"]
+        Path("out/job/stop").touch()
+    world.Barrier()
+    assert sweep.run(cases, cases, groups, act) == 3
+    assert begun == list(range(6))[groups.number :: groups.count]
+    assert not Path("out/job/stop").exists()
+
+
+def test_unfinished_cases_are_dealt_first(cases: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep_table, "state", lambda case: "done" if case.number in (0, 3) else "begun")
+    assert sweep.unfinished_first(cases) == [1, 2, 4, 5, 0, 3]
+    assert sweep.to_do(cases, afresh=False) == [cases[number].job for number in (1, 2, 4, 5)]
+    assert len(sweep.to_do(cases, afresh=True)) == 6
+
+
+def test_how_many_cases_are_done_at_a_time(cases: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """One on each rank as long as cases are small, there are that many, and they fit into the memory."""
+    jobs = [case.job for case in cases]
+    assert [side_by_side.count(jobs, ranks) for ranks in (1, 2, 4, 40)] == [1, 2, 4, 6]
+    assert side_by_side.count(jobs[:1], 4) == 1
+    large = jobs[0].model_copy(update={"grid": jobs[0].grid.model_copy(update={"points": (2048, 1024)})})
+    assert side_by_side.count([*jobs, large], 4) == 1
+    monkeypatch.setattr(trial, "free_bytes", lambda: 8 * 34 * 34 * 10)
+    assert side_by_side.count(jobs, 4) == 1
 
 
 def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:
@@ -122,12 +182,13 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
     before = (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns
     done = run_parcontact(["job.yaml"], ranks=2)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "case 5: history.1.velocity = 0.1, surface.seed = 3 (of 6)" in done.stdout
-    assert "out/job/cases/004: finished before" in done.stdout
+    assert "case 5: history.1.velocity = 0.1, surface.seed = 3 (of 6)\n" in done.stdout
+    assert "case 5: done\n" in done.stdout
     assert done.stdout.splitlines()[-1] == "results of all cases: out/job/sweep.csv"
     told = run_parcontact(["info", "out/job"], ranks=0)
     assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "  sweep of 6 cases: 6 done")
     assert (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns == before
+    assert "34 x 34 points on 1 rank\n" in (here / "cases" / "005" / "run.log").read_text()
     rows, means = table(directory=here), table("sweep_mean.csv", here)
     assert [row["state"] for row in rows] == ["done"] * 6
     assert [row["history.1.velocity"] for row in rows] == ["0.01"] * 3 + ["0.1"] * 3

@@ -7,67 +7,40 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..parallel.root import on_root
 from . import ranks
+from .cases import OF_A_CURVE, cases_of, each_case, overrides
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from ..job import Case, Job
+    from ..job import Job
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
+    from .cases import Shows
 
-    Act = Callable[[Job, Slab, Collection[str]], int]
-
-OF_A_CURVE = ("velocities", "pressures", "temperatures")
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: stopped early, run again
 
 
 def run(options: argparse.Namespace) -> int:
-    world = ranks.start()
+    return each_case(options, ranks.start(), _run)
+
+
+def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..run import runner
 
-    def act(job: Job, slab: Slab, told: Collection[str]) -> int:
-        chosen = runner.Options(options.quiet, options.restart, options.until, options.wall, told=told)
-        return runner.run(job, slab, chosen) if job.history else _curve(options, job, slab, told)
-
-    return _each_case(options, world, act)
+    if not job.history:
+        return _curve(options, job, slab, shows)
+    return runner.run(
+        job, slab, runner.Options(options.quiet, options.restart, options.until, options.wall, shows=shows)
+    )
 
 
 def steady(options: argparse.Namespace) -> int:
-    return _each_case(options, ranks.start(), lambda job, slab, told: _curve(options, job, slab, told))
+    return each_case(options, ranks.start(), _curve)
 
 
-def _each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
-    """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective.
-
-    The third argument of `act` are the warnings that were shown before, once for all cases.
-    """
-    from ..parallel.slab import Slab
-    from ..run import sweep, watch
-
-    cases, chosen = on_root(world, lambda: _cases(options))
-    if not cases[0].settings:
-        return act(cases[0].job, Slab(world, *cases[0].job.grid.points), ())
-    limit = watch.limit(getattr(options, "wall", None))
-    on_root(world, lambda: sweep.refuse_foreign(cases))
-    told = on_root(world, lambda: sweep.warn_once(chosen)) if runs and len(chosen) > 1 else ()
-
-    def act_on_case(job: Job, slab: Slab) -> int:
-        return act(job, slab, told)
-
-    return sweep.run(cases, chosen, lambda job: Slab(world, *job.grid.points), act_on_case, options.quiet, runs, limit)
-
-
-def _cases(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:
-    """All cases of a job, and those that the command line is about."""
-    from .. import job as jobs
-
-    cases = jobs.load_cases(options.job, _overrides(options))
-    return cases, jobs.choose(cases, options.case)
-
-
-def _curve(options: argparse.Namespace, job: Job, slab: Slab, told: Collection[str]) -> int:
+def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from .. import prediction
     from ..steady_sliding import curve
 
@@ -75,7 +48,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, told: Collection[s
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    code = curve.run(job, slab, wanted, options.quiet, options.restart, told)
+    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code
@@ -86,7 +59,7 @@ def check(options: argparse.Namespace) -> int:
     if ranks.is_root():
         from .. import job as jobs
 
-        cases, chosen = _cases(options)
+        cases, chosen = cases_of(options)
         job = chosen[0].job
         print(jobs.describe(job))
         if job.included:
@@ -146,25 +119,23 @@ def plan(options: argparse.Namespace) -> int:
 
 
 def theory(options: argparse.Namespace) -> int:
-    world = ranks.start()
+    return each_case(options, ranks.start(), _predict, runs=False)
+
+
+def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from .. import prediction
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..record.theory_settings import TheorySettings
 
-    def act(job: Job, slab: Slab, told: Collection[str]) -> int:
-        alone = Slab(MPI.COMM_SELF, *job.grid.points)
+    def write() -> Path:
+        rows = prediction.predict(job, Slab(MPI.COMM_SELF, *job.grid.points), options.gamma, options.waves)
+        return prediction.write(job, rows, TheorySettings(options.gamma, options.waves))
 
-        def write() -> Path:
-            rows = prediction.predict(job, alone, options.gamma, options.waves)
-            return prediction.write(job, rows, TheorySettings(options.gamma, options.waves))
-
-        path = on_root(world, write)
-        if slab.root and not options.quiet:
-            print(f"Persson's theory, gamma {options.gamma:g}, {options.waves} of waves: {path}", flush=True)
-        return DONE
-
-    return _each_case(options, world, act, runs=False)
+    path = on_root(slab.comm, write)
+    if slab.root and not options.quiet:
+        print(f"Persson's theory, gamma {options.gamma:g}, {options.waves} of waves: {path}", flush=True)
+    return DONE
 
 
 def fit(options: argparse.Namespace) -> int:
@@ -193,7 +164,7 @@ def study(options: argparse.Namespace) -> int:
     from ..parallel.slab import Slab
     from ..study import runner
 
-    job, words = _load(options, world), _overrides(options)
+    job, words = _load(options, world), overrides(options)
 
     def make(changes: Sequence[str]) -> Job:
         return on_root(world, lambda: jobs.load(options.job, [*words, *changes], options.case))
@@ -276,15 +247,4 @@ def _load(options: argparse.Namespace, world: MPI.Intracomm) -> Job:
     """Root reads the job; the others get what it found; collective."""
     from .. import job as jobs
 
-    return on_root(world, lambda: jobs.load(options.job, _overrides(options), options.case))
-
-
-def _overrides(options: argparse.Namespace) -> list[str]:
-    """What the command line changes in a job; the name of a directory is taken as it is, whatever YAML would read.
-
-    Velocities, pressures and temperatures of a friction curve are keys of the job, which then needs no history.
-    """
-    name = "".join(f"\\U{ord(letter):08x}" for letter in options.out or "")
-    asked = {key: getattr(options, key, ()) for key in OF_A_CURVE}
-    curve = [f"steady.{key}={list(values)!r}" for key, values in asked.items() if values]
-    return [*options.set, *curve, *([f'output.directory="{name}"'] if options.out is not None else [])]
+    return on_root(world, lambda: jobs.load(options.job, overrides(options), options.case))

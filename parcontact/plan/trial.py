@@ -51,7 +51,7 @@ def _feasible(job: Job, ranks: int, seconds: float) -> bool:
     per_point = PER_POINT * (PADDED if decisions.isolated(job).on else 1.0)
     calls = CALLS + (STEADY_START if decisions.steady_start(job).on else 0)
     quick = calls * per_point * points / ranks <= seconds
-    return quick and memory.total(job, ranks) * ranks <= SHARE * _free()
+    return quick and memory.total(job, ranks) * ranks <= SHARE * free_bytes()
 
 
 def _coarser(job: Job) -> Iterator[Job]:
@@ -72,7 +72,7 @@ def _coarser(job: Job) -> Iterator[Job]:
             return
 
 
-def _free() -> int:
+def free_bytes() -> int:
     """Bytes of memory that are free, as far as that is known."""
     try:
         facts = dict(line.split(":") for line in MEMINFO.read_text().splitlines())

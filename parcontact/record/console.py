@@ -26,6 +26,11 @@ def line(row: Row) -> str:
     )
 
 
+def always(text: str) -> bool:
+    """Every warning is shown."""
+    return True
+
+
 class Console:
     """Root's voice; the other ranks have `Silence` instead, so that no caller asks who it is."""
 
@@ -50,10 +55,10 @@ class Console:
             with suppress(OSError):
                 os.write(self._log, f"{stamp},{int(now % 1.0 * 1000):03d} {printable(text)}\n".encode())
 
-    def warn(self, text: str, told: bool = False) -> None:
-        """A message that is shown even to those who asked for quiet, unless they were told before."""
+    def warn(self, text: str, shown: bool = True) -> None:
+        """A message that is shown even to those who asked for quiet, or is for run.log only."""
         self.log(f"warning: {text}")
-        if not told:
+        if shown:
             self._write(f"warning: {printable(text)}", sys.stderr)
 
     def step(self, row: Row) -> None:
@@ -113,7 +118,7 @@ class Silence:
 
     def log(self, text: str) -> None: ...
 
-    def warn(self, text: str, told: bool = False) -> None: ...
+    def warn(self, text: str, shown: bool = True) -> None: ...
 
     def step(self, row: Row) -> None: ...
 

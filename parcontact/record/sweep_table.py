@@ -52,7 +52,7 @@ def fail(case: Case, reason: str) -> None:
 
 def _row(case: Case) -> dict[str, Any]:
     directory = case.job.output.directory
-    row: dict[str, Any] = {"case": case.number, **case.settings, "state": _state(case)}
+    row: dict[str, Any] = {"case": case.number, **case.settings, "state": state(case)}
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
         columns = measures.read(directory / name) if (directory / name).is_file() else {"time": []}
         if columns["time"]:
@@ -66,8 +66,8 @@ def _row(case: Case) -> dict[str, Any]:
     return row
 
 
-def _state(case: Case) -> str:
-    """done | failed | begun | -"""
+def state(case: Case) -> str:
+    """How far a case has come: done | failed | begun | -"""
     directory = case.job.output.directory
     if (directory / FAILURE).is_file():
         return "failed"

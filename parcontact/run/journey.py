@@ -1,6 +1,7 @@
 """A march through its timeline, with what is done on the way: it is recorded, saved, stopped if asked to."""
 
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from ..march.step import March
 from ..physics.entries import Entry
 from ..record import checkpoint, measures, slide, wisdom
 from ..record.checkpoint import Facts
+from ..record.console import always
 from ..record.directory import Directory
 from ..record.recorder import Recorder
 from .errors_so_far import ErrorsSoFar, chosen_by_accuracy
@@ -38,6 +40,7 @@ class Journey:
         until: float | None,
         errors: ErrorsSoFar,
         contacts: sanity.ContactWatch,
+        shows: Callable[[str], bool] = always,
     ) -> None:
         self.march, self.timeline, self.directory, self.recorder = marching, timeline, directory, recorder
         self.watch, self.facts, self.until = watching, facts, until
@@ -45,7 +48,7 @@ class Journey:
         self.console = recorder.console
         self.first, self.saved, self.failed = marching.row.step, -1, False
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
-        self.errors, self.contacts = errors, contacts
+        self.errors, self.contacts, self.shows = errors, contacts, shows
         self.stop = ""
         self.began, self.saving = time.monotonic(), 0.0
 
@@ -117,7 +120,7 @@ class Journey:
     def _doubt(self, texts: list[str]) -> None:
         """Warn, in the files too; all ranks have the same doubts."""
         for text in texts:
-            self.console.warn(text)
+            self.console.warn(text, shown=self.shows(text))
         provenance = self.facts.provenance
         provenance = replace(provenance, warnings=(*provenance.warnings, *texts))
         self.facts = replace(self.facts, provenance=provenance)

@@ -1,6 +1,6 @@
 """A run from a job to its output directory: it begins or goes on, saves what it remembers, and ends well."""
 
-from collections.abc import Collection
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..record import header, marker, wisdom
 from ..record.checkpoint import Contents, Facts, Table
-from ..record.console import Console, Silence
+from ..record.console import Console, Silence, always
 from ..record.directory import Directory
 from ..record.marker import Claim
 from ..record.provenance import Link, Provenance, extended
@@ -34,8 +34,8 @@ from .watch import Watch
 class Options:
     """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
-    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. The warnings that a
-    user was `told` before go into run.log only.
+    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. Doubts about a
+    scene that are not shown, as `shows` says, go into run.log only.
     """
 
     quiet: bool = False
@@ -44,7 +44,7 @@ class Options:
     wall: float | None = None
     stop_file: Path | None = None
     beside: bool = False
-    told: Collection[str] = ()
+    shows: Callable[[str], bool] = always
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,10 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         try:
             for text in header.lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
-            for text in (*doubts, *warnings, *recorder.warnings):
-                recorder.console.warn(text, told=text in options.told)
+            for text in doubts:
+                recorder.console.warn(text, shown=options.shows(text))
+            for text in (*warnings, *recorder.warnings):
+                recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None
             facts = Facts(0, 0.0, plain, provenance, claim.id)
             with Signals().noted() as signals:
@@ -103,9 +105,8 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 errors = ErrorsSoFar(marching.row, saved, half)
                 told = set(sanity.ODD_CONTACTS if options.beside else ())
                 contacts = sanity.ContactWatch(job, timeline, told)
-                journey = Journey(
-                    marching, timeline, directory, recorder, watching, facts, options.until, errors, contacts
-                )
+                parts = marching, timeline, directory, recorder, watching, facts
+                journey = Journey(*parts, options.until, errors, contacts, options.shows)
                 return Ended(journey.go(origin), marching)
         finally:
             recorder.close()

@@ -1,82 +1,111 @@
-"""The cases of a sweep, one after the other; those that have finished are passed over."""
+"""The cases of a sweep, one after the other or side by side; those that have finished are passed over."""
 
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError, RunError
 from ..job import Case, Job
 from ..job.reading import CASES
+from ..parallel.groups import Groups
+from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..record import marker, sweep_table
 from ..record.directory import BESIDE, SHOWN
 from . import watch
 from .journey import AGAIN, DONE
+from .sweep_warnings import SweepWarnings, warn
 
 FAILED = 1
-STOP = "stop"  # a file of this name in the directory of the sweep ends it after the case that runs
+STOP = "stop"  # a file of this name in the directory of the sweep ends it after the cases that run
+ENDS = {DONE: "done", AGAIN: "stopped early", FAILED: "failed"}
+
+Shows = Callable[[str], bool]
+Act = Callable[[Job, Slab, Shows], int]
 
 
-def run(
-    cases: Sequence[Case],
-    chosen: Sequence[Case],
-    slab_of: Callable[[Job], Slab],
-    act: Callable[[Job, Slab], int],
-    quiet: bool = False,
-    runs: bool = True,
-    limit: float | None = None,
-) -> int:
+@dataclass(frozen=True)
+class Manner:
+    """How a sweep is done: `quiet`; until when at most, `limit` in the time of `time.monotonic`; `told`, the warnings
+    that were shown before. Unless it `runs` its cases, their failures are not noted."""
+
+    quiet: bool = False
+    limit: float | None = None
+    told: Sequence[str] = ()
+    runs: bool = True
+
+
+def run(cases: Sequence[Case], chosen: Sequence[Case], groups: Groups, act: Act, manner: Manner = Manner()) -> int:
     """Do `act` with each of the chosen cases, and collect what all have come to; collective. Returns the exit code.
 
+    Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
+    and what says whether a warning is shown.
+
     A case that fails does not stop the others: the code is 1 in the end. One that stops early with a checkpoint stops
-    the sweep, with its code: the same command goes on with it. So do a stop file, and the end of the wall time, `limit`
-    in the time of `time.time`, before a case begins. Unless `act` runs the case, its failure is not noted.
+    the sweep, with its code: the same command goes on with it. So do a stop file, and the end of the wall time, before
+    a case begins.
     """
+    doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
+    code, stopped = _go(cases, dealt(chosen, groups), groups, act, manner, doubts)
+    with Signals().noted():  # one that ends the ranks that wait here would end the others with them
+        found = groups.from_all((code, stopped, doubts.kinds))
+    codes = [one for one, _, _ in found]
+    if groups.root:
+        for text in doubts.summary([kinds for _, _, kinds in found]):
+            warn(text)
+        if any(reason == watch.REASONS[watch.FILE] for _, reason, _ in found):
+            (_directory(cases) / STOP).unlink(missing_ok=True)
+        if AGAIN not in codes and not manner.quiet:
+            print(f"results of all cases: {_directory(cases) / sweep_table.TABLE}", flush=True)
+    return AGAIN if AGAIN in codes else max(codes)
+
+
+def dealt(chosen: Sequence[Case], groups: Groups) -> Sequence[Case]:
+    """The cases of the group of this rank: every group has as many of those that have not finished as the others, give
+    or take one; collective."""
+    if groups.count == 1:
+        return chosen
+    order: list[int] = groups.agree(unfinished_first(chosen) if groups.root else [])
+    return [chosen[index] for index in order[groups.number :: groups.count]]
+
+
+def unfinished_first(chosen: Sequence[Case]) -> list[int]:
+    """The places of cases in a list of them, first of those that have not finished; root only."""
+    finished = [sweep_table.state(case) == "done" for case in chosen]
+    return sorted(range(len(chosen)), key=lambda index: (finished[index], index))
+
+
+def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
+    """The jobs of all cases that something is to be done for; root only."""
+    return [case.job for case in chosen if afresh or sweep_table.state(case) != "done"]
+
+
+def _go(
+    cases: Sequence[Case], own: Sequence[Case], groups: Groups, act: Act, manner: Manner, doubts: SweepWarnings
+) -> tuple[int, str]:
+    """The cases of one group of ranks: the exit code, and why it has stopped before a case, or ''."""
     directory, code = _directory(cases), DONE
-    for case in chosen:
-        slab = slab_of(case.job)
-        if reason := slab.agree(_reason_to_stop(directory, limit) if slab.root else ""):
-            if slab.root and not quiet:
+    for case in own:
+        slab = Slab(groups.comm, *case.job.grid.points)
+        speaks = slab.root and not manner.quiet
+        if reason := slab.agree(_reason_to_stop(directory, manner.limit) if slab.root else ""):
+            if speaks:
                 print(f"stopped before case {case.number}: {reason}; run again to go on", flush=True)
-            return AGAIN
-        if slab.root and not quiet:
+            return AGAIN, reason
+        if speaks:
             print(f"{case} (of {len(cases)})", flush=True)
-        ended = _attempt(case, slab, act, runs)
+        doubts.begin(case.number)
+        ended = _attempt(case, slab, lambda job, slab: act(job, slab, doubts.shows), manner.runs)
         if slab.root:
             sweep_table.write(directory, cases)
+        if speaks and groups.count > 1:
+            print(f"case {case.number}: {ENDS[ended]}", flush=True)
         if ended == AGAIN:
-            return AGAIN
+            return AGAIN, ""
         code = max(code, ended)
-    if slab.root and not quiet:
-        print(f"results of all cases: {directory / sweep_table.TABLE}", flush=True)
-    return code
-
-
-def warn_once(cases: Sequence[Case]) -> list[str]:
-    """Warn of what is doubtful about the jobs of cases, each text once with the cases that it holds for; root only.
-
-    Returns the texts.
-    """
-    found: dict[str, list[int]] = {}
-    for case in cases:
-        for text in dict.fromkeys(case.job.warnings):
-            found.setdefault(text, []).append(case.number)
-    for text, numbers in found.items():
-        which = "all cases" if len(numbers) == len(cases) else f"case{'s' * (len(numbers) > 1)} {_ranges(numbers)}"
-        print(f"warning: {text} ({which})", file=sys.stderr, flush=True)
-    return list(found)
-
-
-def _ranges(numbers: Sequence[int]) -> str:
-    """Ascending numbers as `0, 2-5`."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+    return code, ""
 
 
 def refuse_foreign(cases: Sequence[Case]) -> None:
@@ -120,9 +149,6 @@ def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool
 
 
 def _reason_to_stop(directory: Path, limit: float | None) -> str:
-    if limit is not None and time.time() + watch.RESERVE_SECONDS > limit:
+    if limit is not None and time.monotonic() + watch.RESERVE_SECONDS > limit:
         return watch.REASONS[watch.WALL]
-    file = directory / STOP
-    found = file.exists()
-    file.unlink(missing_ok=True)
-    return watch.REASONS[watch.FILE] if found else ""
+    return watch.REASONS[watch.FILE] if (directory / STOP).exists() else ""

@@ -1,7 +1,7 @@
 """Friction curves: steady sliding solved directly at many velocities and pressures, into steady.csv and a picture."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
 from ..record import hdf5, marker
+from ..record.console import always
 from ..record.directory import ADVICE, Directory
 from ..record.provenance import Link, Provenance
 from ..record.steady_maps import SteadyMaps
@@ -81,11 +82,18 @@ def _pressures(job: Job) -> tuple[float, ...]:
     return ()
 
 
-def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto", told: Collection[str] = ()) -> int:
+def run(
+    job: Job,
+    slab: Slab,
+    wanted: Request,
+    quiet: bool,
+    restart: str = "auto",
+    shows: Callable[[str], bool] = always,
+) -> int:
     """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
 
     A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
-    the warnings that were `told` before are not shown again.
+    of the warnings those are printed that it `shows`.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -102,11 +110,11 @@ def run(job: Job, slab: Slab, wanted: Request, quiet: bool, restart: str = "auto
         columns = wanted.waves, bool(wanted.temperatures)
         table = _on_root(slab, lambda: CurveTable(directory.path, sliding, *columns, quiet))
         if table:
-            table.warn([text for text in doubts if text not in told])
+            table.warn(list(filter(shows, doubts)))
         maps = _maps(job, slab, wanted, directory)
         try:
             with Signals().noted() as signals:
-                return _Curve(sliding, wanted, table, maps, directory, signals).go()
+                return _Curve(sliding, wanted, table, maps, directory, signals, shows).go()
         finally:
             if table:
                 table.close()
@@ -159,10 +167,12 @@ class _Curve:
         maps: SteadyMaps | None,
         directory: Directory,
         signals: Signals,
+        shows: Callable[[str], bool],
     ) -> None:
         self.sliding, self.wanted, self.table, self.maps = sliding, wanted, table, maps
         self.directory, self.signals, self.slab = directory, signals, sliding.base.slab
         job = sliding.base.job
+        self.shows = shows
         self.watch, self.failures = sanity.ContactWatch(job, job.timeline()), 0
 
     def go(self) -> int:
@@ -210,7 +220,7 @@ class _Curve:
         def write() -> None:
             if table:
                 table.write(point, shares)
-                table.warn(self.watch.judge_point(point.measures, at))
+                table.warn(list(filter(self.shows, self.watch.judge_point(point.measures, at))))
 
         hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
 

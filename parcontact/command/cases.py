@@ -1,0 +1,64 @@
+"""The job, or the cases of the job, that a command line is about, and doing something with each."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ..parallel.root import on_root
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..job import Case, Job
+    from ..parallel.mpi import MPI
+    from ..parallel.slab import Slab
+
+    Shows = Callable[[str], bool]  # whether a warning is shown
+    Act = Callable[[argparse.Namespace, Job, Slab, Shows], int]
+
+OF_A_CURVE = ("velocities", "pressures", "temperatures")
+
+
+def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
+    """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective.
+
+    Of cases that are done side by side only the beginning and the end are told.
+    """
+    from ..parallel.slab import Slab
+    from ..record.console import always
+
+    cases, chosen = on_root(world, lambda: cases_of(options))
+    if not cases[0].settings:
+        return act(options, cases[0].job, Slab(world, *cases[0].job.grid.points), always)
+    from ..parallel.groups import Groups
+    from ..plan import side_by_side
+    from ..run import sweep, sweep_warnings, watch
+
+    on_root(world, lambda: sweep.refuse_foreign(cases))
+    told = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
+    afresh = getattr(options, "restart", "") == "never" or not runs
+    groups = Groups(world, on_root(world, lambda: side_by_side.count(sweep.to_do(chosen, afresh), world.size)))
+    limit = watch.limit(getattr(options, "wall", None))
+    manner = sweep.Manner(options.quiet, limit, told, runs)
+    own = argparse.Namespace(**{**vars(options), "quiet": options.quiet or groups.count > 1})
+    return sweep.run(cases, chosen, groups, lambda job, slab, shows: act(own, job, slab, shows), manner)
+
+
+def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:
+    """All cases of a job, and those that the command line is about."""
+    from .. import job as jobs
+
+    cases = jobs.load_cases(options.job, overrides(options))
+    return cases, jobs.choose(cases, options.case)
+
+
+def overrides(options: argparse.Namespace) -> list[str]:
+    """What the command line changes in a job; the name of a directory is taken as it is, whatever YAML would read.
+
+    Velocities, pressures and temperatures of a friction curve are keys of the job, which then needs no history.
+    """
+    name = "".join(f"\\U{ord(letter):08x}" for letter in options.out or "")
+    asked = {key: getattr(options, key, ()) for key in OF_A_CURVE}
+    curve = [f"steady.{key}={list(values)!r}" for key, values in asked.items() if values]
+    return [*options.set, *curve, *([f'output.directory="{name}"'] if options.out is not None else [])]

@@ -1,0 +1,77 @@
+"""What the cases of a sweep warn of: each kind of warning is shown once, with the cases that it holds for."""
+
+import re
+import sys
+from collections.abc import Sequence
+
+from ..job import Case
+
+NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")  # in which warnings of one kind may differ
+
+Kinds = dict[str, tuple[str, list[int]]]  # the first text of each kind, and the numbers of the cases that have it
+
+
+class SweepWarnings:
+    """Warnings by kind. `told` are texts that were shown before; others are shown `at_once`, or only at the end."""
+
+    def __init__(self, told: Sequence[str] = (), at_once: bool = True) -> None:
+        self._told, self._at_once, self._case = frozenset(told), at_once, -1
+        self.kinds: Kinds = {}
+
+    def begin(self, case: int) -> None:
+        """What follows is of this case."""
+        self._case = case
+
+    def shows(self, text: str) -> bool:
+        """Note a warning; whether it is to be shown now."""
+        if text in self._told:
+            return False
+        _, cases = self.kinds.setdefault(NUMBER.sub("#", text), (text, []))
+        new = not cases
+        if self._case not in cases:
+            cases.append(self._case)
+        return new and self._at_once
+
+    def summary(self, of_groups: Sequence[Kinds]) -> list[str]:
+        """What is to be said at the end of what all groups of ranks have noted: what was not shown yet, or is not of
+        one case alone."""
+        whole: Kinds = {}
+        for kinds in of_groups:
+            for kind, (text, cases) in kinds.items():
+                whole.setdefault(kind, (text, []))[1].extend(cases)
+        return [
+            f"{text} ({cases_text(sorted(cases))})"
+            for text, cases in whole.values()
+            if len(cases) > 1 or not self._at_once
+        ]
+
+
+def warn_once(cases: Sequence[Case]) -> list[str]:
+    """Warn of what is doubtful about the jobs of cases, each text once with the cases that it holds for; root only.
+
+    Returns the texts.
+    """
+    found: dict[str, list[int]] = {}
+    for case in cases:
+        for text in dict.fromkeys(case.job.warnings):
+            found.setdefault(text, []).append(case.number)
+    for text, numbers in found.items():
+        warn(f"{text} ({'all cases' if len(numbers) == len(cases) else cases_text(numbers)})")
+    return list(found)
+
+
+def warn(text: str) -> None:
+    """To the user; root only."""
+    print(f"warning: {text}", file=sys.stderr, flush=True)
+
+
+def cases_text(numbers: Sequence[int]) -> str:
+    """Ascending numbers as `cases 0, 2-5`."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    listed = ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+    return f"case{'s' * (len(numbers) > 1)} {listed}"
