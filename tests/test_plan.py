@@ -8,18 +8,21 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import yaml
 from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import __main__, private, scene
 from parcontact.command import words
 from parcontact.effects import decisions
-from parcontact.job import Job
+from parcontact.job import Job, load_cases
+from parcontact.job.table import plain
 from parcontact.parallel.slab import Slab
-from parcontact.plan import machine, memory, other_ranks, report, trial
+from parcontact.plan import machine, memory, other_ranks, report, trial, whole_sweep
 from parcontact.plan.planning import only_steady_states, try_job
 from parcontact.plan.report import Costs
 from parcontact.plan.sample import Sample, StageCost, chosen, sample
@@ -307,7 +310,7 @@ def test_what_cannot_be_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_too_large_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no memory for any grid, nothing is tried."""
-    monkeypatch.setattr(trial, "_free", lambda: 1000)
+    monkeypatch.setattr(trial, "free_bytes", lambda: 1000)
     assert trial.grid_for(job(), 1, 10.0) is None
 
 
@@ -402,3 +405,34 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert re.search(r"tried: [12] states on 1 rank in", said)
     assert bool(re.search(r"tried: [12] states on 2 ranks in", said)) == (machine.cores() > 1)
     assert "state [s]" in said
+
+
+SWEEP = {"history": [SLIDE], "sweep": [{"history.0.duration": [1e-3, 2e-3, 4e-3]}]}
+
+
+def test_times_of_a_sweep_add_up() -> None:
+    """Work goes with the steps; a case that was not tried is like the nearest one that was. Side by side the time is
+    that of all shared out, and no less than that of the longest; the program starts once."""
+    cases = load_cases({**plain(job()), **SWEEP})
+    steps = [11, 21, 41]  # with the jump of the load
+    assert whole_sweep.times_of_first(cases, {0: 1.0}) == pytest.approx([count / 11 for count in steps])
+    assert whole_sweep.times_of_first(cases, {0: 1.0, 2: 3.0}) == pytest.approx([1, 21 / 11, 3 * 41 / 11])
+    times = [1.0, 2.0, 12.0]
+    assert [whole_sweep.places_to_try(count) for count in (1, 2, 3, 21)] == [[0], [0, 1], [0, 1, 2], [0, 10, 20]]
+    costs = Mock(whole=lambda ranks: 1.0 + 8.0 / ranks)  # seconds: one to start, the rest is shared
+    costs.scaling.sample.return_value.starting = 1.0
+    costs.scaling.machine.slowed.return_value = 1.0
+    assert whole_sweep.whole(costs, times, 1, 1) == pytest.approx(1 + 15 * 8)
+    assert whole_sweep.whole(costs, times, 2, 1) == pytest.approx(1 + 15 * 8 / 2)
+    assert whole_sweep.whole(costs, [1, 2, 3], 2, 2) == pytest.approx(1 + 6 * 8 / 2)
+    assert whole_sweep.whole(costs, times, 3, 3) == pytest.approx(1 + 12 * 8)
+
+
+def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**plain(job()), **SWEEP}))
+    assert __main__.main(["plan", str(tmp_path / "job.yaml"), "--seconds", "0.1", "--ranks", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "first of 3 cases: history.0.duration = 0.001" in lines
+    assert lines[-3] == "sweep of 3 cases: 0, 1, 2 were tried"
+    assert re.fullmatch(r" +1 rank: [0-9.]+ s\*? in all, one case after the other", lines[-1])
+    assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]

@@ -98,21 +98,28 @@ def plan(options: argparse.Namespace) -> int:
     from .. import sanity, scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..plan import machine, planning
+    from ..plan import machine, planning, whole_sweep
+    from ..run import sweep_warnings
 
-    job = _load(options, world)
+    chosen = on_root(world, lambda: cases_of(options)[1])
+    job = chosen[0].job
     counts = options.ranks or tuple(sorted({1, world.size, *({machine.cores()} if world.size == 1 else ())}))
     words = [options.job, *(word for change in options.set for word in ("--set", change))]
     words += [] if options.case is None else ["--case", str(options.case)]
     wanted = planning.Wanted(counts, words, options.seconds, options.cores, options.network)
-    slab = Slab(world, *job.grid.points)
+    slab, alone = Slab(world, *job.grid.points), Slab(MPI.COMM_SELF, 1, 1)
     if options.sample:
         planning.leave_sample(job, slab, wanted, options.sample, options.sample_points)
         return DONE
-    for warning in (*job.warnings, *(sanity.of_surface(scene.frame(job, slab)) if sanity.is_quickly_made(job) else ())):
+    whole = len(chosen) > 1
+    doubts = [] if whole else list(job.warnings)
+    if whole:
+        on_root(world, lambda: sweep_warnings.warn_once(chosen))
+    for warning in (*doubts, *(sanity.of_surface(scene.frame(job, slab)) if sanity.is_quickly_made(job) else ())):
         if world.rank == 0:
             print(f"warning: {warning}", flush=True)
-    for line in planning.plan(job, slab, Slab(MPI.COMM_SELF, 1, 1), wanted, started):
+    given = slab, alone, wanted, started
+    for line in whole_sweep.plan(chosen, *given) if whole else planning.plan(job, *given):
         if world.rank == 0:
             print(line, flush=True)
     return DONE

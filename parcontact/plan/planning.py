@@ -29,21 +29,24 @@ class Wanted:
     network: tuple[float, float] | None = None
 
 
-def plan(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) -> Iterator[str]:
+def plan(
+    job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float, found: list[Costs] | None = None
+) -> Iterator[str]:
     """Lines of the plan of a job, its run and its steady states; collective, all ranks must take every line.
 
-    `alone` is a slab of one rank; `started` the seconds of the program so far.
+    `alone` is a slab of one rank; `started` the seconds of the program so far. The costs are left in `found`.
     """
+    found = [] if found is None else found
     yield from report.effects(job)
     yield ""
     if job.history:
         yield from report.maps(job, wanted.ranks)
         yield ""
-        yield from _costs(job, slab, alone, wanted, started)
+        yield from _costs(job, slab, alone, wanted, started, found)
     if job.steady:
         steady, changes = only_steady_states(job)
         yield from [""] * bool(job.history)
-        yield from _costs(steady, slab, alone, replace(wanted, words=[*wanted.words, *changes]), started)
+        yield from _costs(steady, slab, alone, replace(wanted, words=[*wanted.words, *changes]), started, found)
 
 
 def only_steady_states(job: Job) -> tuple[Job, list[str]]:
@@ -55,7 +58,7 @@ def only_steady_states(job: Job) -> tuple[Job, list[str]]:
     return job.model_copy(update={"history": (), "steady": section, "initial": type(job.initial)()}), changes
 
 
-def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) -> Iterator[str]:
+def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float, found: list[Costs]) -> Iterator[str]:
     """What the steps, or the steady states, of a job cost; collective."""
     seen = try_job(job, slab, wanted.seconds, started)
     if seen is None:
@@ -65,11 +68,17 @@ def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float) ->
     more = other_ranks.samples(seen.job, wanted.words, sorted(others), wanted.seconds)
     scaling = Scaling.of(job, [seen, *more], describe(seen.job, alone, wanted))
     costs = Costs(scaling, machine.write_rate(job.output.directory))
+    found.append(costs)
     yield from report.steps(costs)
     yield ""
     yield from report.times(costs, wanted.ranks)
     yield ""
     yield from price.table(costs, wanted.ranks)
+
+
+def costs_on(like: Costs, job: Job, seen: Sample) -> Costs:
+    """Of another job, on the machine of one that was planned."""
+    return replace(like, scaling=Scaling.of(job, [seen], like.scaling.machine))
 
 
 def try_job(job: Job, slab: Slab, seconds: float, started: float, points: Sequence[int] = ()) -> Sample | None:
