@@ -356,6 +356,22 @@ def test_units_of_memory(points: int, unit: str) -> None:
     assert all("e+" not in row for row in rows)
 
 
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (12.34, "12.3 s"),
+        (599.6, "600 s"),
+        (3660.0, "01h01m"),
+        (86400.0 * 2.5, "2.5 days"),
+        (7.79e3 * 86400.0, "21.3 years"),
+    ],
+)
+def test_times_as_people_tell_them(seconds: float, text: str) -> None:
+    """No longer than a column of a table, so that one can be told from the next."""
+    assert report.duration_text(seconds) == text
+    assert len(text + report.MARK) <= 11
+
+
 # -- steady states -----------------------------------------------------------------------------------------------------
 
 CURVE: Json = {"velocities": [1e-3, 1e-2, 0.1, 1.0], "pressures": [1e4, 3e4]}

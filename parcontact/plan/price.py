@@ -211,7 +211,7 @@ def table(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
         grid, held = each.job.grid, each.costs.held(1) / size
         area = f"{_per_cent(each.area):>9}" if slides else ""
         numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.steps:9d}  {each.job.numerics.precision:9}{held:11.4g}"
-        yield f"  {name:9}{area}{numbers}" + "".join(f"{_time(each.costs, count):>11}" for count in ranks)
+        yield f"  {name:9}{area}{numbers}" + "".join(f" {_time(each.costs, count):>10}" for count in ranks)
     yield from _basis(costs)
 
 

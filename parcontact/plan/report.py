@@ -11,6 +11,7 @@ from . import machine, memory
 from .scaling import SUMS_PER_STEP, Scaling
 
 MEGA = 1e6
+DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
 LARGE = 1e10  # bytes from which on there are told GB
 HALF_MESH = 0.3  # of the time of a run, that on half the mesh: a quarter of the points, some more calls
 MARK = "*"  # of figures that were taken while other programs were at work
@@ -190,4 +191,6 @@ def duration_text(seconds: float) -> str:
     """A time as people tell it."""
     if seconds < 600.0:
         return f"{seconds:.3g} s"
-    return time.strftime("%Hh%Mm", time.gmtime(seconds)) if seconds < 86400 else f"{seconds / 86400:.3g} days"
+    if seconds < DAY:
+        return time.strftime("%Hh%Mm", time.gmtime(seconds))
+    return f"{seconds / DAY:.3g} days" if seconds < 1000 * DAY else f"{seconds / YEAR:.3g} years"
