@@ -24,7 +24,7 @@ from parcontact.march.step import March
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 
-WARM = 6  # first steps of a slide, which are not like the others
+WARM = 12  # first steps of a slide, which are not like the others
 SMALL = 0.05  # maps an iteration: loops that pass over less are told together
 MAPS = 12  # that the bandwidth is measured over: about as many as a solve has
 TOLERANCE = 1e-6  # of cold solves
