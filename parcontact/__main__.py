@@ -85,7 +85,8 @@ def _end_all(error: BaseException) -> NoReturn:
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
     if not isinstance(error, KeyboardInterrupt):
         traceback.print_exception(error)
-    print(f"parcontact: ended by {type(error).__name__}{where}: {error}", file=sys.stderr, flush=True)
+    said = f": {error}" if str(error) else ""
+    print(f"parcontact: ended by {type(error).__name__}{where}{said}", file=sys.stderr, flush=True)
     if world is not None and several:
         world.Abort(FAILED)
     sys.exit(FAILED)
