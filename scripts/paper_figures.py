@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from paper_panels import WIDTH, MissingError, columns, moduli, over_distance, over_key, panels, there
+from paper_panels import WIDTH, MissingError, columns, explain, moduli, over_distance, over_key, panels, there
 
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import load, load_cases
@@ -148,7 +148,7 @@ def fig08(out: Path) -> Figure:
         axes.axvline(500, color=style.GREY, lw=0.7, ls=":")
         axes.set(ylabel=label, ylim=(0, None), xlim=(1e-2, 1e3))
     bottom.set(xlabel="distance slid [µm]")
-    top.legend()
+    explain(top, directory)
     return figure
 
 
@@ -159,9 +159,8 @@ def fig09(out: Path) -> Figure:
         found = columns(table.parent, table.name)
         for axes, name in zip(figure.axes, ("friction", "contact_area"), strict=False):
             axes.plot(found["velocity"], found[name], "kx", label="steady in the box")
-            axes.legend(
-                loc="upper center" if name == "friction" else "upper right", ncols=2 if name == "friction" else 1
-            )
+        explain(figure.axes[0], out / "fig09_velocities", loc="upper center", ncols=2)
+        figure.axes[1].legend(loc="upper right")
     return figure
 
 
@@ -183,10 +182,10 @@ def fig11(out: Path) -> Figure:
         over_distance(friction, directory, "friction", f", {speed:g} m/s", number, start)
         over_distance(area, directory, "contact_area", f", {speed:g} m/s", number, start)
     rest.set(xlabel="time at rest [ms]", ylabel="contact area ratio", ylim=(0, None))
-    friction.set(ylabel="friction coefficient", ylim=(0, 1.6 * friction.get_ylim()[1]), xlim=(0.1, 500))
+    friction.set(ylabel="friction coefficient", ylim=(0, 1.8 * friction.get_ylim()[1]), xlim=(0.1, 500))
     area.set(ylabel="contact area ratio", xlabel="distance slid [µm]", ylim=(0, None), xlim=(0.1, 500))
     rest.legend()
-    friction.legend(loc="upper center", ncols=2)
+    explain(friction, out / "fig11_tyre", loc="upper center", ncols=2)
     return figure
 
 

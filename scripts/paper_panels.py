@@ -13,7 +13,9 @@ from parcontact.job import Job
 from parcontact.record import measures, sweep_table, theory_settings
 from parcontact.record.pictures import style
 
+QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
 WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
+TITLE = 6.5  # points, of the title of a legend
 
 
 class MissingError(Exception):
@@ -35,10 +37,10 @@ def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
     return figure, figure.subplots(count, 1, squeeze=False)[:, 0]
 
 
-def explain(axes: Axes, *directories: Path, **look: Any) -> None:
-    """The legend of a panel, with the settings of the theory if they are known and the same in all directories."""
-    settings = theory_settings.shared(directories)
-    axes.legend(**look, title=f"theory: {settings}" if settings else None)
+def explain(axes: Axes, directory: Path, **look: Any) -> None:
+    """The legend of a panel, with the settings of the theory if they are known, and those of all cases of a sweep."""
+    settings = theory_settings.shared([directory, *directory.glob("cases/*")])
+    axes.legend(**look, title=f"theory: {settings}" if settings else None, title_fontsize=TITLE)
 
 
 def moduli(job: Job) -> tuple[float, float]:
@@ -66,11 +68,15 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
 
 
 def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> Figure:
-    """Friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds."""
+    """Friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds.
+
+    The same on a finer grid, in the directory NAME_1024, has open markers, its theory dotted lines.
+    """
     rows = sweep_table.read(there(out / name / "sweep.csv"))
+    finer = out / f"{name}_1024" / "sweep.csv"
+    fine = sweep_table.read(finer) if finer.is_file() else []
     figure, (top, middle, bottom) = panels(3, 1.75)
-    quantities = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))
-    for number, (axes, (column, short)) in enumerate(zip((top, top, middle), quantities, strict=True)):
+    for number, (axes, (column, short)) in enumerate(zip((top, top, middle), QUANTITIES, strict=True)):
         color = style.COLORS[number]
         x, y, spread = means(rows, key, column)
         axes.errorbar(scale * x, y, spread, fmt="o-", color=color, capsize=2, label=f"{short}, simulation")
@@ -78,11 +84,31 @@ def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> 
         axes.plot(scale * tx, theory, "--", color=color, label=f"{short}, theory")
         if x.size == tx.size:
             bottom.plot(scale * x, 100 * (theory - y) / y, "os^"[number] + "-", color=color, label=short)
-    top.set(ylabel="friction coefficient", ylim=(0, 1.5 * top.get_ylim()[1]))
+        if fine:
+            _finer_points(axes, bottom, fine, key, scale, number)
+    top.set(ylabel="friction coefficient", ylim=(0, 1.7 * top.get_ylim()[1]))
     middle.set(ylabel="contact area ratio", yscale="log")
     bottom.axhline(0, color=style.GREY, lw=0.6)
     bottom.set(ylabel="theory − simulation [%]", xlabel=label)
+    bottom.set_ylim(top=0.4 * abs(bottom.get_ylim()[0]))
+    if fine:
+        bottom.plot([], [], "D:", color=style.GREY, mfc="none", label="1024 × 1024")
     for axes in (top, middle, bottom):
         axes.set_xscale("log")
-        axes.legend(**({"loc": "upper center", "ncols": 2} if axes is top else {}))
+    explain(top, out / name, loc="upper center", ncols=2)
+    middle.legend()
+    bottom.legend(loc="upper right", ncols=2)
     return figure
+
+
+def _finer_points(
+    axes: Axes, bottom: Axes, rows: Sequence[dict[str, Any]], key: str, scale: float, number: int
+) -> None:
+    """A quantity of a sweep on a finer grid: the simulation, its theory, and below the error of that."""
+    (column, _), color = QUANTITIES[number], style.COLORS[number]
+    x, y, _ = means(rows, key, column)
+    tx, theory, _ = means(rows, key, f"theory_{column}")
+    axes.plot(scale * x, y, "D", color=color, mfc="none")
+    axes.plot(scale * tx, theory, ":", color=color)
+    if x.size == tx.size:
+        bottom.plot(scale * x, 100 * (theory - y) / y, "os^"[number] + ":", color=color, mfc="none")
