@@ -58,7 +58,7 @@ def run(cases: Sequence[Case], chosen: Sequence[Case], groups: Groups, act: Act,
         if any(reason == watch.REASONS[watch.FILE] for _, reason, _ in found):
             (_directory(cases) / STOP).unlink(missing_ok=True)
         if AGAIN not in codes and not manner.quiet:
-            print(f"results of all cases: {_directory(cases) / sweep_table.TABLE}", flush=True)
+            _say(f"results of all cases: {_directory(cases) / sweep_table.TABLE}")
     return AGAIN if AGAIN in codes else max(codes)
 
 
@@ -92,16 +92,16 @@ def _go(
         speaks = slab.root and not manner.quiet
         if reason := slab.agree(_reason_to_stop(directory, manner.limit) if slab.root else ""):
             if speaks:
-                print(f"stopped before case {case.number}: {reason}; run again to go on", flush=True)
+                _say(f"stopped before case {case.number}: {reason}; run again to go on")
             return AGAIN, reason
         if speaks:
-            print(f"{case} (of {len(cases)})", flush=True)
+            _say(f"{case} (of {len(cases)})")
         doubts.begin(case.number)
         ended = _attempt(case, slab, lambda job, slab: act(job, slab, doubts.shows), manner.runs)
         if slab.root:
             sweep_table.write(directory, cases)
         if speaks and groups.count > 1:
-            print(f"case {case.number}: {ENDS[ended]}", flush=True)
+            _say(f"case {case.number}: {ENDS[ended]}")
         if ended == AGAIN:
             return AGAIN, ""
         code = max(code, ended)
@@ -129,6 +129,11 @@ def refuse_foreign(cases: Sequence[Case]) -> None:
             f"the output directory {directory} is not empty and not of this program: it holds {names}; give --out for "
             "another directory"
         )
+
+
+def _say(text: str) -> None:
+    """A line at once: those of several groups do not mingle."""
+    print(f"{text}\n", end="", flush=True)
 
 
 def _directory(cases: Sequence[Case]) -> Path:
