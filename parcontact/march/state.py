@@ -21,7 +21,7 @@ class State:
 
     `pressure` is a map of p with the pressure `alpha p`, `earlier` the one before it (no history of single solves keeps
     one), `alpha` and `alpha_old` the moduli of the two steps; `approach` d of the body, all in the run's units.
-    `position` [m] is by how much the surface has moved.
+    `position` [m] is by how much the surface has moved, `position_old` by how much it had with the earlier pressure.
     """
 
     row: Row
@@ -31,6 +31,7 @@ class State:
     alpha_old: float = 0.0
     approach: float = 0.0
     position: tuple[float, float] = (0.0, 0.0)
+    position_old: tuple[float, float] = (0.0, 0.0)
 
     @staticmethod
     def count_maps(lasts: bool) -> MapCount:
@@ -41,7 +42,12 @@ class State:
         """What a checkpoint has of it; step and time it says itself."""
         strain = units.height / units.length
         earlier = (
-            {} if self.earlier is None else {"contact/earlier pressure": Entry(self.earlier, strain, optional=True)}
+            {}
+            if self.earlier is None
+            else {
+                "contact/earlier pressure": Entry(self.earlier, strain, optional=True),
+                "clock/earlier position": Entry(np.array(self.position_old), 1.0, "m", optional=True),
+            }
         )
         return {
             "clock/distance": Entry(self.row.distance, 1.0, "m"),
@@ -60,8 +66,9 @@ class State:
         names = ("contact/modulus", "contact/earlier modulus", "contact/approach", "clock/distance")
         alpha, alpha_old, approach, distance = (float(saved[name]) for name in names)
         x, y = saved["clock/position"].tolist()
+        old_x, old_y = saved.get("clock/earlier position", saved["clock/position"]).tolist()
         row = replace(row, distance=distance)
-        return State(row, self.pressure, self.earlier, alpha, alpha_old, approach, (x, y))
+        return State(row, self.pressure, self.earlier, alpha, alpha_old, approach, (x, y), (old_x, old_y))
 
 
 def entries(scene: Scene, state: State) -> dict[str, Entry]:

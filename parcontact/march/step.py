@@ -17,7 +17,7 @@ from ..physics.body import Trial, ZenerBody
 from ..physics.energy import Pressed
 from ..physics.entries import Entry
 from ..physics.measures import Measures
-from ..physics.motion import cells_between
+from ..physics.motion import are_whole, cells_between
 from ..record.checkpoint import Contents
 from ..record.row import Row
 from ..scene import Scene, solver_on
@@ -89,7 +89,7 @@ class March:
             errors=errors.budget,
         )
         earlier = None if old.earlier is None else old.pressure
-        self.state = State(row, contact.p, earlier, trial.alpha, old.alpha, contact.d, step.position)
+        self.state = State(row, contact.p, earlier, trial.alpha, old.alpha, contact.d, step.position, old.position)
         self._next_pressure = old.pressure if old.earlier is None else old.earlier
         if scene.followers:
             instant = Instant(step, contact.p, trial.alpha, self._displacement(), slid, measures)
@@ -174,26 +174,35 @@ class March:
         return contact, remark
 
     def _start(self, step: Step, alpha: float) -> Array:
-        """The start of the next solve: the last pressure, moved with the surface by whole cells and extrapolated."""
+        """The start of the next solve: the last pressure, moved with the surface by whole cells and extrapolated.
+
+        Where the surface is whole cells from where it was one step earlier, but not from where it was last, as with
+        halves of cells, the earlier pressure is moved: it needs no rounding.
+        """
         old, start, slab = self.state, self._next_pressure, self.scene.slab
         if old.earlier is None:
             start[...] = old.pressure
             return start
+        cells, since_earlier = self._cells(step, old.position), self._cells(step, old.position_old)
         now, before = (1.0 + step.growth) * old.alpha / alpha, step.growth * old.alpha_old / alpha
+        newest, older = old.pressure, old.earlier
+        if before > 0.0 and are_whole(since_earlier) and not are_whole(cells):
+            newest, cells, now, before = old.earlier, since_earlier, old.alpha_old / alpha, 0.0
         along_x, along_y = (
-            round(cells) % count  # a step may pass more boxes than a machine's whole numbers reach
-            for cells, count in zip(self._cells(step), self.scene.job.grid.points, strict=True)
+            round(moved) % count  # a step may pass more boxes than a machine's whole numbers reach
+            for moved, count in zip(cells, self.scene.job.grid.points, strict=True)
         )
-        earlier = rows.roll(slab, old.earlier, along_y, start) if along_y else old.earlier
-        loops.travel(old.pressure, earlier, now, before, along_x, start)
+        if along_y and before > 0.0:
+            older = rows.roll(slab, old.earlier, along_y, start)
+        loops.travel(newest, older, now, before, along_x, start)
         if along_y:
             start[...] = rows.roll(slab, start, along_y, self.scene.solver.lend()[0])
         return start
 
-    def _cells(self, step: Step) -> tuple[float, float]:
-        """By how many cells the surface moves in a step, along x and y."""
+    def _cells(self, step: Step, since: tuple[float, float]) -> tuple[float, float]:
+        """By how many cells the surface moves from a position [m] to the end of a step, along x and y."""
         grid = self.scene.job.grid
-        return cells_between(self.state.position, step.position, (grid.dx, grid.dy))
+        return cells_between(since, step.position, (grid.dx, grid.dy))
 
     def _control(self, step: Step, trial: Trial) -> MeanPressure | Approach:
         scene, grid = self.scene, self.scene.job.grid
@@ -229,7 +238,7 @@ class March:
         scene = self.scene
         contact, tried = retry.again(scene.solver, effective, control, failed, partial(solver_on, scene.frame))
         if contact.failure:
-            moved = math.hypot(*self._cells(step))
+            moved = math.hypot(*self._cells(step, self.state.position))
             raise failure.of_solve(scene, step, failed, contact, tried, effective, moved)
         what = f"{failure.where(scene, step)}: the contact solve {failed.failure}"
         return contact, f"{what}; solved when retried with {', with '.join(tried)}"

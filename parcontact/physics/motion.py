@@ -18,6 +18,11 @@ def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
     return (new[0] - old[0]) / cell[0], (new[1] - old[1]) / cell[1]
 
 
+def are_whole(cells: Vector) -> bool:
+    """Whether a displacement is one of whole cells."""
+    return all(abs(moved - round(moved)) <= SAME_PLACE for moved in cells)
+
+
 class Motion(Protocol):
     """Heights of the surface at a displacement; collective."""
 
