@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from bench_cold import Cold, pair
 from bench_lines import Line
-from bench_meter import TRANSFORM, Meter
+from bench_meter import OTHER, TRANSFORM, Meter
 from bench_sliding import sliding_job
 from mpi4py import MPI
 
@@ -130,11 +130,21 @@ def told(what: str, one: list[Run], two: list[Run], work: float, rate: float) ->
         yield Line("scale", name, 1e3 * float(np.median([run.whole for run in runs])), "ms")
         for part in runs[0].parts:
             yield Line("scale", f"{name}: {part}", 1e3 * float(np.median([run.parts[part] for run in runs])), "ms")
+    yield from _rates(f"{what} on 1 rank", one)
     pairs = list(zip(one, two, strict=True))
     low, middle, high = np.quantile([work * a.whole / b.whole for a, b in pairs], (0.25, 0.5, 0.75)).tolist()
     yield Line("scale", f"{what}: speed of 2 ranks over 1", middle, "", low, high)
     limit = float(np.median([best_ratio(a, b, work, rate) for a, b in pairs]))
     yield Line("scale", f"{what}: by the roofline at most", limit, "")
+
+
+def _rates(name: str, runs: list[Run]) -> Iterator[Line]:
+    """How fast parts pass their bytes through memory, to see beside the rate of memory."""
+    transforms = float(np.median([run.transformed / run.parts[TRANSFORM] for run in runs]))
+    yield Line("scale", f"{name}: bytes of transforms over their time", transforms / 1e9, "GB/s")
+    if any(run.looped for run in runs):
+        loops = float(np.median([run.looped / run.parts[OTHER] for run in runs]))
+        yield Line("scale", f"{name}: bytes of loops over the time of everything else", loops / 1e9, "GB/s")
 
 
 def best_ratio(one: Run, two: Run, work: float, rate: float) -> float:
