@@ -154,7 +154,8 @@ def test_mpirun_that_is_told_to_end(here: Path, outside_mpi: dict[str, str], num
 def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> None:
     """There is nothing to save yet: it ends the process at once."""
     (here / "out").mkdir()
-    (here / "out" / "theory.csv").touch()
+    for name in ("theory.csv", "theory.yaml"):
+        (here / "out" / name).touch()
     process = start(["job.yaml", "--out", "out", *LONG, "--set", "grid.points=[2048, 1536]"], outside_mpi)
     wait_for(process, lambda: (here / "out" / ".lock").exists())
     process.send_signal(signal.SIGTERM)
