@@ -39,6 +39,7 @@ from bench_scale import on_two_ranks, scale, show_inside, traffic
 from bench_sizes import large, sizes
 from bench_sliding import held, slide, steady
 
+FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 PARTS = {
     "fft": fft,
@@ -83,6 +84,8 @@ def main() -> int:
         return 0
     if unknown := set(asked.parts) - set(names):
         parser.error(f"there is no part {', '.join(sorted(unknown))}; there are {', '.join(names)}")
+    if asked.points < FEWEST:
+        parser.error(f"--points must be {FEWEST} or more: the shortest wave has 16 of them, the longest a quarter")
     if os.getloadavg()[0] > BUSY:
         print(f"WARNING: others keep {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores busy: trust counts, not times")
     lines = list[Line]()

@@ -61,10 +61,13 @@ def solve(tolerance):
 {COLD}"""
 ASPHER_COLD = f"""\
 import aspher
+coarsest = len(heights)
+while coarsest % 2 == 0 and coarsest > 64:
+    coarsest //= 2
 def solve(tolerance):
     gap = heights.max() - heights
     found = aspher.solve_nested(
-        heights.shape[0], gap, load, coarsest=64, tol=tolerance, coarse_tol=1e-3, backend="periodic"
+        heights.shape[0], gap, load, coarsest=coarsest, tol=tolerance, coarse_tol=1e-3, backend="periodic"
     )
     return np.asarray(found.pressure).reshape(heights.shape)
 {COLD}"""
