@@ -31,7 +31,7 @@ def tried(exponent):
     return error <= given["wanted"]
 exponent = float(given["exponent"])
 if tried(exponent):
-    while tried(exponent := exponent + 0.25):
+    while exponent < 0.0 and tried(exponent := exponent + 0.25):
         pass
 else:
     while not tried(exponent := exponent - 0.25) and exponent > -14.0:
