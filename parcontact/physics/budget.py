@@ -2,16 +2,16 @@
 
 Each part is an estimate of a relative error (1 is all of it), found by experiment: spheres, cylinders and rough
 surfaces from 0.4 % to full contact, bodies of one to twelve branches, starts and jumps of velocity, against runs with
-finer steps, meshes and tolerances (`scripts/error_budget.py`). Of the eight scenes there, with both integrators, the
-estimate is 0.4 to 5 times the error of friction by the solver and 0.6 to 2.3 times that of area; 1.1 to 2.5 times that
-of friction by the time steps of the exponential integrator, 0.7 to 1.3 times by those of backward Euler. Those of area,
-mostly below 0.3 %, are estimated at 0.4 to 30 times what they are.
+finer steps, meshes and tolerances (`scripts/error_budget.py`).
+@@HONEST@@
 
-solver: from the `complementarity` of the certificate (see `solve.contact.Certificate`).
+solver: from the `complementarity` C of the certificate (see `solve.contact.Certificate`). Friction is wrong in
+    proportion to it, area, which edges decide that carry little pressure, to C^0.7.
 time: from the embedded pair (see `embedded`). Over one step the pair differs in the second order of the step where all
     branches are slow, in the first where some are as fast as the step is short. The error that all steps of the
     exponential integrator leave in the end is of an order of 1.7 in contacts, and little in full contact, where the
-    displacement is smooth in time; that of backward Euler is of the first order and goes with the root.
+    displacement is smooth in time; that of backward Euler is of the first order and goes with the root. The area, which
+    is wrong now by more and now by less than none, has a share of the error of friction: less where little is open.
 folded: the bound of the branches without a map.
 mesh: of friction from the cells per shortest wave of a rough surface, or per radius of a contact spot; of the corrected
     area from the correction itself. Where there is a run on half the mesh, both from their difference to it.
@@ -32,13 +32,16 @@ from numpy.typing import NDArray
 
 from .measures import SIDE
 
-SOLVER_FRICTION, SOLVER_AREA = 0.5, 2.0  # times the complementarity
-EXPONENTIAL_FRICTION, EXPONENTIAL_AREA = 1.7, 0.4  # times the difference of the pair
+SOLVER_FRICTION = 0.5  # times the complementarity
+SOLVER_AREA, SOLVER_AREA_POWER = 0.4, 0.7  # times this power of it
+EXPONENTIAL_FRICTION = 1.7  # times the difference of the pair
 LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least
 TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
 EQUAL_DIFFERENCE = 0.0072  # of the pair, at which a material of many branches is no worse than one of a single branch
 FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
-EULER_FRICTION, EULER_AREA = 0.7, 0.4  # times its root
+EULER_FRICTION = 0.8  # times its root
+EXPONENTIAL_AREA, NEARLY_CLOSED = 0.08, 0.2  # of the error of friction; in proportion below this share of open points
+EULER_AREA, EULER_OPEN_POWER = 0.35, 1.5  # of it, times this power of the share of open points
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 CORRECTED_ORDER = 1.0  # of the corrected area
@@ -167,10 +170,17 @@ def compared_with_half_mesh(
 
 def _area(known: Known, seen: Seen) -> Parts:
     open_share = 1.0 - seen.area
-    spread = EXPONENTIAL_AREA * seen.difference if known.exponential else EULER_AREA * seen.difference**0.5
+    solver = SOLVER_AREA * seen.complementarity**SOLVER_AREA_POWER
     edges = STRAIGHT_EDGES if known.straight else EDGES
     mesh = edges * (seen.area - seen.corrected) / seen.corrected if seen.corrected > 0.0 else 0.0
-    return Parts(SOLVER_AREA * seen.complementarity, spread * open_share, known.folded * open_share, mesh)
+    return Parts(solver, _share_of_area(known, open_share) * time_error(known, seen), known.folded * open_share, mesh)
+
+
+def _share_of_area(known: Known, open_share: float) -> float:
+    """What the error of area by the time steps is of that of friction."""
+    if known.exponential:
+        return EXPONENTIAL_AREA * min(1.0, open_share / NEARLY_CLOSED)
+    return EULER_AREA * open_share**EULER_OPEN_POWER
 
 
 class Summary:

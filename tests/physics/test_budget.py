@@ -1,7 +1,7 @@
 """The arithmetic of the error budget; what it says of real runs is in scripts/error_budget.py and its test."""
 
 import math
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import pytest
 
@@ -19,15 +19,27 @@ def test_parts_add_up() -> None:
     assert astuple(budget.friction) == pytest.approx(
         (0.5e-3, 1.7 * 4e-4 * (4e-4 / 7.2e-3) ** 0.25 * (1 - 0.9 * 0.1**2), 1e-4, 0.05 * 2**-2.5)
     )
-    assert astuple(budget.area) == pytest.approx((2e-3, 0.4 * 4e-4 * 0.9, 0.9e-4, 0.25 / 19))
-    assert budget.area.total == pytest.approx(2e-3 + 1.44e-4 + 0.9e-4 + 0.25 / 19)
+    solver, time = 0.4 * 1e-3**0.7, 0.08 * budget.friction.time
+    assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, 0.25 / 19))
+    assert budget.area.total == pytest.approx(solver + time + 0.9e-4 + 0.25 / 19)
+
+
+@pytest.mark.parametrize("exponential", [True, False])
+def test_area_has_no_error_of_time_in_full_contact(exponential: bool) -> None:
+    """And less than in proportion to what is open, for backward Euler, near it; friction has one."""
+    known, seen = replace(KNOWN, exponential=exponential), replace(SEEN, area=1.0, corrected=1.0)
+    full, nearly, open_ = (estimate(known, replace(seen, area=area), 10_000) for area in (1.0, 0.9, 0.2))
+    assert full.area.time == 0.0
+    assert full.friction is not None
+    assert full.friction.time > 0.0
+    assert 0.0 < nearly.area.time < open_.area.time / 2
 
 
 def test_backward_euler_is_of_the_first_order() -> None:
     budget = estimate(Known(8.0, False, 0.0, False), SEEN, 10_000)
     assert budget.friction is not None
-    assert budget.friction.time == pytest.approx(0.7 * 0.02)
-    assert budget.area.time == pytest.approx(0.4 * 0.02 * 0.9)
+    assert budget.friction.time == pytest.approx(0.8 * 0.02)
+    assert budget.area.time == pytest.approx(0.8 * 0.02 * 0.35 * 0.9**1.5)
 
 
 def test_little_friction_counts_more() -> None:
@@ -60,7 +72,7 @@ def test_summary() -> None:
     assert summary.friction is not None
     assert summary.area is not None
     assert summary.friction.solver == pytest.approx((0.06 * 0.5e-3 + 0.02 * 1.5e-3) / 0.08)
-    assert summary.area.solver == pytest.approx(2 * (3 * 1e-3 + 2 * 3e-3 + 1 * 5e-3) / 6)
+    assert summary.area.solver == pytest.approx(0.4 * (3 * 1e-3**0.7 + 2 * 3e-3**0.7 + 1 * 5e-3**0.7) / 6)
     friction, area = summary.lines(0.012)
     assert friction.startswith("friction is wrong by about ")
     assert "solver 0.075 %" in friction
@@ -118,6 +130,6 @@ def test_steps_that_last_no_time_count_where_none_does() -> None:
         summary.add(estimate(KNOWN, Seen(complementarity, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0)
     assert summary.friction is None
     assert summary.area is not None
-    assert summary.area.solver == pytest.approx(2 * 3e-3)
+    assert summary.area.solver == pytest.approx(0.4 * (1e-3**0.7 + 2e-3**0.7 + 6e-3**0.7) / 3)
     summary.add(estimate(KNOWN, Seen(8e-3, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9)
-    assert summary.area.solver == pytest.approx(2 * 8e-3)
+    assert summary.area.solver == pytest.approx(0.4 * 8e-3**0.7)
