@@ -39,8 +39,7 @@ def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
 
 def explain(axes: Axes, directory: Path, **look: Any) -> None:
     """The legend of a panel, with the settings of the theory if they are known, and those of all cases of a sweep."""
-    settings = theory_settings.shared([directory, *directory.glob("cases/*")])
-    axes.legend(**look, title=f"theory: {settings}" if settings else None, title_fontsize=TITLE)
+    axes.legend(**look, title=theory_settings.describe(directory) or None, title_fontsize=TITLE)
 
 
 def moduli(job: Job) -> tuple[float, float]:

@@ -57,8 +57,7 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
     theory_settings.write(out, theory_settings.TheorySettings(0.5, "lattice"))
     plots.plot([out])
-    labels = [line.get_label() for line in drawn[1].axes[0].get_lines()]
-    assert "theory (γ = 0.5, lattice)" in labels
+    assert drawn[1].get_suptitle().splitlines()[-1] == "theory: γ = 0.5, lattice"
 
 
 def test_a_directory_above_that_of_a_run(tmp_path: Path) -> None:

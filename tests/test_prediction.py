@@ -168,9 +168,10 @@ def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
         prediction.write(one, iter([]), first)
     paths = [one.output.directory for one in (ran, other)]
     assert theory_settings.read(paths[0]) == first
-    assert theory_settings.name_of_lines(paths) == "theory (γ = 0.5, lattice)"
+    assert theory_settings.shared(paths) == first
+    assert theory_settings.describe(paths[0]) == "theory: γ = 0.5, lattice"
     prediction.write(other, iter([]), second)
-    assert theory_settings.name_of_lines(paths) == "theory"
+    assert theory_settings.shared(paths) is None
     table = (paths[0] / "theory.csv").read_bytes()
     with pytest.raises(ZeroDivisionError):
         prediction.write(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]

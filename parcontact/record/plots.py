@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..job.reading import CASES
-from . import files, hdf5, sweep_table
+from . import files, hdf5, sweep_table, theory_settings
 from .pictures import charts, histories, movie, steady, style, sweep
 from .pictures.charts import Chart
 from .pictures.maps import maps
@@ -111,7 +111,7 @@ def _picture(directory: Path, options: Options) -> Figure:
         )
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    return _figure(title, groups)
+    return _figure("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups)
 
 
 def _instead(path: Path) -> str:

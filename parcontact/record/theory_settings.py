@@ -48,7 +48,7 @@ def shared(directories: Iterable[Path]) -> TheorySettings | None:
     return found.pop() if len(found) == 1 else None
 
 
-def name_of_lines(directories: Iterable[Path]) -> str:
-    """What a legend calls the theory in one or several directories."""
-    settings = shared(directories)
-    return f"theory ({settings})" if settings else "theory"
+def describe(directory: Path) -> str:
+    """The settings of the theory in a directory, or in the cases of a sweep there, if they are known; else ''."""
+    settings = shared([directory, *directory.glob("cases/*")])
+    return f"theory: {settings}" if settings else ""

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ..record import measures, sweep_table
+from ..record import measures, slide, sweep_table, theory_settings
 from ..record.pictures import histories, steady, sweep
 from ..record.pictures.run import Run
 from . import browse
@@ -31,7 +31,8 @@ def of_run(directory: Path) -> Section:
             rows.append((name.replace("_", " "), number(known[-1]), number(min(known)), number(max(known)), unit))
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     pictures = [of_chart(chart) for chart in histories.charts(run)]
-    return Section("Results of the run", (), [numbers], pictures, browse.of_run(directory))
+    told = [*slide.describe(run.job.history, columns), theory_settings.describe(directory)]
+    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(directory))
 
 
 def of_curve(directory: Path) -> Section:
@@ -50,7 +51,8 @@ def of_sweep(directory: Path) -> Section:
     rows = sweep_table.read(directory / "sweep.csv")
     used = [name for name in (rows[0] if rows else ()) if any(not _empty(row[name]) for row in rows)]
     table = shortened(used, [[cell(row[name]) for name in used] for row in rows])
-    return Section("Sweep", (), [table], [of_chart(chart) for chart in sweep.charts(directory)])
+    told = list(filter(None, [theory_settings.describe(directory)]))
+    return Section("Sweep", told, [table], [of_chart(chart) for chart in sweep.charts(directory)])
 
 
 def of_study(directory: Path) -> Section:

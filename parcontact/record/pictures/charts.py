@@ -42,7 +42,8 @@ class Axis:
 @dataclass(frozen=True)
 class Chart:
     """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
-    are names, starts and ends over `x`; `peak`: whether the highest point is told, and so stays in the picture."""
+    are names, starts and ends over `x`; `peak`: whether the highest point is told, and so stays in the picture;
+    `headroom`: the height of the panel over that of its highest point."""
 
     key: str
     x: Axis
@@ -55,6 +56,7 @@ class Chart:
     named: bool = False
     legend_title: str = ""
     log_x: bool = False
+    headroom: float = 1.08
 
     def __call__(self, axes: Axes) -> None:
         draw(self, axes)
@@ -72,7 +74,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     _scale(axes, "x", xs, log_x)
     _scale(axes, "y", ys, log_y)
     if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        axes.set_ylim(0.0, 1.08 * max(map(_highest, ys)) or 1.0)
+        axes.set_ylim(0.0, chart.headroom * max(map(_highest, ys)) or 1.0)
     if chart.spikes and not (chart.peak or log_x or log_y):
         _cut_spike(axes, xs, ys, y_unit)
     if chart.peak and not log_y:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...parallel.slab import Array
-from .. import measures, theory_settings
+from .. import measures
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 from .run import Run
@@ -54,9 +54,8 @@ def _beside_theory(chart: Chart, run: Run) -> Chart:
         return chart
     theory = {name: np.array(values) for name, values in measures.read(table).items()}
     over = "distance" if chart.x.unit == "m" else "time"
-    name = theory_settings.name_of_lines([run.directory])
     (own,) = chart.series
-    lines = [replace(own, name="simulation"), Series(name, theory[over], theory[column], style.line(1))]
+    lines = [replace(own, name="simulation"), Series("theory", theory[over], theory[column], style.line(1))]
     if chart.key == "friction" and run.viscous is not None:  # the theory knows of no interface
         lines.append(Series("without interface", own.x, run.viscous, style.line(2)))
     return replace(chart, series=lines)

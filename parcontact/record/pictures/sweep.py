@@ -4,13 +4,14 @@ Points are cases, lines their means over seeds and other keys that do not tell l
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...parallel.slab import Array
-from .. import sweep_table, theory_settings
+from .. import sweep_table
 from ..sweep_table import SEED
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
@@ -20,9 +21,11 @@ UNITS = {"velocity": "m/s", "pressure": "Pa", "force": "N", "size": "m", "distan
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "shear_modulus": "Pa"}
 MAX_LINES = 3  # of a second key
 MAX_COLORS = len(style.COLORS)
+FEW_NAMES, PER_NAME = 2, 0.12  # lines that a legend finds room for; of the height of a panel that each of more needs
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 SHOWN = (("friction", "friction coefficient", ("mu_max", "mu_dyn")), ("area", FRACTION, ("contact_area",)))
 LABELS = {"mu_max": "highest", "mu_dyn": "dynamic", "contact_area": "simulation"}
+THEORY = "theory"
 
 Rows = Sequence[dict[str, Any]]
 
@@ -34,18 +37,18 @@ def charts(directory: Path) -> list[Chart]:
     if not keys:
         return []
     key, *others = keys
-    theory, found = theory_settings.name_of_lines(sorted(directory.glob("cases/*"))), []
+    found = []
     for panel, title, names in SHOWN:
         wanted = [(label, part, name) for label, part in _parts(rows, others) for name in names]
-        series = [
-            line for k, one in enumerate(wanted) for line in _lines(*one, key, theory, style.COLORS[k % MAX_COLORS])
-        ]
+        series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.COLORS[k % MAX_COLORS])]
         if series:
             values = np.concatenate([one.x for one in series])
             wide = values.min() > 0.0 and values.max() >= WIDE * values.min()
             word = key.split(".")[-1]
             x = Axis(word.replace("_", " "), UNITS.get(word, ""))
-            found.append(Chart(panel, x, Axis(title), series, log_x=wide))
+            named = sum(bool(one.name) for one in series)
+            chart = Chart(panel, x, Axis(title), series, log_x=wide)
+            found.append(replace(chart, headroom=1.0 + PER_NAME * named) if named > FEW_NAMES else chart)
     return found
 
 
@@ -76,7 +79,7 @@ def _parts(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
         yield f", {units.text(value, UNITS.get(word, ''))}", [row for row in rows if row[others[0]] == value]
 
 
-def _lines(label: str, rows: Rows, name: str, key: str, of_theory: str, color: str) -> Iterator[Series]:
+def _lines(label: str, rows: Rows, name: str, key: str, color: str) -> Iterator[Series]:
     """Means as a line with its points, all cases as small dots, and the theory."""
     x, y, theory = (_numbers(rows, column) for column in (key, name, f"theory_{name}"))
     if (there := np.isfinite(y)).any():
@@ -85,7 +88,7 @@ def _lines(label: str, rows: Rows, name: str, key: str, of_theory: str, color: s
         if at.size < there.sum():
             yield Series("", x[there], y[there], {"marker": "_", "linestyle": "none", "color": color})
     if (there := np.isfinite(theory)).any():
-        yield Series(of_theory + label, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
+        yield Series(THEORY + label, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:
