@@ -40,6 +40,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "solve/kernels.py": ("tests/solve/test_kernels.py", "tests/solve/test_contact.py"),
     "solve/steady.py": ("tests/test_steady_states.py",),
     "solve/projected.py": ("tests/solve/test_projected.py", "tests/test_steady_states.py"),
+    "solve/local_load.py": ("tests/solve/test_local_load.py",),
     "solve/gcr.py": ("tests/solve/test_gcr.py",),
     "solve/active_set.py": ("tests/solve/test_active_set.py", "tests/test_retry.py"),
     "march/step.py": ("tests/test_viscoelastic.py", "tests/test_sliding_runs.py", "tests/test_retry.py"),

@@ -12,8 +12,9 @@ iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C
    the set (`surround`);
 3. direction `t = C R (z + beta t)` with Polak and Ribiere's beta, or `t = z` where that is much less of a descent,
    or where much of the last step was cut off;
-4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, then scaled to the mean P0;
-5. f must not rise: else the step is halved along this path and the direction is forgotten.
+4. `p <- max(p - alpha t, 0)` with the exact step `alpha = <r, t>/<t, A t>`, the load that cutting off adds taken back
+   near by if it is much (`local_load`), then scaled to the mean P0;
+5. f must not rise: else the step is halved along this path, without the former, and the direction is forgotten.
 
 With d given there is neither centring nor scaling. With P0 given, d is the mean of `A p - h` weighted by p, so that
 `<p, g> = 0`: scaling p then does not change f to first order, and cutting t off at p = 0, which a small step does only
@@ -30,6 +31,7 @@ import numpy as np
 from ..parallel.slab import Array, Slab, deal
 from . import kernels
 from .certificate import Certificate
+from .local_load import LEAST, LocalLoad
 from .operator import Operator
 from .surround import Surround
 
@@ -155,6 +157,7 @@ class ContactSolver:
         self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
         self._working = slab.zeros(np.bool_)
         self._surround = Surround(slab, preconditioner, most=grids)
+        self._local_load = LocalLoad(slab)
 
     @staticmethod
     def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int, grids: int | None = None) -> int:
@@ -271,7 +274,10 @@ class ContactSolver:
         step = slope / curvature if curvature > 0.0 else 0.0
         for halvings in range(MAX_HALVINGS + 1):
             load, cut = self.slab.sum(*kernels.advance(old_p, self._t, step, p))
-            if cut and mean is not None:
+            if mean is not None and cut:
+                if cut > LEAST * load and halvings == 0:
+                    kernels.move(old_p, self._t, step, p)
+                    load = self._local_load.cut_off(p, load)
                 kernels.scale(p, mean * self.slab.points / load)
             self._u, self._w = self.operator.apply(p, self._w), self._u
             new = weigh(self.slab, p, self._u, h, old.d)

@@ -136,6 +136,14 @@ def advance(p_old, t, step, p):
     return load, cut
 
 
+@loop
+def move(p_old, t, step, p):
+    """`p = p_old - step t`, which may be negative."""
+    for j in range(p.shape[0]):
+        for i in range(p.shape[1]):
+            p[j, i] = p_old[j, i] - step * t[j, i]
+
+
 def clip(p):
     """`p <- max(p, 0)`; returns the sum of p and how much of it was added by cutting off at 0."""
     return advance(p, p, 0.0, p)

@@ -2,9 +2,10 @@
 
 On the working set c (pressure, or penetration) of an admissible pressure x, a step goes along the preconditioned
 residual t and the last two changes of x, as far along each as makes the sum of squares of `C R (A x - h)` smallest (R:
-values on c, C: subtract the mean over c). Then what has become negative is put to 0, the load is restored, and A is
-applied anew, so that the changes that are kept have exact images. A need not be symmetric. Nothing is guaranteed: where
-a residual has nothing in common with the image of its own t, steps no longer help, and the caller has to notice.
+values on c, C: subtract the mean over c). Then what has become negative is put to 0, the load is restored, near by
+first (`local_load`), and A is applied anew, so that the changes that are kept have exact images. A need not be
+symmetric. Nothing is guaranteed: where a residual has nothing in common with the image of its own t, steps no longer
+help, and the caller has to notice.
 """
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
 from .gcr import gaps_on, residual, spread, sum_on
+from .local_load import LocalLoad
 from .operator import Operator
 from .surround import Surround
 
@@ -38,6 +40,7 @@ class Projected:
         t, w, self.r, self.z = lent
         self.t, self.w = t[:DIRECTIONS], w[:DIRECTIONS]
         self.surround = Surround(slab, preconditioner, FLOOR, GRIDS)
+        self.local_load = LocalLoad(slab)
 
     def begin(self) -> None:
         """Forget earlier changes."""
@@ -57,7 +60,7 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
-        kernels.scale(x, load / self.slab.sum(*kernels.clip(x))[0])
+        kernels.scale(x, load / self.local_load.cut_off(x))
         self.operator.apply(x, u)
         self._keep_change(x, u)
 
@@ -110,10 +113,10 @@ def _gram(working, r, a, b, c):
 
 @loop
 def _move(working, along_a, along_b, along_c, a, b, c, x):
-    """Move x on the set, cut it off at 0, put 0 elsewhere; the old x is left in c."""
+    """Move x on the set, put 0 elsewhere; the old x is left in c."""
     for j in range(x.shape[0]):
         for i in range(x.shape[1]):
             old = x[j, i]
             value = old - along_a * a[j, i] - along_b * b[j, i] - along_c * c[j, i]
-            x[j, i] = max(value, 0.0) if working[j, i] else 0.0
+            x[j, i] = value if working[j, i] else 0.0
             c[j, i] = old

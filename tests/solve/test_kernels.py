@@ -107,6 +107,8 @@ def test_advance(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     assert maps.close(cut, np.maximum(-free, 0.0))
     assert kernels.advance(maps.p, maps.t, 0.0, maps.r)[1] == 0.0
     assert np.array_equal(maps.r, maps.p)
+    kernels.move(maps.p, maps.t, 0.3, maps.r)
+    assert np.allclose(maps.r, free, rtol=0.0, atol=8 * ROUNDING[dtype])
 
 
 @SHAPES
