@@ -191,13 +191,13 @@ class Journey:
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
-        self._tell_slide()
         for line in self.errors.summary.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
             console.say(line)
         if self.stop:
             of = f"about {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")
             return AGAIN
+        self._tell_slide()
         finished = row.step >= len(self.timeline)
         if self.slab.root and finished:
             self.directory.note(saved=True, finished=(row.step, row.time))
