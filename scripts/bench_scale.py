@@ -136,6 +136,7 @@ def told(what: str, one: list[Run], two: list[Run], work: float, rate: float) ->
     yield Line("scale", f"{what}: speed of 2 ranks over 1", middle, "", low, high)
     limit = float(np.median([best_ratio(a, b, work, rate) for a, b in pairs]))
     yield Line("scale", f"{what}: by the roofline at most", limit, "")
+    yield Line("scale", f"{what}: share of that", middle / limit, "")
 
 
 def _rates(name: str, runs: list[Run]) -> Iterator[Line]:
