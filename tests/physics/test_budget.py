@@ -19,7 +19,7 @@ def test_parts_add_up() -> None:
     assert astuple(budget.friction) == pytest.approx(
         (0.5e-3, 1.7 * 4e-4 * (4e-4 / 7.2e-3) ** 0.25 * (1 - 0.9 * 0.1**2), 1e-4, 0.05 * 2**-2.5)
     )
-    solver, time = 0.4 * 1e-3**0.7, 0.08 * budget.friction.time
+    solver, time = 0.4 * 1e-3**0.7, 0.1 * budget.friction.time
     assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, 0.25 / 19))
     assert budget.area.total == pytest.approx(solver + time + 0.9e-4 + 0.25 / 19)
 
