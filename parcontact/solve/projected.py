@@ -5,7 +5,7 @@ residual t and the last two changes of x, as far along each as makes the sum of 
 values on c, C: subtract the mean over c). Then what has become negative is put to 0, the load is restored, near by
 first (`local_load`), and A is applied anew, so that the changes that are kept have exact images. A need not be
 symmetric. Nothing is guaranteed: where a residual has nothing in common with the image of its own t, steps no longer
-help, and the caller has to notice.
+help, and the caller has to notice. Restoring the load from all points alike may then lead on, but is slower as a rule.
 """
 
 import numpy as np
@@ -42,8 +42,9 @@ class Projected:
         self.surround = Surround(slab, preconditioner, FLOOR, GRIDS)
         self.local_load = LocalLoad(slab)
 
-    def begin(self) -> None:
-        """Forget earlier changes."""
+    def begin(self, near_by: bool = True) -> None:
+        """Forget earlier changes. From now on the load is restored `near_by` first, or from all points alike."""
+        self.near_by = near_by
         for field in (*self.t, *self.w):
             field.fill(0.0)
 
@@ -60,7 +61,8 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
-        kernels.scale(x, load / self.local_load.cut_off(x))
+        now = self.local_load.cut_off(x) if self.near_by else self.slab.sum(*kernels.clip(x))[0]
+        kernels.scale(x, load / now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 

@@ -105,17 +105,19 @@ class SteadySolver:
         return self._change_sets(start, h, mean, projections)
 
     def _project(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate, int]:
-        """Projected steps as long as they help."""
+        """Projected steps as long as they help, in one way and then in the other."""
         self._admit(p, mean)
         d, certificate = self._certify(p, h, mean)
-        best, since, steps = certificate.worst, 0, 0
-        self._projected.begin()
-        while certificate.worst > self.tolerance and since < MAX_STEPS_TO_HALVE:
-            self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
-            d, certificate = self._certify(p, h, mean)
-            steps += 1
-            halved = certificate.worst <= 0.5 * best
-            best, since = (certificate.worst, 0) if halved else (best, since + 1)
+        steps = 0
+        for near_by in (True, False):
+            best, since = certificate.worst, 0
+            self._projected.begin(near_by)
+            while certificate.worst > self.tolerance and since < MAX_STEPS_TO_HALVE:
+                self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
+                d, certificate = self._certify(p, h, mean)
+                steps += 1
+                halved = certificate.worst <= 0.5 * best
+                best, since = (certificate.worst, 0) if halved else (best, since + 1)
         return d, certificate, steps
 
     def _change_sets(self, x: Array, h: Array, mean: float, projections: int) -> SteadyContact:
