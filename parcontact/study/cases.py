@@ -13,6 +13,7 @@ from dataclasses import astuple, dataclass, fields, replace
 
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, HeightFile, Job, Stage, Study
+from ..job.limits import one_cell
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,12 @@ class Ladders:
             yield replace(base, kernel=kernel)
 
 
+def _cells_of_time_steps(job: Job) -> float:
+    """The cells that the time step of the first slide with one comes to; 1 where nothing slides so."""
+    steps = ((stage, stage.time_step) for stage in job.history if stage.speed)
+    return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
+
+
 def at_time_step(case: Case, mesh: int) -> Case:
     """The same time step on another mesh; steps that are chosen are so there too."""
     if case.cells_per_step is None:
@@ -111,7 +118,9 @@ def ladders(job: Job) -> Ladders:
         if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:
             raise InputError(f"study.mesh: {mesh} points along x are no whole number along y in this box")
     own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
-    if own is None and (study.cells_per_step or not _sliding(job)):
+    if own is None and not _sliding(job):
+        own = _cells_of_time_steps(job)
+    if own is None and study.cells_per_step:
         own = 1.0
     case = Case(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)

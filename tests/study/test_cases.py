@@ -134,3 +134,13 @@ def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
     assert all(load(path, overrides(job, found.own, case)).history[2].chooses for case in cases)
     assert "study.cells_per_step would show" in about_chosen_steps(job)[0]
     assert found.shared == 0.01
+
+
+def test_a_time_step_of_a_slide_is_told_in_cells(path: Path) -> None:
+    """1e-6 s at 1 m/s over cells of 1e-3/64 m, and a ladder that refines it takes those cells."""
+    path.write_text(TEXT.replace(", cells_per_step: 2", ", time_step: 1.0e-6"))
+    _, found = refined(path, "{tolerance: [1e-3]}")
+    assert [case.steps for case in found.cases()] == ["0.064 cell per step"] * 2
+    job, found = refined(path, "{cells_per_step: [0.5, 0.25]}")
+    jobs = [load(path, overrides(job, found.own, case)) for case in found.cases()]
+    assert [one.history[1].time_step for one in jobs] == pytest.approx([0.5e-3 / 64, 0.25e-3 / 64], rel=1e-12)
