@@ -135,6 +135,7 @@ def test_groups_of_ranks_take_cases_by_turns(
     world.Barrier()
     assert sweep.run(cases, cases, groups, act) == 3
     assert begun == list(range(6))[groups.number :: groups.count]
+    world.Barrier()  # root removes it
     assert not Path("out/job/stop").exists()
 
 
