@@ -1,10 +1,12 @@
 """Friction curves from the command line, and marches that start from steady sliding."""
 
+import csv
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import Main
 from mpi4py import MPI
 
 from parcontact import job as jobs
@@ -138,6 +140,18 @@ def test_curve_without_velocities_or_pressure(tmp_path: Path) -> None:
         request(jobs.load(path))
     with pytest.raises(InputError, match="no pressure"):
         request(jobs.load(path, ["history.0.pressure=null", "history.0.approach=-1e-6"]), [0.1])
+
+
+def test_one_point_is_a_flat_surface(main: Main, tmp_path: Path) -> None:
+    """Which is in full contact, without friction."""
+    material = "{model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0e-3}]}"
+    job = tmp_path / "job.yaml"
+    job.write_text(f"grid: {{points: 1, size: 1.0e-3}}\nsurface: {{shape: flat}}\nmaterial: {material}\n")
+    code, _, err = main("steady", job, "--velocities", "0.1", "--pressures", "1e5", "--quiet")
+    assert code == 0, err
+    with (tmp_path / "out" / "job" / "steady.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert (float(row["contact_area"]), float(row["friction"]), float(row["max_pressure"])) == (1.0, 0.0, 1e5)
 
 
 def test_energies_need_a_body_at_rest(frictions: Callable[..., list[float]]) -> None:

@@ -41,7 +41,8 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     groups = Groups(world, on_root(world, lambda: side_by_side.count(sweep.to_do(chosen, afresh), world.size)))
     limit = watch.limit(getattr(options, "wall", None))
     manner = sweep.Manner(options.quiet, limit, told, runs)
-    own = argparse.Namespace(**{**vars(options), "quiet": options.quiet or groups.count > 1})
+    own = argparse.Namespace(**vars(options))
+    own.quiet, own.others_file = options.quiet or groups.count > 1, sweep.stop_file(cases)
     return sweep.run(cases, chosen, groups, lambda job, slab, shows: act(own, job, slab, shows), manner)
 
 

@@ -31,9 +31,9 @@ def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int
 
     if not job.history:
         return _curve(options, job, slab, shows)
-    return runner.run(
-        job, slab, runner.Options(options.quiet, options.restart, options.until, options.wall, shows=shows)
-    )
+    others_file = getattr(options, "others_file", None)  # of a sweep
+    chosen = (options.quiet, options.restart, options.until, options.wall)
+    return runner.run(job, slab, runner.Options(*chosen, others_file=others_file, shows=shows))
 
 
 def steady(options: argparse.Namespace) -> int:
@@ -48,7 +48,8 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows)
+    others_file = getattr(options, "others_file", None)  # of a sweep
+    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows, others_file)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code

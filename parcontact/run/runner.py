@@ -34,7 +34,8 @@ from .watch import Watch
 class Options:
     """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
-    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. Doubts about a
+    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. One that is a case
+    of a sweep ends with the stop file of all, `others_file`, too. Doubts about a
     scene that are not shown, as `shows` says, go into run.log only.
     """
 
@@ -43,6 +44,7 @@ class Options:
     until: float | None = None
     wall: float | None = None
     stop_file: Path | None = None
+    others_file: Path | None = None
     beside: bool = False
     shows: Callable[[str], bool] = always
 
@@ -97,7 +99,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
             facts = Facts(0, 0.0, plain, provenance, claim.id)
             with Signals().noted() as signals:
                 stop_file = options.stop_file or directory.stop_file
-                watching = Watch(slab, job.checkpoint, stop_file, signals, limit)
+                watching = Watch(slab, job.checkpoint, stop_file, signals, limit, options.others_file)
                 code, half = _half_mesh(job, slab, options, recorder.console, stop_file)
                 if code != DONE:
                     return Ended(code, marching)

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from .journey import AGAIN, DONE
 from .sweep_warnings import SweepWarnings, warn
 
 FAILED = 1
-STOP = "stop"  # a file of this name in the directory of the sweep ends it after the cases that run
+STOP = "stop"  # a file of this name in the directory of the sweep ends it, and the cases that run, when they have saved
 ENDS = {DONE: "done", AGAIN: "stopped early", FAILED: "failed"}
 
 Shows = Callable[[str], bool]
@@ -44,19 +45,19 @@ def run(cases: Sequence[Case], chosen: Sequence[Case], groups: Groups, act: Act,
     and what says whether a warning is shown.
 
     A case that fails does not stop the others: the code is 1 in the end. One that stops early with a checkpoint stops
-    the sweep, with its code: the same command goes on with it. So do a stop file, and the end of the wall time, before
-    a case begins.
+    the sweep, with its code, and the cases beside it: the same command goes on with them. So do a stop file, and the
+    end of the wall time.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
-    code, stopped = _go(cases, dealt(chosen, groups), groups, act, manner, doubts)
+    code = _go(cases, dealt(chosen, groups), groups, act, manner, doubts)
     with Signals().noted():  # one that ends the ranks that wait here would end the others with them
-        found = groups.from_all((code, stopped, doubts.kinds))
-    codes = [one for one, _, _ in found]
+        found = groups.from_all((code, doubts.kinds))
+    codes = [one for one, _ in found]
     if groups.root:
-        for text in doubts.summary([kinds for _, _, kinds in found]):
+        for text in doubts.summary([kinds for _, kinds in found]):
             warn(text)
-        if any(reason == watch.REASONS[watch.FILE] for _, reason, _ in found):
-            (_directory(cases) / STOP).unlink(missing_ok=True)
+        if AGAIN in codes:
+            stop_file(cases).unlink(missing_ok=True)
         if AGAIN not in codes and not manner.quiet:
             _say(f"results of all cases: {_directory(cases) / sweep_table.TABLE}")
     return AGAIN if AGAIN in codes else max(codes)
@@ -84,8 +85,8 @@ def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
 
 def _go(
     cases: Sequence[Case], own: Sequence[Case], groups: Groups, act: Act, manner: Manner, doubts: SweepWarnings
-) -> tuple[int, str]:
-    """The cases of one group of ranks: the exit code, and why it has stopped before a case, or ''."""
+) -> int:
+    """The cases of one group of ranks; returns the exit code. If it stops early, so do the others."""
     directory, code = _directory(cases), DONE
     for case in own:
         slab = Slab(groups.comm, *case.job.grid.points)
@@ -93,7 +94,7 @@ def _go(
         if reason := slab.agree(_reason_to_stop(directory, manner.limit) if slab.root else ""):
             if speaks:
                 _say(f"stopped before case {case.number}: {reason}; run again to go on")
-            return AGAIN, reason
+            return AGAIN
         if speaks:
             _say(f"{case} (of {len(cases)})")
         doubts.begin(case.number)
@@ -103,9 +104,12 @@ def _go(
         if speaks and groups.count > 1:
             _say(f"case {case.number}: {ENDS[ended]}")
         if ended == AGAIN:
-            return AGAIN, ""
+            if slab.root and groups.count > 1:
+                with suppress(OSError):
+                    stop_file(cases).touch()
+            return AGAIN
         code = max(code, ended)
-    return code, ""
+    return code
 
 
 def refuse_foreign(cases: Sequence[Case]) -> None:
@@ -134,6 +138,11 @@ def refuse_foreign(cases: Sequence[Case]) -> None:
 def _say(text: str) -> None:
     """A line at once: those of several groups do not mingle."""
     print(f"{text}\n", end="", flush=True)
+
+
+def stop_file(cases: Sequence[Case]) -> Path:
+    """Ends a sweep."""
+    return _directory(cases) / STOP
 
 
 def _directory(cases: Sequence[Case]) -> Path:

@@ -35,13 +35,15 @@ class Verdict:
 
 @dataclass
 class Watch:
-    """Asked after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any."""
+    """Asked after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any;
+    `others_file` a stop file of more than this run, which stays where it is."""
 
     slab: Slab
     rules: Checkpoint
     stop_file: Path
     signals: Signals
     limit: float | None = None
+    others_file: Path | None = None
     state_bytes: int = 0
     _saved: float = field(default_factory=time.monotonic)
     _looked: float = 0.0
@@ -89,7 +91,7 @@ class Watch:
             return WALL
         if now - self._looked > LOOK_SECONDS:
             self._looked = now
-            return FILE if os.path.lexists(self.stop_file) else GO
+            return FILE if any(os.path.lexists(path) for path in (self.stop_file, self.others_file) if path) else GO
         return GO
 
     def _due(self, step: int, now: float, began: bool) -> bool:

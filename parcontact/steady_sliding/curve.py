@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import sanity, scene
@@ -89,11 +90,13 @@ def run(
     quiet: bool,
     restart: str = "auto",
     shows: Callable[[str], bool] = always,
+    others_file: Path | None = None,
 ) -> int:
     """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
 
     A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
-    of the warnings those are printed that it `shows`.
+    of the warnings those are printed that it `shows`. The file
+    `others_file` stops it like its own stop file, and stays where it is.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -114,7 +117,7 @@ def run(
         maps = _maps(job, slab, wanted, directory)
         try:
             with Signals().noted() as signals:
-                return _Curve(sliding, wanted, table, maps, directory, signals, shows).go()
+                return _Curve(sliding, wanted, table, maps, directory, signals, shows, others_file).go()
         finally:
             if table:
                 table.close()
@@ -168,11 +171,12 @@ class _Curve:
         directory: Directory,
         signals: Signals,
         shows: Callable[[str], bool],
+        others_file: Path | None,
     ) -> None:
         self.sliding, self.wanted, self.table, self.maps = sliding, wanted, table, maps
         self.directory, self.signals, self.slab = directory, signals, sliding.base.slab
         job = sliding.base.job
-        self.shows = shows
+        self.shows, self.others_file = shows, others_file
         self.watch, self.failures = sanity.ContactWatch(job, job.timeline()), 0
 
     def go(self) -> int:
@@ -189,7 +193,8 @@ class _Curve:
 
     def _stopped(self) -> bool:
         stop = self.directory.stop_file
-        asked = self.signals.stop or (self.slab.root and stop.exists())
+        found = self.slab.root and any(path.exists() for path in (stop, self.others_file) if path)
+        asked = self.signals.stop or found
         if not self.slab.reduce((), [float(asked)])[0]:
             return False
         if self.slab.root and stop.is_file():

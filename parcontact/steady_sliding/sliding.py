@@ -232,4 +232,5 @@ def _stiffness(slab: Slab, operator: Convolution, dtype: type[np.floating]) -> f
     if owner:
         impulse[0, 0] = 1.0
     operator.apply(impulse, answer)
-    return 1.0 / slab.sum(float(answer[0, 0]) if owner else 0.0)[0]
+    displacement = slab.sum(float(answer[0, 0]) if owner else 0.0)[0]
+    return 1.0 / displacement if displacement else 0.0  # one point, whose mean displacement is not counted
