@@ -7,6 +7,7 @@ ones, and goes as far as makes the sum of squares of `r = C R (A x - h)` smalles
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,40 +18,60 @@ from .operator import Operator
 
 
 class Directions:
-    """Buffers for up to `count` directions t and their images A t."""
+    """Up to `count` directions t and their images A t: in the maps of `lent`, pairs of them, then in maps of their own.
 
-    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, count: int, dtype: type) -> None:
+    These, and that of the residual, are made when they are needed for the first time.
+    """
+
+    def __init__(
+        self,
+        slab: Slab,
+        operator: Operator,
+        preconditioner: Operator,
+        count: int,
+        dtype: type,
+        lent: Sequence[tuple[Array, Array]] = (),
+    ) -> None:
         self.slab, self.operator, self.preconditioner, self.count = slab, operator, preconditioner, count
-        self.t = [slab.empty(dtype) for _ in range(count)]
-        self.w = [slab.empty(dtype) for _ in range(count)]
-        self.z = slab.empty(dtype)
-        self.r = slab.empty(dtype)
+        self.dtype, self._pairs = dtype, list(lent)
+        self._r: Array | None = None
+
+    def _residual(self) -> Array:
+        if self._r is None:
+            self._r = self.slab.empty(self.dtype)
+        return self._r
+
+    def _pair(self, number: int) -> tuple[Array, Array]:
+        if number == len(self._pairs):
+            self._pairs.append((self.slab.empty(self.dtype), self.slab.empty(self.dtype)))
+        return self._pairs[number]
 
     def improve(self, x: Array, u: Array, h: Array, working: NDArray[np.bool_], limit: int, reduction: float) -> int:
         """Up to `limit` steps on `working`, until the residual has fallen by `reduction`; u stays A x. Collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         if members == 0.0:
             return 0
-        size = self.slab.sum(residual(working, u, h, total / members, self.r))[0]
+        r = self._residual()
+        size = self.slab.sum(residual(working, u, h, total / members, r))[0]
         goal = reduction**2 * size
         norms: list[float] = []
         means: list[float] = []
         for step in range(limit):
             if size <= goal or size == 0.0:
                 return step
-            t, w = self.t[step], self.w[step]
-            self.preconditioner.apply(self.r, self.z)
-            _, mean = self.slab.sum(*sum_on(working, self.z))
-            spread(working, self.z, mean / members, t)
+            t, w = self._pair(step)
+            self.preconditioner.apply(r, t)
+            _, mean = self.slab.sum(*sum_on(working, t))
+            centre(working, mean / members, t)
             self.operator.apply(t, w)
             self._orthogonalize(working, members, norms, means)
-            total, square, product = self.slab.sum(*_products(working, w, self.r))
+            total, square, product = self.slab.sum(*_products(working, w, r))
             means.append(total / members)
             norms.append(square - total * means[-1])
             if not norms[-1] > 0.0 or not math.isfinite(product):
                 return step
             alpha = product / norms[-1]
-            size = self.slab.sum(_step(working, alpha, t, w, means[-1], x, u, self.r))[0]
+            size = self.slab.sum(_step(working, alpha, t, w, means[-1], x, u, r))[0]
         return limit
 
     def _orthogonalize(
@@ -60,13 +81,14 @@ class Directions:
         last = len(norms)
         if last == 0:
             return
-        w = self.w[last]
-        sums = [_common(working, w, self.w[k]) for k in range(last)]
+        t, w = self._pairs[last]
+        earlier = self._pairs[:last]
+        sums = [_common(working, w, other) for _, other in earlier]
         total, *common = self.slab.sum(sum_on(working, w)[1], *sums)
-        for k in range(last):
+        for k, (other_t, other_w) in enumerate(earlier):
             beta = (common[k] - total * means[k]) / norms[k]
-            _subtract(beta, self.t[k], self.t[last])
-            _subtract(beta, self.w[k], w)
+            _subtract(beta, other_t, t)
+            _subtract(beta, other_w, w)
 
 
 @loop
@@ -113,11 +135,11 @@ def sum_on(working, z):
 
 
 @loop
-def spread(working, z, mean, t):
-    """`t = z - mean` on the set, 0 elsewhere."""
-    for j in range(z.shape[0]):
-        for i in range(z.shape[1]):
-            t[j, i] = z[j, i] - mean if working[j, i] else 0.0
+def centre(working, mean, t):
+    """`t <- t - mean` on the set, 0 elsewhere."""
+    for j in range(t.shape[0]):
+        for i in range(t.shape[1]):
+            t[j, i] = t[j, i] - mean if working[j, i] else 0.0
 
 
 @loop

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .gcr import gaps_on, residual, spread, sum_on
+from .gcr import centre, gaps_on, residual, sum_on
 from .local_load import LocalLoad
 from .operator import Operator
 from .surround import Surround
@@ -26,21 +26,17 @@ GRIDS, FLOOR = 4, 1.0  # of `Surround`: where waves along the slide are far stif
 
 
 class Projected:
-    """Buffers: the maps t and w are lent, at least DIRECTIONS of them, as are r and z."""
+    """Holds DIRECTIONS maps t and as many of their images w, and those of `Surround`."""
 
-    def __init__(
-        self,
-        slab: Slab,
-        operator: Operator,
-        preconditioner: Operator,
-        lent: tuple[list[Array], list[Array], Array, Array],
-        dtype: type,
-    ) -> None:
+    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, dtype: type) -> None:
         self.slab, self.operator = slab, operator
-        t, w, self.r, self.z = lent
-        self.t, self.w = t[:DIRECTIONS], w[:DIRECTIONS]
+        self.t, self.w = ([slab.empty(dtype) for _ in range(DIRECTIONS)] for _ in range(2))
         self.surround = Surround(slab, preconditioner, FLOOR, GRIDS)
         self.local_load = LocalLoad(slab)
+
+    def lend(self) -> list[tuple[Array, Array]]:
+        """The pairs of a direction and its image, for work before the next `begin`."""
+        return list(zip(self.t, self.w, strict=True))
 
     def begin(self, near_by: bool = True) -> None:
         """Forget earlier changes. From now on the load is restored `near_by` first, or from all points alike."""
@@ -51,13 +47,13 @@ class Projected:
     def step(self, x: Array, u: Array, h: Array, working: Set, load: float) -> None:
         """Move x, which is then admissible and has the sum `load`, and its image u with it; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
-        residual(working, u, h, total / members, self.r)
-        self.z[...] = self.r
-        self.surround.apply(working, self.z)
-        _, mean = self.slab.sum(*sum_on(working, self.z))
-        spread(working, self.z, mean / members, self.t[0])
-        self.operator.apply(self.t[0], self.w[0])
-        sums = np.array(self.slab.sum(*_gram(working, self.r, *self.w)))
+        level, t = total / members, self.t[0]
+        residual(working, u, h, level, t)
+        self.surround.apply(working, t)
+        _, mean = self.slab.sum(*sum_on(working, t))
+        centre(working, mean / members, t)
+        self.operator.apply(t, self.w[0])
+        sums = np.array(self.slab.sum(*_gram(working, u, h, level, *self.w)))
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
@@ -88,15 +84,15 @@ def _smallest(sums: Array, members: float) -> list[float]:
 
 
 @loop
-def _gram(working, r, a, b, c):
-    """Over the set: sums of a, b and c, of their products with r, and of aa, ab, ac, bb, bc and cc."""
+def _gram(working, u, h, level, a, b, c):
+    """Over the set: sums of a, b and c, of their products with `u - h - level`, and of aa, ab, ac, bb, bc and cc."""
     total = np.zeros(12)
-    for j in range(r.shape[0]):
+    for j in range(u.shape[0]):
         s_a, s_b, s_c, r_a, r_b, r_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         a_a, a_b, a_c, b_b, b_c, c_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(r.shape[1]):
-            weight = 1.0 if working[j, i] else 0.0
-            x, y, z, here = weight * a[j, i], weight * b[j, i], weight * c[j, i], r[j, i]
+        for i in range(u.shape[1]):
+            weight, here = 1.0 if working[j, i] else 0.0, u[j, i] - h[j, i] - level
+            x, y, z = weight * a[j, i], weight * b[j, i], weight * c[j, i]
             s_a += x
             s_b += y
             s_c += z

@@ -16,21 +16,25 @@ coarser grids makes it cheap; from far away it may cycle, and then it says so.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import loop
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array, Slab, deal
 from . import kernels
 from .certificate import Certificate
 from .contact import certify, weigh
 from .gcr import Directions, gaps_on
 from .operator import Operator
-from .projected import Projected
+from .projected import DIRECTIONS, GRIDS, Projected
+from .surround import Surround
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 WAYS = ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
+MAX_DIRECTIONS = 10  # of the linear steps on a set
 MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which sets have stalled
 
 
@@ -57,7 +61,8 @@ class SteadyContact:
 
 
 class SteadySolver:
-    """Buffers and loop on one grid.
+    """Loop on one grid, and the maps that it works in: seven, a byte per point, and those of `Surround`; where the
+    active set goes on, one more and two for each linear step on a set beyond the third.
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `stiffness`, the pressure on a point over the
     displacement it causes there; `height` of the surface; `tolerance` on the certificate;
@@ -73,18 +78,25 @@ class SteadySolver:
         height: float,
         tolerance: float,
         max_steps: int,
-        directions: int = 10,
+        directions: int = MAX_DIRECTIONS,
         dtype: type[np.floating] = np.float64,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.kappa = 0.1 * stiffness
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
-        self._linear = linear = Directions(slab, operator, preconditioner, directions, dtype)
-        lent = (linear.t, linear.w, linear.r, linear.z)
-        self._projected = Projected(slab, operator, preconditioner, lent, dtype)
+        self._projected = Projected(slab, operator, preconditioner, dtype)
+        self._linear = Directions(slab, operator, preconditioner, directions, dtype, self._projected.lend())
         self._u = slab.zeros(dtype)
         self._length = height  # of the last certificate
-        self._working = np.zeros(slab.shape, dtype=np.bool_)
+        self._working: NDArray[Any] = slab.zeros(np.bool_)
+
+    @staticmethod
+    def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int, sets: bool = False) -> int:
+        """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
+        rows = deal(ny, ranks)[rank]
+        maps = 1 + 2 * DIRECTIONS + sets * (1 + 2 * (MAX_DIRECTIONS - DIRECTIONS))
+        surround = Surround.footprint(nx, ny, ranks, rank, GRIDS)
+        return (maps * itemsize + 1) * (rows.stop - rows.start) * nx + surround
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution
