@@ -122,7 +122,10 @@ class FFT:
         return self._to_map(out, 1.0 / (self.mx * self.my))
 
     def convolve(self, field: Array, symbol: NDArray[np.inexact], out: Array) -> Array:
-        """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective."""
+        """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective.
+
+        One that is even in q_y may have only the rows of q_y >= 0, the first `my // 2 + 1`.
+        """
         spectrum = self.forward(field)
         _multiply(spectrum, symbol)
         return self._to_map(out, 1.0)
@@ -263,7 +266,10 @@ class Transpose:
 
 @loop
 def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]) -> None:
-    """`spectrum <- symbol spectrum`: faster than numpy, which makes a real symbol complex first."""
-    for j in range(spectrum.shape[0]):
+    """`spectrum <- symbol spectrum`: faster than numpy, which makes a real symbol complex first. Rows that the symbol
+    does not have are those of -q_y."""
+    count = spectrum.shape[0]
+    for j in range(count):
+        factors = symbol[j] if j < symbol.shape[0] else symbol[count - j]
         for i in range(spectrum.shape[1]):
-            spectrum[j, i] *= symbol[j, i]
+            spectrum[j, i] *= factors[i]

@@ -3,26 +3,37 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from ..parallel.fft import FFT
 from ..parallel.fftw import pyfftw
-from ..parallel.slab import Array
+from ..parallel.slab import Array, deal
+
+ALL = slice(None)
+PARTS = 16  # of a spectrum, for which something is calculated at once: what it takes is small beside the whole
 
 
 class Convolution:
-    """A linear operator given by its symbol on the wavenumbers of a transform, shape `fft.shape`."""
+    """A linear operator given by its symbol on the wavenumbers of a transform.
 
-    def __init__(self, fft: FFT, symbol: NDArray[np.inexact]) -> None:
+    `part(rows)` is the symbol on these rows of the spectrum, `dtype` what it is kept in. Of one that is `even` in q_y
+    only the rows of q_y >= 0 are made and kept.
+    """
+
+    def __init__(
+        self, fft: FFT, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, even: bool = True
+    ) -> None:
         self.fft = fft
-        scale = 1.0 / (fft.mx * fft.my)
-        self.symbol = np.multiply(symbol, scale).astype(fft.dtype if np.isrealobj(symbol) else fft.complex)
+        count, scale = fft.my // 2 + 1 if even else fft.my, 1.0 / (fft.mx * fft.my)
+        self.symbol = np.empty((count, fft.shape[1]), dtype)
         fft.slab.tally.hold(self.symbol)
+        for rows in deal(count, PARTS):
+            np.multiply(part(rows), scale, out=self.symbol[rows], casting="same_kind")
 
     @staticmethod
-    def footprint(spectrum: int) -> int:
-        """Bytes of a real symbol beside a transform whose spectrum has so many."""
-        return spectrum // 2
+    def footprint(spectrum: int, my: int) -> int:
+        """Bytes of a real symbol, which is even, beside a transform whose spectrum has so many in `my` rows."""
+        return spectrum // my * (my // 2 + 1) // 2
 
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""
@@ -30,10 +41,11 @@ class Convolution:
         return self.fft.convolve(field, self.symbol, out)
 
 
-def wavenumbers(fft: FFT, size: tuple[float, float]) -> tuple[Array, Array]:
-    """Angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to its shape."""
+def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
+    """Angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to the shape of these
+    rows of it."""
     along_x, along_y = fft.modes
-    return 2 * np.pi / size[0] * along_x, 2 * np.pi / size[1] * along_y
+    return 2 * np.pi / size[0] * along_x, 2 * np.pi / size[1] * along_y[rows]
 
 
 def padded_lengths(nx: int, ny: int) -> tuple[int, int]:

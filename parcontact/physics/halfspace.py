@@ -28,7 +28,7 @@ from numpy.typing import DTypeLike
 from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
-from .convolution import Convolution, padded_lengths, tabulate, wavenumbers
+from .convolution import ALL, Convolution, padded_lengths, tabulate, wavenumbers
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 from .wake import wake
@@ -42,8 +42,8 @@ class HalfSpace:
 
     `free`: there is nothing around the box, and the coefficients are Love's; else the box repeats for ever, with the
     `kernel`. Transforms are handed in: `fft` is one of the maps' own size, in whose precision operators calculate;
-    symbols have its shape. A free half space makes a padded transform for each of its operators, which nobody outside
-    sees.
+    symbols have its shape, or that of the rows that are asked for. A free half space makes a padded transform for each
+    of its operators, which nobody outside sees.
     """
 
     size: Vector
@@ -53,20 +53,20 @@ class HalfSpace:
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 
-    def symbol(self, fft: FFT) -> Array:
+    def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Displacement over pressure of each wave of a periodic half space, `(1 - nu)/|q|`; a mean moves nothing."""
-        q = np.hypot(*wavenumbers(fft, self.size))
+        q = np.hypot(*wavenumbers(fft, self.size, rows))
         with np.errstate(divide="ignore"):
             symbol = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
-        return symbol * cell_factor(fft, self.size) if self.kernel == "love" else symbol
+        return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
-    def inverse_symbol(self, fft: FFT) -> Array:
+    def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Pressure over displacement of each wave, `|q|/(1 - nu)`, whatever the kernel.
 
         At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
         acts on mean values only.
         """
-        q = np.hypot(*wavenumbers(fft, self.size))
+        q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
         return np.asarray(q / (1.0 - self.poisson))
 
@@ -86,27 +86,32 @@ class HalfSpace:
         coefficients a linear one (paper, reference [12]).
         """
         if not self.free:
-            return Convolution(fft, self.symbol(fft))
+            return Convolution(fft, partial(self.symbol, fft), fft.dtype)
         padded = _padded(fft, fft.dtype, fft.measured)
-        return Convolution(padded, tabulate(padded, self.size, partial(love, poisson=self.poisson)).real)
+        table = tabulate(padded, self.size, partial(love, poisson=self.poisson))
+        return Convolution(padded, lambda rows: table[rows].real, fft.dtype)
 
     def inverse(self, fft: FFT) -> Convolution:
         """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
         a preconditioner."""
-        return Convolution(fft, self.inverse_symbol(fft))
+        return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 
-    def frequencies(self, fft: FFT, velocity: Vector) -> Array:
+    def frequencies(self, fft: FFT, velocity: Vector, rows: slice = ALL) -> Array:
         """Angular frequency `q v` of each wave under a surface of that velocity [length/s]; shape `fft.shape`."""
-        qx, qy = wavenumbers(fft, self.size)
+        qx, qy = wavenumbers(fft, self.size, rows)
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
-    def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony) -> Spectrum:
-        """G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both."""
-        qx, qy = wavenumbers(fft, self.size)
-        at_x, at_y = (2 * np.abs(mode) == count for mode, count in zip(fft.modes, (fft.mx, fft.my), strict=True))
-        result = np.zeros(fft.shape, dtype=np.complex128)
+    def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:
+        """G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both.
+
+        It broadcasts to the shape of these rows of a spectrum: under a surface that slides along x all are the same.
+        """
+        rows = rows if velocity[1] else slice(0, 1)
+        qx, qy = wavenumbers(fft, self.size, rows)
+        at_x, at_y = 2 * np.abs(fft.modes[0]) == fft.mx, 2 * np.abs(fft.modes[1][rows]) == fft.my
+        result = np.zeros((len(qy), fft.shape[1]), dtype=np.complex128)
         for sign_x, sign_y in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
             along_x, along_y = np.where(at_x, sign_x * qx, qx), np.where(at_y, sign_y * qy, qy)
             result += 0.25 * complex_modulus(-(along_x * velocity[0] + along_y * velocity[1]), *prony)
@@ -119,11 +124,19 @@ class HalfSpace:
         """
         if self.free:
             return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
-        return Convolution(fft, self.symbol(fft) / self.sliding_modulus(fft, velocity, prony))
+
+        def part(rows: slice) -> Spectrum:
+            return np.asarray(self.symbol(fft, rows) / self.sliding_modulus(fft, velocity, prony, rows))
+
+        return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def sliding_inverse(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
         """Displacement -> pressure, as `inverse`."""
-        return Convolution(fft, self.inverse_symbol(fft) * self.sliding_modulus(fft, velocity, prony))
+
+        def part(rows: slice) -> Spectrum:
+            return np.asarray(self.inverse_symbol(fft, rows) * self.sliding_modulus(fft, velocity, prony, rows))
+
+        return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def branch_operator(self, fft: FFT, velocity: Vector, prony: Prony, k: int) -> Convolution:
         """Pressure -> map h_k of branch k of an unbounded body; collective.
@@ -143,7 +156,8 @@ class HalfSpace:
         def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:
             return wake(x, y, dx, dy, velocity, creep) * (2.0 * (1.0 - self.poisson))
 
-        return Convolution(padded, tabulate(padded, self.size, coefficient))
+        table = tabulate(padded, self.size, coefficient)
+        return Convolution(padded, table.__getitem__, padded.complex, even=not velocity[1])
 
 
 def _padded(fft: FFT, dtype: DTypeLike, measured: bool = True) -> FFT:

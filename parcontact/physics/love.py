@@ -12,7 +12,7 @@ import numpy as np
 from ..compiled import pointwise
 from ..parallel.fft import FFT
 from ..parallel.slab import Array
-from .convolution import wavenumbers
+from .convolution import ALL, wavenumbers
 
 NEAR = 4.0  # cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
 GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.legendre.leggauss(6))
@@ -58,10 +58,10 @@ def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the 
     return total * dx
 
 
-def cell_factor(fft: FFT, size: tuple[float, float]) -> Array:
+def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array:
     """Compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
 
-    Shape `fft.shape`; `size` is that of the box.
+    On these rows of a spectrum; `size` is that of the box.
 
     A wave of pressures constant on cells contains all aliases of its wavenumber, each with the cell's form factor:
     `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
@@ -71,7 +71,7 @@ def cell_factor(fft: FFT, size: tuple[float, float]) -> Array:
     the sums over Qx and Qy separate, and the integral is one product of matrices. Double exponential quadrature (H.
     Takahasi and M. Mori, Publ. RIMS 9 (1974) 721) starts far inside a cell and ends far outside the box.
     """
-    qx, qy = wavenumbers(fft, size)
+    qx, qy = wavenumbers(fft, size, rows)
     dx, dy = size[0] / fft.mx, size[1] / fft.my
     shortest, longest = min(dx, dy) / 16, max(size)
     u = np.arange(-3.7, math.log(2.0 * longest / shortest), 0.1)

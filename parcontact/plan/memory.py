@@ -69,7 +69,7 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
     precision, part = np.dtype(job.numerics.map_type), deal(job.grid.ny, ranks)[rank]
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
-    symbol = Convolution.footprint(spectrum)
+    symbol = Convolution.footprint(spectrum, job.grid.ny)
     yield _transform("transforms", job, job.grid.points, precision, ranks, rank)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
         yield _transform("padded transforms and operator", job, lengths, precision, ranks, rank, with_symbol=True)
@@ -100,7 +100,7 @@ def _transform(
 ) -> Holding:
     """A transform with its buffers, and the symbol of the operator that alone uses it."""
     spectrum, sent, blocks = footprint(job.grid.points, lengths, dtype, ranks, rank)
-    symbol = Convolution.footprint(spectrum) if with_symbol else 0
+    symbol = Convolution.footprint(spectrum, lengths[1]) if with_symbol else 0
     return Holding(what, spectrum + sent + blocks + symbol, transform_name(lengths, dtype), sent)
 
 

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import RunError
 from ..parallel.fft import FFT
-from ..parallel.slab import Array, Slab
-from ..physics.convolution import Convolution, wavenumbers
+from ..parallel.slab import Array, Slab, deal
+from ..physics.convolution import PARTS, Convolution, wavenumbers
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..scene import Frame
@@ -124,41 +125,46 @@ class SteadySliding:
         u = fft.forward(self.contact.u).copy()
         for modulus, tau in zip(self.base.prony.moduli, self.base.prony.relaxation_times, strict=True):
             own = Prony(0.0, np.array([modulus]), np.array([tau]))
-            yield fft.backward(half_space.sliding_modulus(fft, speed, own) * u, out)
+            for rows in deal(fft.my, PARTS):
+                np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
+            yield fft.backward(fft.spectrum, out)
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
 
         Of the last state; only for periodic scenes, where waves are independent. Collective.
         """
-        base = self.base
-        q = np.hypot(*wavenumbers(base.fft, base.job.grid.size))
-        longest = max(base.job.grid.size)
-        octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(int)
-        power = self._powers(velocity, octave)
+        longest = max(self.base.job.grid.size)
+        power = self._powers(velocity)
         total = power.sum()
         return longest / 2.0 ** np.arange(power.shape[1]), power.sum(axis=0) / (total if total > 0.0 else 1.0)
 
-    def _powers(self, velocity: Vector, group: Array | None = None) -> Array:
-        """Power [W] lost in each branch to each group of waves; collective.
+    def _powers(self, velocity: Vector) -> Array:
+        """Power [W] lost in each branch to waves from each wavelength of `shares` to half of it; collective.
 
         A wave u^ loses `|u^|^2/A |w| G_k''(|w|)`, with A its displacement over its pressure for a modulus of 1.
         """
         assert self.contact is not None
         base, fft, prony, grid = self.base, self.base.fft, self.base.prony, self.base.job.grid
-        omega = np.abs(base.half_space.frequencies(fft, self._in_units(velocity)))
-        compliance = base.half_space.symbol(fft)
-        waves = fft.multiplicity * np.abs(fft.forward(self.contact.u)) ** 2
-        waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
-        groups = 1 + int(np.log2(max(grid.points)))
-        group = np.zeros(fft.shape, dtype=int) if group is None else group
-        powers = []
-        for modulus, tau in zip(prony.moduli, prony.relaxation_times, strict=True):
-            loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
-            powers.append(np.bincount(group.ravel(), loss.ravel(), groups + 1))
+        spectrum, speed = fft.forward(self.contact.u), self._in_units(velocity)
+        powers = np.zeros((prony.moduli.size, 2 + int(np.log2(max(grid.points)))))
+        for rows in deal(fft.my, PARTS):
+            omega = np.abs(base.half_space.frequencies(fft, speed, rows))
+            compliance = base.half_space.symbol(fft, rows)
+            waves = fft.multiplicity * np.abs(spectrum[rows]) ** 2
+            waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
+            octave = self._octaves(rows)
+            for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
+                loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
+                branch += np.bincount(octave.ravel(), loss.ravel(), branch.size)
         unit = base.units.pressure * base.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
-        flat = np.array(powers).reshape(-1)
-        return np.array(base.slab.sum(*flat)).reshape(len(powers), -1) * unit if powers else np.zeros((0, groups + 1))
+        return np.array(base.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
+
+    def _octaves(self, rows: slice) -> NDArray[np.int64]:
+        """How many times the wavelength of each wave, on these rows of a spectrum, can be doubled within the box."""
+        size = self.base.job.grid.size
+        q = np.hypot(*wavenumbers(self.base.fft, size, rows))
+        return np.floor(np.log2(np.maximum(q * max(size) / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(np.int64)
 
     def _in_units(self, velocity: Vector) -> Vector:
         """A velocity [m/s] in the run's units of length per second."""

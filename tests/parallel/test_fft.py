@@ -99,6 +99,16 @@ def test_convolution_is_linear(communicators: list[MPI.Intracomm]) -> None:
         close(out, reference[slab.rows], scale=np.abs(reference).max())
 
 
+@pytest.mark.parametrize("ny", [1, 2, 9, 10])
+def test_half_of_an_even_symbol(comm: MPI.Intracomm, ny: int) -> None:
+    """It stands for the whole, to the same digits."""
+    slab = Slab(comm, 7, ny)
+    fft, field = FFT(slab), random_map(7, ny)[slab.rows]
+    half = np.random.default_rng(5).normal(size=(ny // 2 + 1, 4))[:, fft.columns]
+    whole = half[np.abs(fft.modes[1][:, 0])]
+    assert fft.convolve(field, half, slab.empty()).tolist() == fft.convolve(field, whole, slab.empty()).tolist()
+
+
 @pytest.mark.parametrize("dtype", TOLERANCES)
 def test_maps_that_fftw_cannot_take(comm: MPI.Intracomm, dtype: DTypeLike) -> None:
     """Of another precision, not aligned, or not contiguous: the result is the same."""
