@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import time
@@ -11,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import outside
 from bench_cold import Cold, pair
 from bench_lines import Line
 from bench_meter import OTHER, TRANSFORM, Meter
@@ -35,8 +35,7 @@ def on_two_ranks(parts: list[str], points: int, rounds: int) -> Iterator[Line]:
     """Lines of parts that this script, started on two ranks, measures there. Raises RuntimeError if it cannot."""
     words = [Path(sys.executable).with_name("mpirun"), "-n", "2", sys.executable, sys.argv[0], *parts, "--inside"]
     words += ["--points", str(points), "--rounds", str(rounds)]
-    outside = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=outside)
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=outside.environment())
     if done.returncode:
         raise RuntimeError(f"{', '.join(parts)} on two ranks: {done.stderr.strip()}")
     yield from (Line(**line) for line in json.loads(done.stdout.splitlines()[-1]))

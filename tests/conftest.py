@@ -2,7 +2,6 @@
 
 import io
 import math
-import os
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 import hypothesis
 import pytest
 from _pytest.config import create_terminal_writer
+from marching import load_script
 from mpi4py import MPI
 
 from parcontact import __main__
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 WORLD = MPI.COMM_WORLD
 REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
 UNSEEN = io.StringIO()  # what pytest says on the other ranks
+outside = load_script("outside")
 MAX_SECONDS_APART = 20.0  # seconds in which the other ranks must end a test that failed here
 
 # All ranks must see the same examples, and a first example waits for the compiler.
@@ -57,19 +58,10 @@ class RunParcontact(Protocol):
     ) -> subprocess.CompletedProcess[str]: ...
 
 
-def environment_outside_mpi() -> dict[str, str]:
-    """The environment without the marks that MPI has left in it, which would confuse another mpirun.
-
-    An mpirun whose ranks have ended with an error ends at once, too: it would give each 3 s and again 3 s to do so.
-    """
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    return clean | {"OMPI_MCA_odls_base_sigkill_timeout": "0", "PRTE_MCA_odls_base_sigkill_timeout": "0"}
-
-
 @pytest.fixture
 def outside_mpi() -> dict[str, str]:
     """The environment of a process outside MPI."""
-    return environment_outside_mpi()
+    return outside.environment()
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from conftest import WORLD, environment_outside_mpi
+from conftest import WORLD, outside
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
 
@@ -39,9 +39,9 @@ class Runs:
     def start(self, out: Path, ranks: int = 2, program: Sequence[str] = ("-m", "parcontact")) -> subprocess.Popen[str]:
         launch = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks > 1 else []
         command = [*launch, sys.executable, *program, "job.yaml", "--quiet", "--out", str(out)]
-        pipe, outside = subprocess.PIPE, environment_outside_mpi()
+        pipe, env = subprocess.PIPE, outside.environment()
         process = subprocess.Popen(
-            command, cwd=self.where, env=outside, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+            command, cwd=self.where, env=env, stdout=pipe, stderr=pipe, text=True, start_new_session=True
         )
         self.started.append(process)
         return process

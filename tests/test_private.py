@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import environment_outside_mpi
+from conftest import outside
 from mpi4py import MPI
 
 from parcontact import private
@@ -113,9 +113,7 @@ def common() -> Iterator[Path]:
 
 def as_nobody(words: list[str | Path], cwd: Path, home: Path | None, **more: str) -> subprocess.CompletedProcess[str]:
     """A command of a user who may write nowhere but in `cwd`."""
-    clean = {
-        key: value for key, value in environment_outside_mpi().items() if key != "HOME" and not key.startswith("XDG_")
-    }
+    clean = {key: value for key, value in outside.environment().items() if key != "HOME" and not key.startswith("XDG_")}
     environment = clean | more | ({} if home is None else {"HOME": str(home)})
     command = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", *map(str, words)]
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120.0)
@@ -225,7 +223,7 @@ def test_plans_that_somebody_prepared_are_not_read(cache: Path, tmp_path: Path) 
 
 def test_mpirun_without_a_home() -> None:
     """It takes the user's own, never a directory that others may fill."""
-    clean = environment_outside_mpi()
+    clean = outside.environment()
     clean.pop("HOME")
     words: list[str | Path] = [BIN / "mpirun", "-n", "1", sys.executable, "-c", "import os; print(os.environ['HOME'])"]
     said = subprocess.run(words, env=clean, capture_output=True, text=True)

@@ -6,11 +6,10 @@ from typing import Any
 
 import pytest
 from mpi4py import MPI
-from test_sweeps import JOB, table
+from test_sweeps import JOB, cases_in_groups, table
 
 from parcontact.__main__ import main
-from parcontact.job import Job, load_cases
-from parcontact.parallel.groups import Groups
+from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.run import sweep, watch
 
@@ -40,12 +39,7 @@ def test_a_stop_file_ends_the_case_that_runs(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.mpi
 def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A signal to one rank, say: the others begin no further case."""
-    monkeypatch.chdir(shared_path)
-    world, stop = MPI.COMM_WORLD, Path("out/job/stop")
-    if world.rank == 0:
-        (shared_path / "job.yaml").write_text(JOB)
-    world.Barrier()
-    cases, groups = load_cases("job.yaml"), Groups(world, 2)
+    (cases, groups), stop = cases_in_groups(shared_path, monkeypatch), Path("out/job/stop")
     begun: list[int] = []
 
     def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
@@ -57,5 +51,5 @@ def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.M
 
     assert sweep.run(cases, cases, groups, act) == 3
     assert groups.from_all(begun) == [[number] for number in range(groups.count)]
-    world.Barrier()  # root removes it
+    MPI.COMM_WORLD.Barrier()  # root removes it
     assert not stop.exists()

@@ -44,6 +44,15 @@ def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> list[di
         return list(csv.DictReader(file))
 
 
+def cases_in_groups(directory: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[tuple[Case, ...], Groups]:
+    """The cases of the job in a directory that all ranks see, and two groups of ranks for them, or one; collective."""
+    monkeypatch.chdir(directory)
+    if MPI.COMM_WORLD.rank == 0:
+        (directory / "job.yaml").write_text(JOB)
+    MPI.COMM_WORLD.Barrier()
+    return load_cases("job.yaml"), Groups(MPI.COMM_WORLD, 2)
+
+
 def go(cases: tuple[Case, ...], act: Callable[[Job, Slab], int]) -> int:
     return sweep.run(cases, cases, Groups(MPI.COMM_SELF), lambda job, slab, _: act(job, slab), sweep.Manner(quiet=True))
 
@@ -103,12 +112,7 @@ def test_groups_of_ranks_take_cases_by_turns(
 ) -> None:
     """Each unfinished case is done by one group, as many by each; a failure is told and does not stop the others, and
     what stops one before a case stops all, and is removed only then."""
-    monkeypatch.chdir(shared_path)
-    world = MPI.COMM_WORLD
-    if world.rank == 0:
-        (shared_path / "job.yaml").write_text(JOB)
-    world.Barrier()
-    cases, groups = load_cases("job.yaml"), Groups(world, 2)
+    (cases, groups), world = cases_in_groups(shared_path, monkeypatch), MPI.COMM_WORLD
     begun: list[int] = []
 
     def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
