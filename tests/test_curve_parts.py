@@ -105,6 +105,17 @@ def test_stopped_curve_goes_on(
     assert len(solved) == 13
 
 
+def test_curve_and_a_directory_named_stop(main: Main, tmp_path: Path) -> None:
+    """It stops a curve like any stop file; where it cannot be removed, a sentence says so."""
+    stop = tmp_path / "out" / "stop"
+    (stop / "full").mkdir(parents=True)
+    code, said = main(*CURVE)
+    assert (code, "stop, which cannot be removed: Directory not empty; remove it" in said) == (FAILED, True)
+    (stop / "full").rmdir()
+    assert main(*CURVE) == (AGAIN, "")
+    assert not stop.exists()
+
+
 def test_curve_of_another_job(main: Main, tmp_path: Path) -> None:
     """It is refused, and nothing of the curve that is there changes."""
     assert main(*CURVE)[0] == DONE

@@ -1,5 +1,6 @@
 """What stops one case of a sweep stops all of them, and the same command goes on."""
 
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from test_sweeps import JOB, cases_in_groups, table
 
 from parcontact.__main__ import main
 from parcontact.job import Job
+from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.run import sweep, watch
 
@@ -31,25 +33,64 @@ def test_a_stop_file_ends_the_case_that_runs(tmp_path: Path, monkeypatch: pytest
     assert [row["state"] for row in table()] == ["begun", *"-----"]
     assert not Path("out/job/stop").exists()
     monkeypatch.setattr(watch.Watch, "judge", judge)
+    Path("out/job/stop").touch()  # as a program leaves it that was killed
     assert main(["job.yaml", "--quiet"]) == 0
     assert "stopped after step 4 of" in Path("out/job/cases/000/run.log").read_text()
     assert {row["state"] for row in table()} == {"done"}
 
 
+def test_a_stop_file_ends_all_that_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs with a case each stop by one file, which none of them removes; it stops none that begins later."""
+    cases, _ = cases_in_groups(tmp_path, monkeypatch)
+    stops, begun = [sweep.stop_file(cases) for _ in range(3)], list[str]()
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        begun.append(job.output.directory.name)
+        stops[0].path.mkdir(parents=True)
+        return 3
+
+    for number, stop in enumerate(stops):
+        assert sweep.run(cases, cases[number : number + 1], Groups(MPI.COMM_SELF), act, stop) == 3
+    assert begun == ["000"]
+    later = sweep.stop_file(cases)
+    assert sweep.run(cases, cases[1:3], Groups(MPI.COMM_SELF), lambda *_: 0, later) == 0
+    assert not later.asks
+    os.utime(later.path, ns=(1, 1))
+    assert later.asks
+    assert sweep.run(cases, cases, Groups(MPI.COMM_SELF), lambda *_: 0, later) == 3
+    assert not later.path.exists()
+
+
+def test_a_stop_file_that_cannot_be_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ends one sweep between two cases, and no later one."""
+    cases, _ = cases_in_groups(tmp_path, monkeypatch)
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        (stop.path / "full").mkdir(parents=True, exist_ok=True)
+        return 0
+
+    stop = sweep.stop_file(cases)
+    assert sweep.run(cases, cases, Groups(MPI.COMM_SELF), act, stop) == 3
+    assert (stop.path / "full").is_dir()
+    stop = sweep.stop_file(cases)
+    assert sweep.run(cases, cases, Groups(MPI.COMM_SELF), act, stop) == 0
+
+
 @pytest.mark.mpi
 def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A signal to one rank, say: the others begin no further case."""
-    (cases, groups), stop = cases_in_groups(shared_path, monkeypatch), Path("out/job/stop")
+    cases, groups = cases_in_groups(shared_path, monkeypatch)
+    stop = sweep.stop_file(cases)
     begun: list[int] = []
 
     def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
         begun.append(int(job.output.directory.name))
         deadline = time.monotonic() + 20.0
-        while groups.number == 0 and groups.count > 1 and not stop.exists() and time.monotonic() < deadline:
+        while groups.number == 0 and groups.count > 1 and not stop.asks and time.monotonic() < deadline:
             time.sleep(0.01)
         return 3 if groups.number == groups.count - 1 else 0
 
-    assert sweep.run(cases, cases, groups, act) == 3
+    assert sweep.run(cases, cases, groups, act, stop) == 3
     assert groups.from_all(begun) == [[number] for number in range(groups.count)]
     MPI.COMM_WORLD.Barrier()  # root removes it
-    assert not stop.exists()
+    assert not stop.path.exists()

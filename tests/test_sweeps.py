@@ -54,7 +54,8 @@ def cases_in_groups(directory: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[t
 
 
 def go(cases: tuple[Case, ...], act: Callable[[Job, Slab], int]) -> int:
-    return sweep.run(cases, cases, Groups(MPI.COMM_SELF), lambda job, slab, _: act(job, slab), sweep.Manner(quiet=True))
+    groups, stop = Groups(MPI.COMM_SELF), sweep.stop_file(cases)
+    return sweep.run(cases, cases, groups, lambda job, slab, _: act(job, slab), stop, sweep.Manner(quiet=True))
 
 
 def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, list[int]]:
@@ -93,17 +94,10 @@ def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys
 
     for seconds, code in ((1.0, 3), (60.0, 0)):
         manner = sweep.Manner(limit=watch.limit(watch.age() + seconds, {}))
-        assert sweep.run(cases[:2], cases[:2], Groups(MPI.COMM_SELF), act, manner) == code
+        assert sweep.run(cases[:2], cases[:2], Groups(MPI.COMM_SELF), act, sweep.stop_file(cases), manner) == code
         assert len(begun) == (0 if code else 2)
     said = capsys.readouterr().out.splitlines()[0]
     assert said == "stopped before case 0: the wall time is nearly used up; run again to go on"
-
-
-def test_a_stop_file_ends_the_sweep_between_cases(cases: tuple[Case, ...]) -> None:
-    Path("out/job").mkdir(parents=True)
-    Path("out/job/stop").touch()
-    assert seeds_done(cases, {}) == (3, [])
-    assert not Path("out/job/stop").exists()
 
 
 @pytest.mark.mpi
@@ -111,7 +105,7 @@ def test_groups_of_ranks_take_cases_by_turns(
     shared_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Each unfinished case is done by one group, as many by each; a failure is told and does not stop the others, and
-    what stops one before a case stops all, and is removed only then."""
+    a stop file that is made before a case stops all, and is removed only then."""
     (cases, groups), world = cases_in_groups(shared_path, monkeypatch), MPI.COMM_WORLD
     begun: list[int] = []
 
@@ -125,7 +119,7 @@ def test_groups_of_ranks_take_cases_by_turns(
             raise RunError("it fell over")
         return 0
 
-    assert sweep.run(cases, cases, groups, act) == 1
+    assert sweep.run(cases, cases, groups, act, sweep.stop_file(cases)) == 1
     assert groups.from_all(begun) == [list(range(6))[number :: groups.count] for number in range(groups.count)]
     said = capsys.readouterr()
     told = "".join(world.allgather(said.err)).splitlines()
@@ -135,12 +129,15 @@ def test_groups_of_ranks_take_cases_by_turns(
     assert ("case 4: done\n" in "".join(world.allgather(said.out))) == (groups.count > 1)
     if world.rank == 0:
         assert [row["state"] for row in table()] == ["-", "-", "-", "failed", "-", "-"]
-        Path("out/job/stop").touch()
+    stop = sweep.stop_file(cases)
     world.Barrier()
-    assert sweep.run(cases, cases, groups, act) == 3
+    if world.rank == 0:
+        stop.path.touch()
+    world.Barrier()
+    assert sweep.run(cases, cases, groups, act, stop) == 3
     assert begun == list(range(6))[groups.number :: groups.count]
     world.Barrier()  # root removes it
-    assert not Path("out/job/stop").exists()
+    assert not stop.path.exists()
 
 
 def test_unfinished_cases_are_dealt_first(cases: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,8 +42,9 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     limit = watch.limit(getattr(options, "wall", None))
     manner = sweep.Manner(options.quiet, limit, told, runs)
     own = argparse.Namespace(**vars(options))
-    own.quiet, own.others_file = options.quiet or groups.count > 1, sweep.stop_file(cases)
-    return sweep.run(cases, chosen, groups, lambda job, slab, shows: act(own, job, slab, shows), manner)
+    stop = on_root(world, lambda: sweep.stop_file(cases))
+    own.quiet, own.others_file = options.quiet or groups.count > 1, stop
+    return sweep.run(cases, chosen, groups, lambda job, slab, shows: act(own, job, slab, shows), stop, manner)
 
 
 def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:

@@ -18,7 +18,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..parallel.slab import Slab
-from . import checkpoint, files, hdf5, marker
+from . import checkpoint, files, hdf5, marker, stopfile
 from .marker import SCENE, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
@@ -32,8 +32,8 @@ COPIES = {  # of the job: as given, and with every default
     "steady": ("steady.job.yaml", "steady.resolved.yaml"),
     "study": ("study.job.yaml", "study.resolved.yaml"),
 }
-LOCK, STOP = ".lock", "stop"
-BESIDE = (STOP, "theory.csv", "theory.yaml")  # may be there before the first run
+LOCK = ".lock"
+BESIDE = (stopfile.NAME, "theory.csv", "theory.yaml")  # may be there before the first run
 SHOWN = 4  # names of files that a message lists
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 ADVICE = "give --restart never to start afresh, or --out for another directory"
@@ -53,7 +53,7 @@ class Directory:
 
     @property
     def stop_file(self) -> Path:
-        return self.path / STOP
+        return self.path / stopfile.NAME
 
     @property
     def claim(self) -> Claim | None:

@@ -20,6 +20,7 @@ from ..record.directory import Directory
 from ..record.marker import Claim
 from ..record.provenance import Link, Provenance, extended
 from ..record.recorder import Recorder
+from ..record.stopfile import StopFile
 from ..scene import Scene
 from ..steady_sliding import start as steadystart
 from . import half_mesh, restart, watch
@@ -35,8 +36,8 @@ class Options:
     """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
     A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. One that is a case
-    of a sweep ends with the stop file of all, `others_file`, too. Doubts about a
-    scene that are not shown, as `shows` says, go into run.log only.
+    of a sweep ends with the stop file of all, `others_file`, too. Doubts about a scene that are not shown, as `shows`
+    says, go into run.log only.
     """
 
     quiet: bool = False
@@ -44,7 +45,7 @@ class Options:
     until: float | None = None
     wall: float | None = None
     stop_file: Path | None = None
-    others_file: Path | None = None
+    others_file: StopFile | None = None
     beside: bool = False
     shows: Callable[[str], bool] = always
 

@@ -13,14 +13,14 @@ from ..job.reading import CASES
 from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import marker, sweep_table
+from ..record import marker, stopfile, sweep_table
 from ..record.directory import BESIDE, SHOWN
+from ..record.stopfile import StopFile
 from . import watch
 from .journey import AGAIN, DONE
 from .sweep_warnings import SweepWarnings, warn
 
 FAILED = 1
-STOP = "stop"  # a file of this name in the directory of the sweep ends it, and the cases that run, when they have saved
 ENDS = {DONE: "done", AGAIN: "stopped early", FAILED: "failed"}
 
 Shows = Callable[[str], bool]
@@ -38,26 +38,34 @@ class Manner:
     runs: bool = True
 
 
-def run(cases: Sequence[Case], chosen: Sequence[Case], groups: Groups, act: Act, manner: Manner = Manner()) -> int:
+def run(
+    cases: Sequence[Case],
+    chosen: Sequence[Case],
+    groups: Groups,
+    act: Act,
+    stop: StopFile,
+    manner: Manner = Manner(),
+) -> int:
     """Do `act` with each of the chosen cases, and collect what all have come to; collective. Returns the exit code.
 
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
     and what says whether a warning is shown.
 
     A case that fails does not stop the others: the code is 1 in the end. One that stops early with a checkpoint stops
-    the sweep, with its code, and the cases beside it: the same command goes on with them. So do a stop file, and the
-    end of the wall time.
+    the sweep, with its code, and the cases beside it: the same command goes on with them. So do the file `stop`, and
+    the end of the wall time. Who does all cases removes the file in the end; who does some leaves it to the programs
+    that do the others.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
-    code = _go(cases, dealt(chosen, groups), groups, act, manner, doubts)
+    code = _go(cases, dealt(chosen, groups), groups, act, stop, manner, doubts)
     with Signals().noted():  # one that ends the ranks that wait here would end the others with them
         found = groups.from_all((code, doubts.kinds))
     codes = [one for one, _ in found]
     if groups.root:
         for text in doubts.summary([kinds for _, kinds in found]):
             warn(text)
-        if AGAIN in codes:
-            stop_file(cases).unlink(missing_ok=True)
+        if AGAIN in codes and len(chosen) == len(cases):
+            stopfile.remove(stop.path)  # one that stays stops no later program
         if AGAIN not in codes and not manner.quiet:
             _say(f"results of all cases: {_directory(cases) / sweep_table.TABLE}")
     return AGAIN if AGAIN in codes else max(codes)
@@ -84,14 +92,20 @@ def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
 
 
 def _go(
-    cases: Sequence[Case], own: Sequence[Case], groups: Groups, act: Act, manner: Manner, doubts: SweepWarnings
+    cases: Sequence[Case],
+    own: Sequence[Case],
+    groups: Groups,
+    act: Act,
+    stop: StopFile,
+    manner: Manner,
+    doubts: SweepWarnings,
 ) -> int:
     """The cases of one group of ranks; returns the exit code. If it stops early, so do the others."""
     directory, code = _directory(cases), DONE
     for case in own:
         slab = Slab(groups.comm, *case.job.grid.points)
         speaks = slab.root and not manner.quiet
-        if reason := slab.agree(_reason_to_stop(directory, manner.limit) if slab.root else ""):
+        if reason := slab.agree(_reason_to_stop(stop, manner.limit) if slab.root else ""):
             if speaks:
                 _say(f"stopped before case {case.number}: {reason}; run again to go on")
             return AGAIN
@@ -104,9 +118,9 @@ def _go(
         if speaks and groups.count > 1:
             _say(f"case {case.number}: {ENDS[ended]}")
         if ended == AGAIN:
-            if slab.root and groups.count > 1:
+            if slab.root and groups.count > 1 and not stop.asks:
                 with suppress(OSError):
-                    stop_file(cases).touch()
+                    stop.path.touch()
             return AGAIN
         code = max(code, ended)
     return code
@@ -140,9 +154,9 @@ def _say(text: str) -> None:
     print(f"{text}\n", end="", flush=True)
 
 
-def stop_file(cases: Sequence[Case]) -> Path:
-    """Ends a sweep."""
-    return _directory(cases) / STOP
+def stop_file(cases: Sequence[Case]) -> StopFile:
+    """What stops a sweep, and the cases that run, from now on."""
+    return StopFile.from_now_on(_directory(cases) / stopfile.NAME)
 
 
 def _directory(cases: Sequence[Case]) -> Path:
@@ -162,7 +176,7 @@ def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool
     return code
 
 
-def _reason_to_stop(directory: Path, limit: float | None) -> str:
+def _reason_to_stop(stop: StopFile, limit: float | None) -> str:
     if limit is not None and time.monotonic() + watch.RESERVE_SECONDS > limit:
         return watch.REASONS[watch.WALL]
-    return watch.REASONS[watch.FILE] if (directory / STOP).exists() else ""
+    return watch.REASONS[watch.FILE] if stop.asks else ""

@@ -14,6 +14,8 @@ from pathlib import Path
 from ..job import Checkpoint
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
+from ..record import stopfile
+from ..record.stopfile import StopFile
 
 LOOK_SECONDS = 0.2  # between two looks for the stop file
 RESERVE_SECONDS = 5.0  # of wall time for what is not measured: ending MPI, closing files
@@ -43,7 +45,7 @@ class Watch:
     stop_file: Path
     signals: Signals
     limit: float | None = None
-    others_file: Path | None = None
+    others_file: StopFile | None = None
     state_bytes: int = 0
     _saved: float = field(default_factory=time.monotonic)
     _looked: float = 0.0
@@ -66,20 +68,9 @@ class Watch:
         stop, save, failed = self.slab.reduce((), codes)
         if failed:
             return Verdict(problem=self.slab.agree(problem))
-        if stop == FILE and (problem := self.slab.agree(self._remove_stop_file() if self.slab.root else "")):
+        if stop == FILE and (problem := self.slab.agree(stopfile.remove(self.stop_file) if self.slab.root else "")):
             return Verdict(problem=problem)
         return Verdict(REASONS.get(int(stop), ""), bool(save))
-
-    def _remove_stop_file(self) -> str:
-        """Returns why the next run would find it again, or ''."""
-        try:
-            if self.stop_file.is_dir() and not self.stop_file.is_symlink():
-                self.stop_file.rmdir()
-            else:
-                self.stop_file.unlink(missing_ok=True)
-        except OSError as error:
-            return f"asked to stop by {self.stop_file}, which cannot be removed: {error.strerror}; remove it"
-        return ""
 
     def saved(self, seconds: float) -> None:
         """Tell that a checkpoint was written, and how long that took."""
@@ -91,7 +82,8 @@ class Watch:
             return WALL
         if now - self._looked > LOOK_SECONDS:
             self._looked = now
-            return FILE if any(os.path.lexists(path) for path in (self.stop_file, self.others_file) if path) else GO
+            asked = os.path.lexists(self.stop_file) or (self.others_file is not None and self.others_file.asks)
+            return FILE if asked else GO
         return GO
 
     def _due(self, step: int, now: float, began: bool) -> bool:

@@ -1,10 +1,10 @@
 """Friction curves: steady sliding solved directly at many velocities and pressures, into steady.csv and a picture."""
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import sanity, scene
@@ -12,11 +12,12 @@ from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
-from ..record import hdf5, marker
+from ..record import hdf5, marker, stopfile
 from ..record.console import always
 from ..record.directory import ADVICE, Directory
 from ..record.provenance import Link, Provenance
 from ..record.steady_maps import SteadyMaps
+from ..record.stopfile import StopFile
 from .sliding import SteadySliding
 from .table import CurveTable
 
@@ -90,13 +91,13 @@ def run(
     quiet: bool,
     restart: str = "auto",
     shows: Callable[[str], bool] = always,
-    others_file: Path | None = None,
+    others_file: StopFile | None = None,
 ) -> int:
     """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
 
     A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
-    of the warnings those are printed that it `shows`. The file
-    `others_file` stops it like its own stop file, and stays where it is.
+    of the warnings those are printed that it `shows`. The file `others_file` stops it like its own stop file, and stays
+    where it is.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -171,7 +172,7 @@ class _Curve:
         directory: Directory,
         signals: Signals,
         shows: Callable[[str], bool],
-        others_file: Path | None,
+        others_file: StopFile | None,
     ) -> None:
         self.sliding, self.wanted, self.table, self.maps = sliding, wanted, table, maps
         self.directory, self.signals, self.slab = directory, signals, sliding.base.slab
@@ -192,14 +193,17 @@ class _Curve:
         return FAILED if self.failures else DONE
 
     def _stopped(self) -> bool:
-        stop = self.directory.stop_file
-        found = self.slab.root and any(path.exists() for path in (stop, self.others_file) if path)
-        asked = self.signals.stop or found
+        """Whether it is asked to stop; its own stop file is removed then; collective."""
+        asked = self.signals.stop or (self.slab.root and self._file_asks())
         if not self.slab.reduce((), [float(asked)])[0]:
             return False
-        if self.slab.root and stop.is_file():
-            stop.unlink()
+        if problem := self.slab.agree(stopfile.remove(self.directory.stop_file) if self.slab.root else ""):
+            raise RunError(problem)
         return True
+
+    def _file_asks(self) -> bool:
+        others = self.others_file
+        return os.path.lexists(self.directory.stop_file) or (others is not None and others.asks)
 
     def _say(self, text: str) -> None:
         if self.table:

@@ -1,13 +1,14 @@
 """`parcontact study`: all cases one after the other, each at once into study.csv; then limits and pictures."""
 
 import hashlib
+import os
 from collections.abc import Callable, Sequence
 
 from ..errors import RunError
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import files, marker, study_plots
+from ..record import files, marker, stopfile, study_plots
 from ..record.directory import Directory
 from . import outcome, table, verdict
 from .cases import Case, Ladders, about_chosen_steps, ladders, overrides
@@ -32,10 +33,10 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         study = _Study(refined, jobs, directory, slab, quiet, about_chosen_steps(job))
         stop = directory.stop_file
-        ended = study.run(lambda: signals.stop or (slab.root and stop.exists()))
+        ended = study.run(lambda: signals.stop or (slab.root and os.path.lexists(stop)))
         if not ended:
-            if slab.root:
-                stop.unlink(missing_ok=True)
+            if problem := slab.agree(stopfile.remove(stop) if slab.root else ""):
+                raise RunError(problem)
             study.say(f"stopped after {len(study.outcomes)} of {len(jobs)} cases; run again to go on")
             return AGAIN
         study.conclude()

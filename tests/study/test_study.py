@@ -153,7 +153,8 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_path: Path) -> None:
-    """Stopped by the file `stop`, the same command goes on with what lacks, on another number of ranks too."""
+    """Stopped by the file `stop`, also a directory of that name, the same command goes on with what lacks, on another
+    number of ranks too; where that cannot be removed, a sentence says so."""
     job = tmp_path / "wave.yaml"
     job.write_text(WAVE.replace("[32, 64, 128]", "[32, 64]").replace(", backward-euler", ""))
     code, out, err = main("study", job, "--out", "whole")
@@ -164,10 +165,13 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_pat
     assert all(float(row["error_mu_dyn"]) < 0.1 for row in table)
     for name in ("convergence.png", "work_precision.png", "study.txt"):
         assert (tmp_path / "whole" / name).stat().st_size > 100
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "stop").touch()
+    stop = tmp_path / "out" / "stop"
+    (stop / "full").mkdir(parents=True)
     code, out, err = main("study", job)
-    assert (code, "stopped after 0 of 4 cases" in out) == (3, True), err
+    assert (code, "stop, which cannot be removed: Directory not empty; remove it" in err) == (1, True), err
+    (stop / "full").rmdir()
+    code, out, err = main("study", job)
+    assert (code, "stopped after 0 of 4 cases" in out, stop.exists()) == (3, True, False), err
     kept = (tmp_path / "whole" / "study.csv").read_text().splitlines(keepends=True)
     (tmp_path / "out" / "study.csv").write_text("".join(kept[:3]))
     again = run_parcontact(["study", job], ranks=2)
