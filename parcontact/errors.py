@@ -18,5 +18,9 @@ class JobError(InputError):
         return JobError, (self.mistakes,)  # as it travels between ranks
 
 
+class InUseError(InputError):
+    """The output directory is that of another program that runs now."""
+
+
 class RunError(Exception):
     """A run that cannot go on, said in one sentence: exit code 1."""

@@ -1,8 +1,6 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
 import csv
-import fcntl
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -204,21 +202,6 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
     case = here / "cases" / "001"
     for text in ((case / "run.log").read_text(), info_directory.describe(case)[0]):
         assert f"last three quarters of its 0.0005 m, is {float(rows[1]['mu_dyn']):.6g}\n" in text
-
-
-def test_tables_are_written_by_one_program_at_a_time(cases: tuple[Case, ...]) -> None:
-    """Jobs of an array end together: the last one to write has read what all others left."""
-    directory = Path("out/job")
-    sweep_table.write(directory, cases)
-    with (directory / ".sweep.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        other = threading.Thread(target=sweep_table.write, args=(directory, cases))
-        other.start()
-        other.join(0.2)
-        assert other.is_alive()
-        fcntl.flock(lock, fcntl.LOCK_UN)
-        other.join(20.0)
-        assert not other.is_alive()
 
 
 def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:

@@ -16,7 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, InUseError
+from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from . import checkpoint, files, hdf5, marker, stopfile
 from .marker import SCENE, VERBS, Claim
@@ -199,14 +200,16 @@ class Directory:
 
     def _on_root(self, act: Callable[[], str]) -> None:
         """Root acts, and returns what stands in the way or ''; collective. Raises InputError on all ranks."""
-        problem = ""
-        if self.slab.root:
+
+        def attempt() -> None:
             try:
                 problem = act()
             except hdf5.FAILURES as error:
                 problem = f"the output directory {self.path} cannot be written: {hdf5.reason(error)}"
-        if problem := self.slab.agree(problem):
-            raise InputError(problem)
+            if problem:
+                raise InputError(problem)
+
+        on_root(self.slab.comm, attempt)
 
     # -- the lock -----------------------------------------------------------------------------------------------------
 
@@ -222,7 +225,8 @@ class Directory:
         return ""
 
     def _take_lock(self) -> str:
-        """Take the lock, which the system gives back however this process ends. Returns what stands in the way."""
+        """Take the lock, which the system gives back however this process ends. Returns what stands in the way; raises
+        InUseError if it is another program."""
         deadline = time.monotonic() + MAX_SECONDS_TO_RELEASE
         path = self.path / LOCK
         while True:
@@ -237,7 +241,8 @@ class Directory:
                     holder = os.pread(handle, 200, 0).decode(errors="replace").strip()
                     os.close(handle)
                     if time.monotonic() > deadline:
-                        return f"the output directory {self.path} is in use by another run ({holder or 'just started'})"
+                        who = holder or "just started"
+                        raise InUseError(f"the output directory {self.path} is in use by another run ({who})") from None
                     time.sleep(0.05)
                     continue
             if files.is_the_file(path, handle):

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError, RunError
+from ..errors import InputError, InUseError, RunError
 from ..job import Case, Job
 from ..job.reading import CASES
 from ..parallel.groups import Groups
@@ -20,8 +20,8 @@ from . import watch
 from .journey import AGAIN, DONE
 from .sweep_warnings import SweepWarnings, warn
 
-FAILED = 1
-ENDS = {DONE: "done", AGAIN: "stopped early", FAILED: "failed"}
+FAILED, ELSEWHERE = 1, -1  # the latter is no exit code: of a case that another program runs
+ENDS = {DONE: "done", AGAIN: "stopped early", FAILED: "failed", ELSEWHERE: "passed over"}
 
 Shows = Callable[[str], bool]
 Act = Callable[[Job, Slab, Shows], int]
@@ -51,10 +51,11 @@ def run(
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
     and what says whether a warning is shown.
 
-    A case that fails does not stop the others: the code is 1 in the end. One that stops early with a checkpoint stops
-    the sweep, with its code, and the cases beside it: the same command goes on with them. So do the file `stop`, and
-    the end of the wall time. Who does all cases removes the file in the end; who does some leaves it to the programs
-    that do the others.
+    A case that fails does not stop the others: the code is 1 in the end. One that another program runs is passed over,
+    like those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint
+    stops the sweep, with its code, and the cases beside it: the same command goes on with them. So do the file `stop`,
+    and the end of the wall time. Who does all cases removes the file in the end; who does some leaves it to the
+    programs that do the others.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
     code = _go(cases, dealt(chosen, groups), groups, act, stop, manner, doubts)
@@ -112,7 +113,13 @@ def _go(
         if speaks:
             _say(f"{case} (of {len(cases)})")
         doubts.begin(case.number)
-        ended = _attempt(case, slab, lambda job, slab: act(job, slab, doubts.shows), manner.runs)
+        try:
+            ended = _attempt(case, slab, lambda job, slab: act(job, slab, doubts.shows), manner.runs)
+        except InUseError as error:
+            if groups.count == len(own) == 1:
+                raise
+            ended = ELSEWHERE
+            _complain(slab, f"case {case.number} is being run by another program: {error}")
         if slab.root:
             sweep_table.write(directory, cases)
         if speaks and groups.count > 1:
@@ -164,16 +171,24 @@ def _directory(cases: Sequence[Case]) -> Path:
 
 
 def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool) -> int:
+    """The code with which a case ends; raises InUseError if another program runs it."""
     reason = ""
     try:
         code = act(case.job, slab)
+    except InUseError:
+        raise
     except (InputError, RunError) as error:
         code, reason = FAILED, str(error)
     if slab.root and runs:
         sweep_table.fail(case, reason or ("some points have failed" if code == FAILED else ""))
-    if slab.root and reason:
-        print(f"parcontact: case {case.number}: {reason}", file=sys.stderr, flush=True)
+    if reason:
+        _complain(slab, f"case {case.number}: {reason}")
     return code
+
+
+def _complain(slab: Slab, text: str) -> None:
+    if slab.root:
+        print(f"parcontact: {text}", file=sys.stderr, flush=True)
 
 
 def _reason_to_stop(stop: StopFile, limit: float | None) -> str:
