@@ -27,7 +27,7 @@ from parcontact.steady_sliding import start
 
 Json = dict[str, Any]
 ACCURACIES = (0.05, 0.01, 0.003)
-LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125)  # cells per step
+LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # cells per step
 PRONY = [{"modulus": 2e6 * 3.0**-k, "relaxation_time": 1e-6 * 10.0**k} for k in range(5)]
 RUBBER = {"model": "zener", "modulus_inf": 1e5, "branches": PRONY}
 SOLID = {"model": "zener", "modulus_inf": 0.275e6, "branches": [{"modulus": 2.475e6, "relaxation_time": 1e-3}]}

@@ -2,19 +2,17 @@
 was cut into pieces or on how many ranks made it."""
 
 import csv
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from marching import SLS, begun, column, example, marched
+from marching import SLS, begun, column, marched
 from mpi4py import MPI
 
 from parcontact.job import Job, load
 from parcontact.job.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
-from parcontact.job.timeline import Step
 from parcontact.march.rest import steps_to_make
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
@@ -109,36 +107,6 @@ def test_error_falls_with_what_is_asked_for() -> None:
     found = errors(asked, (PRESS, SLIDE))
     assert all(error < accuracy for error, accuracy in zip(found, asked, strict=True))
     assert found[2] < found[0] / 9
-
-
-def test_a_step_that_is_made_anew_leaves_nothing() -> None:
-    """The state after it is that of a march to which the shorter step was proposed at once: to the last bit."""
-    fast = {"model": "zener", "modulus_inf": 1e5, "branches": [{"modulus": 2e6, "relaxation_time": 3e-5}]}
-    before = {"state": "steady", "velocity": 0.01, "pressure": 1e4}
-    sudden = job({**SLIDE, "velocity": 1.0}, material=fast, initial=before, numerics={"accuracy": 1e-3})
-    tried, told = begun(sudden), begun(sudden)
-    made: list[Step] = []
-    rejected = 0
-    for step in itertools.islice(steps_to_make(tried, tried.timeline()), 12):
-        attempts, judge_of_run = [step], step.judge
-
-        def judge(one: Step, error: float) -> Step | None:
-            assert judge_of_run is not None  # noqa: B023  # it is called in this turn only
-            shorter = judge_of_run(one, error)  # noqa: B023
-            if shorter is None:
-                return None
-            attempts.append(shorter)  # noqa: B023
-            return shorter._replace(judge=judge)
-
-        tried.advance(step._replace(judge=judge) if judge_of_run else step)
-        made.append(attempts[-1]._replace(judge=None))
-        rejected += len(attempts) - 1
-    for step in made:
-        told.advance(step)
-    assert rejected > 0
-    for name, entry in told.entries().items():
-        if not name.startswith("clock/"):
-            np.testing.assert_array_equal(np.asarray(entry.value), np.asarray(tried.entries()[name].value), name)
 
 
 def test_an_elastic_body_needs_no_choice() -> None:
@@ -280,16 +248,3 @@ def test_a_body_without_load_has_an_error_too() -> None:
         assert rows[-1].measures.contact_area == 0.0
         counts.append(march.timeline().spans[1].count)
     assert counts[1] > 2 * counts[0]
-
-
-def test_a_jump_of_velocity_needs_one_stage() -> None:
-    """`jobs/velocity_step.yaml` on a coarse grid: the highest friction at 5 % is within 1 % of that at 0.3 %; the first
-    steps after the jump are far shorter than a cell."""
-    small = ("grid.points=64", "surface.0.short_wavelength=1.25e-4", "history.1.distance=3.0e-5", "output.fields=[]")
-    peaks = []
-    for accuracy in (0.05, 0.003):
-        march, rows = marched(example("velocity_step", *small, f"numerics.accuracy={accuracy}"))
-        peaks.append(column(rows[1:], "friction").max())
-        jump = march.timeline().spans[1].before
-        assert rows[jump + 1].distance - rows[jump].distance < 0.05 * 1e-3 / 64
-    assert peaks[0] == pytest.approx(peaks[1], rel=1e-2)

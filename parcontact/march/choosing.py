@@ -137,14 +137,17 @@ class StepChooser:
         return self._made(span, number, dt)
 
     def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
-        """How long until the surface is at a multiple of the way of such a step, nearest to one step from now."""
+        """How long until the surface is at a multiple of the way of such a step: a half to one and a half of one.
+
+        From half a multiple it is half of one: a step that has just grown is not three times the one before.
+        """
         if span.stage.velocity[1]:
             return dt
         (x, _), (along, _) = span.origin, span.stage.velocity
         cell = one_cell(span.stage, self.scene.job.grid)
         at = math.copysign(1.0, along) * x / self.scene.job.grid.dx + now / cell
         size = dt / cell
-        way = (round(at / size + 1.0) * size - at) * cell
+        way = (math.ceil(at / size + 0.5 - SAME_LEVEL) * size - at) * cell
         return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
 
     def _made(self, span: Span, number: int, dt: float) -> Step:
