@@ -67,6 +67,10 @@ class Frame:
     def dtype(self) -> type[np.floating]:
         return np.dtype(self.job.numerics.map_type).type
 
+    def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
+        """A velocity [m/s] in the run's units of length per second."""
+        return velocity[0] / self.units.length, velocity[1] / self.units.length
+
     def ledger(self) -> Ledger:
         """A new one, with the shear of the interface if the job has one."""
         return Ledger(self.slab, self.surface, self.units, interface_of(self.job))
@@ -128,12 +132,12 @@ def frame(job: Job, slab: Slab) -> Frame:
     return Frame(job, slab, fft, surface, roughness, height or min(job.grid.dx, job.grid.dy), units, scaled, told)
 
 
-def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
+def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -> Scene:
     """Make a job's scene on the ranks of `slab`, to be marched to the end of its history or, if later, to `until` [s].
 
-    Collective. Raises InputError for surface files that do not fit.
+    Its frame is `base`, if it has one. Collective. Raises InputError for surface files that do not fit.
     """
-    base = frame(job, slab)
+    base = frame(job, slab) if base is None else base
     motion = _motion(base)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)

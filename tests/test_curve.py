@@ -10,10 +10,8 @@ from conftest import Main
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.march.loop import run as run_march
-from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.record.measures import read
 from parcontact.steady_sliding import start as steadystart
@@ -64,9 +62,7 @@ def frictions(shared_path: Path, comm: MPI.Intracomm) -> Callable[..., list[floa
         path = shared_path / f"job-{comm.rank}.yaml"
         path.write_text(text)
         job = jobs.load(path, overrides)
-        marching = March(scene.build(job, Slab(comm, *job.grid.points)))
-        if job.initial.state == "steady":
-            steadystart.begin(marching)
+        marching = steadystart.first(job, Slab(comm, *job.grid.points))
         found: list[float] = []
         run_march(marching, [lambda m: found.append(m.row.measures.friction)])
         return found

@@ -151,6 +151,8 @@ class FFT:
             transform.execute()
             if self._transpose:
                 self._transpose.post(rows, waves)
+        for height, transform in self._x_forward.items():
+            transform.update_arrays(self._row_block[:height], self._waves(slice(0, height)))  # lets go of the map
         if self._transpose:
             self._transpose.to_columns()
         self.spectrum[self.slab.ny :] = 0.0
@@ -172,6 +174,8 @@ class FFT:
             transform.execute()
             if not direct:
                 target[...] = result[:, : self.slab.nx]
+        for height, transform in self._x_backward.items():
+            transform.update_arrays(self._waves(slice(0, height)), self._row_block[:height])
 
     def _waves(self, rows: slice) -> Spectrum:
         """Where the transform along x of these rows is: on one rank at once in its place."""

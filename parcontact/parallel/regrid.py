@@ -1,5 +1,7 @@
 """Maps between a grid and a coarser one whose cells are made of whole cells of it; collective."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .slab import Array, Slab
@@ -9,8 +11,18 @@ COARSEST = 32  # points: there is no coarser grid
 
 def coarser(slab: Slab) -> Slab | None:
     """The grid of twice the cell, along each direction where points are even and enough; None if there is none."""
-    nx, ny = (n // 2 if n % 2 == 0 and n >= 2 * COARSEST else n for n in (slab.nx, slab.ny))
-    return None if (nx, ny) == (slab.nx, slab.ny) else slab.resized(nx, ny)
+    points = next(coarser_points(slab.nx, slab.ny), None)
+    return slab.resized(*points) if points else None
+
+
+def coarser_points(nx: int, ny: int) -> Iterator[tuple[int, int]]:
+    """Points along x and y of all coarser grids."""
+    while True:
+        before = nx, ny
+        nx, ny = (n // 2 if n % 2 == 0 and n >= 2 * COARSEST else n for n in before)
+        if (nx, ny) == before:
+            return
+        yield nx, ny
 
 
 def factors(fine: Slab, coarse: Slab) -> tuple[int, int]:

@@ -31,9 +31,9 @@ class Convolution:
             np.multiply(part(rows), scale, out=self.symbol[rows], casting="same_kind")
 
     @staticmethod
-    def footprint(spectrum: int, my: int) -> int:
-        """Bytes of a real symbol, which is even, beside a transform whose spectrum has so many in `my` rows."""
-        return spectrum // my * (my // 2 + 1) // 2
+    def footprint(spectrum: int, my: int, even: bool = True, is_complex: bool = False) -> int:
+        """Bytes of a real symbol, or a complex one, beside a transform whose spectrum has so many in `my` rows."""
+        return spectrum // my * (my // 2 + 1 if even else my) // (1 if is_complex else 2)
 
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""

@@ -16,6 +16,7 @@ from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..march.state import State
 from ..parallel.fft import footprint, transform_name
+from ..parallel.regrid import coarser_points
 from ..parallel.slab import deal
 from ..physics.body import ElasticBody, ZenerBody
 from ..physics.convolution import Convolution
@@ -23,6 +24,7 @@ from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
 from ..solve.contact import ContactSolver
+from ..solve.steady import SteadySolver
 from ..solve.surround import grids_for
 
 
@@ -59,6 +61,17 @@ def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
     return sum(holding.bytes for holding in holdings(job, ranks, rank))
 
 
+def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool = False) -> int:
+    """Bytes of all maps of a rank while the steady state is found from which a run starts, before those of `holdings`
+    are made: as a rule, or where the solver changes `sets` of points. 0 for a run that starts from another state.
+
+    In a free box the table of the wake, made before that, may take more for a moment.
+    """
+    if not decisions.steady_start(job).on:
+        return 0
+    return sum(_while_steady(job, ranks, ranks - 1 if rank is None else rank, sets))
+
+
 def saved(job: Job) -> int:
     """Bytes of the maps in a checkpoint, with the four of the checksum of each row."""
     nx, ny = job.grid.points
@@ -87,6 +100,31 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
     for maps in _maps(job):
         if maps.count.held:
             yield Holding(maps.what, maps.count.held * maps.itemsize * cells)
+
+
+def _while_steady(job: Job, ranks: int, rank: int, sets: bool) -> Iterator[int]:
+    points, precision = job.grid.points, np.dtype(job.numerics.map_type)
+    even = not job.initial.velocity[1]
+    finest = _transform("", job, points, precision, ranks, rank).bytes
+    spectrum, *_ = footprint(points, points, precision, ranks, rank)
+    yield SteadySolver.footprint(*points, precision.itemsize, ranks, rank, sets)
+    yield 2 * _map(points, precision, ranks, rank)  # the heights and the start
+    yield finest + decisions.spectrum(job).on * spectrum
+    yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
+    if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(points):
+        padded, *_ = footprint(points, lengths, precision, ranks, rank)
+        yield _transform("", job, lengths, precision, ranks, rank).bytes
+        yield Convolution.footprint(padded, lengths[1], even, is_complex=True)
+    else:
+        yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
+    for coarse in coarser_points(*points):
+        yield sum(footprint(coarse, coarse, precision, ranks, rank)) + _map(coarse, precision, ranks, rank)
+
+
+def _map(points: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int) -> int:
+    """Bytes of a map on a rank."""
+    rows = deal(points[1], ranks)[rank]
+    return (rows.stop - rows.start) * points[0] * np.dtype(dtype).itemsize
 
 
 def _transform(

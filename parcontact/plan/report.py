@@ -14,6 +14,7 @@ MEGA = 1e6
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
 LARGE = 1e10  # bytes from which on there are told GB
 HALF_MESH = 0.3  # of the time of a run, that on half the mesh: a quarter of the points, some more calls
+STEADY_STARTS = (("steady start, before", False), ("steady start, at worst", True))  # and whether by sets of points
 MARK = "*"  # of figures that were taken while other programs were at work
 
 
@@ -31,8 +32,8 @@ class Costs:
     def held(self, ranks: int) -> float:
         """Bytes that a rank holds in maps at once: those of steps, to the byte, or more while a first contact or steady
         state is found on nested grids, which was seen when the job was tried."""
-        steps = memory.total(self.job, ranks) if self.job.history else 0
-        return max(float(steps), self.scaling.held(ranks))
+        known = (memory.total(self.job, ranks), memory.steady_start(self.job, ranks)) if self.job.history else (0,)
+        return max(float(max(known)), self.scaling.held(ranks))
 
     def marching(self, ranks: int) -> float:
         """Seconds of all steps, or steady states; with those on half the mesh, which comes first."""
@@ -84,13 +85,17 @@ def effects(job: Job) -> Iterator[str]:
 def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     """Bytes that a rank holds, for what."""
     columns = [memory.holdings(job, count) for count in ranks]
-    width = max(len(holding.what) for holding in columns[0])
+    before = STEADY_STARTS if decisions.steady_start(job).on else ()
+    width = max(len(what) for what in (*(holding.what for holding in columns[0]), *(what for what, _ in before)))
     totals = [sum(holding.bytes for holding in column) for column in columns]
     unit, size = unit_of(max(totals))
     yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f"{ranks_text(count):>13}" for count in ranks)
     for row in zip(*columns, strict=True):
         yield f"  {row[0].what:{width}}" + "".join(f"{holding.bytes / size:13.4g}" for holding in row)
     yield f"  {'in all':{width}}" + "".join(f"{total / size:13.4g}" for total in totals)
+    for what, sets in before:
+        held = (memory.steady_start(job, count, sets=sets) / size for count in ranks)
+        yield f"  {what:{width}}" + "".join(f"{number:13.4g}" for number in held)
     yield f"a checkpoint has {_bytes(memory.saved(job))}"
 
 

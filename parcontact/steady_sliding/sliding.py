@@ -58,7 +58,7 @@ class Level:
 class SteadySliding:
     """Steady states of one job's surface and body; making and calling it are collective.
 
-    Started from coarser grids, or from the last state where that is very near. Memory: some 30 maps.
+    Started from coarser grids, or from the last state where that is very near. `footprint` says what it holds.
     """
 
     def __init__(self, base: Frame) -> None:
@@ -112,23 +112,6 @@ class SteadySliding:
         place = velocity, pressure, self.temperature, self._slow
         return Point(*place, measures, contact.certificate, calls, contact.sets, seconds, lost)
 
-    def branch_maps(self, velocity: Vector) -> Iterator[Array]:
-        """The map h_k of each branch in the last state, the same array each time; collective."""
-        assert self.contact is not None
-        out = self.base.slab.empty(self.base.dtype)
-        fft, half_space, speed = self.base.fft, self.base.half_space, self._in_units(velocity)
-        if self.base.job.grid.boundary == "free":
-            for k in range(self.base.prony.moduli.size):
-                branch = half_space.branch_operator(fft, speed, self.base.prony, k)
-                yield branch.apply(self.contact.p, out)
-            return
-        u = fft.forward(self.contact.u).copy()
-        for modulus, tau in zip(self.base.prony.moduli, self.base.prony.relaxation_times, strict=True):
-            own = Prony(0.0, np.array([modulus]), np.array([tau]))
-            for rows in deal(fft.my, PARTS):
-                np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
-            yield fft.backward(fft.spectrum, out)
-
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
 
@@ -146,7 +129,7 @@ class SteadySliding:
         """
         assert self.contact is not None
         base, fft, prony, grid = self.base, self.base.fft, self.base.prony, self.base.job.grid
-        spectrum, speed = fft.forward(self.contact.u), self._in_units(velocity)
+        spectrum, speed = fft.forward(self.contact.u), self.base.in_units(velocity)
         powers = np.zeros((prony.moduli.size, 2 + int(np.log2(max(grid.points)))))
         for rows in deal(fft.my, PARTS):
             omega = np.abs(base.half_space.frequencies(fft, speed, rows))
@@ -165,10 +148,6 @@ class SteadySliding:
         size = self.base.job.grid.size
         q = np.hypot(*wavenumbers(self.base.fft, size, rows))
         return np.floor(np.log2(np.maximum(q * max(size) / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(np.int64)
-
-    def _in_units(self, velocity: Vector) -> Vector:
-        """A velocity [m/s] in the run's units of length per second."""
-        return velocity[0] / self.base.units.length, velocity[1] / self.base.units.length
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
@@ -224,11 +203,26 @@ class SteadySliding:
 
     def operators(self, level: Level, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
         """Pressure -> displacement at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
-        half_space, speed = self.base.half_space, self._in_units(velocity)
+        half_space, speed = self.base.half_space, self.base.in_units(velocity)
         return (
             half_space.sliding_operator(level.fft, speed, prony),
             half_space.sliding_inverse(level.fft, speed, prony),
         )
+
+
+def branch_maps(base: Frame, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
+    """The map h_k of each branch in a steady state at a velocity [m/s], each time in `out`; collective."""
+    fft, half_space, speed = base.fft, base.half_space, base.in_units(velocity)
+    if half_space.free:
+        for k in range(base.prony.moduli.size):
+            yield half_space.branch_operator(fft, speed, base.prony, k).apply(contact.p, out)
+        return
+    u = fft.forward(contact.u).copy()
+    for modulus, tau in zip(base.prony.moduli, base.prony.relaxation_times, strict=True):
+        own = Prony(0.0, np.array([modulus]), np.array([tau]))
+        for rows in deal(fft.my, PARTS):
+            np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
+        yield fft.backward(fft.spectrum, out)
 
 
 def _stiffness(slab: Slab, operator: Convolution, dtype: type[np.floating]) -> float:

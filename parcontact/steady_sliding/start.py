@@ -10,43 +10,58 @@ from ..march.step import March
 from ..parallel.slab import Slab
 from ..physics.body import ZenerBody
 from ..record.checkpoint import Contents
-from ..scene import build
-from .sliding import SteadySliding
+from ..scene import Frame, build, frame
+from ..solve.steady import SteadyContact
+from .sliding import Point, SteadySliding, branch_maps
 
 
 def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:
     """A march before the first step of a job, or after that of a checkpoint; collective.
 
-    It can go on to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not fit.
+    It can go on to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not fit,
+    and where a steady start is asked for with energies: they count from a body at rest.
     """
+    if saved is None and decisions.steady_start(job).on:
+        return _from_steady_sliding(job, slab, until)
     march = March(build(job, slab, until))
     if saved is not None:
         march.restore(saved)
-    elif decisions.steady_start(job).on:
-        begin(march)
     return march
 
 
-def begin(march: March) -> None:
-    """Put a run that has not begun into the steady state of its job's `initial` section; collective.
+def _from_steady_sliding(job: Job, slab: Slab, until: float) -> March:
+    """A march in the steady state of its job's `initial` section; collective.
 
-    Raises InputError where energies are asked for: they count from a body at rest.
+    Maps of the scene are made when those of the steady solver are gone, and the pressures of the march last: until then
+    the pressure waits in a map of the contact solver.
     """
-    scene, initial = march.scene, march.scene.job.initial
-    if scene.energy is not None:
+    if decisions.energies(job).on:
         raise InputError("output.energy: energies count from a body at rest, so they need initial: {state: virgin}")
-    sliding = SteadySliding(scene.frame)
-    point = sliding.solve(initial.velocity, initial.pressure or 0.0)
-    contact = sliding.contact
-    assert contact is not None
+    base = frame(job, slab)
+    point, contact = _solve(base)
+    scene = build(job, slab, until, base)
+    pressure, spare, _ = scene.solver.lend()
     if isinstance(scene.material, ZenerBody):
-        scene.material.begin_with(contact.u, sliding.branch_maps(initial.velocity))
+        scene.material.begin_with(contact.u, branch_maps(base, contact, job.initial.velocity, spare))
+    pressure[...] = contact.p
+    iterations, approach = contact.steps, contact.d
+    del contact
+    march = March(scene)
     row = replace(
         march.row,
         measures=point.measures,
-        iterations=contact.steps,
+        iterations=iterations,
         certificate=point.certificate,
         operator_calls=round(point.operator_calls),
         seconds=point.seconds,
     )
-    march.begin_with(State(row, contact.p, None, 1.0, 1.0, contact.d))
+    march.begin_with(State(row, pressure, None, 1.0, 1.0, approach))
+    return march
+
+
+def _solve(base: Frame) -> tuple[Point, SteadyContact]:
+    """The state, and its contact, without the maps that it took to find it; collective."""
+    sliding, initial = SteadySliding(base), base.job.initial
+    point = sliding.solve(initial.velocity, initial.pressure or 0.0)
+    assert sliding.contact is not None
+    return point, sliding.contact

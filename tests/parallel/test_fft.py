@@ -99,6 +99,16 @@ def test_convolution_is_linear(communicators: list[MPI.Intracomm]) -> None:
         close(out, reference[slab.rows], scale=np.abs(reference).max())
 
 
+def test_maps_are_let_go_of(communicators: list[MPI.Intracomm]) -> None:
+    """A transform does not keep the maps alive that it was given."""
+    for comm in communicators:
+        slab = Slab(comm, 16, 12)
+        fft, tally = FFT(slab), slab.tally
+        before = tally["map bytes"]
+        fft.backward(fft.forward(slab.zeros()), slab.empty())
+        assert tally["map bytes"] == before
+
+
 @pytest.mark.parametrize("ny", [1, 2, 9, 10])
 def test_half_of_an_even_symbol(comm: MPI.Intracomm, ny: int) -> None:
     """It stands for the whole, to the same digits."""

@@ -1,0 +1,71 @@
+"""What a steady start holds, as it is planned, and that it comes before the maps of the march."""
+
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+from parcontact import scene
+from parcontact.job import Job
+from parcontact.parallel.slab import Slab
+from parcontact.plan import memory, report
+from parcontact.steady_sliding import start
+from parcontact.steady_sliding.sliding import SteadySliding
+
+Json = dict[str, Any]
+WAVE: Json = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]}
+SPHERE: Json = {"shape": "sphere", "radius": 1e-2}
+SCENES: dict[str, tuple[Json, Json, tuple[float, float]]] = {
+    "along x": ({"points": 128}, WAVE, (0.1, 0.0)),
+    "oblique": ({"points": [128, 96]}, WAVE, (0.1, 0.05)),
+    "free": ({"points": 64, "boundary": "free"}, SPHERE, (0.1, 0.0)),
+}
+
+
+def job(grid: Json, surface: Json, velocity: tuple[float, float], branches: int = 2) -> Job:
+    times = [{"modulus": 1e6, "relaxation_time": 10.0 ** -(k / 4 + 1)} for k in range(branches)]
+    return Job.model_validate(
+        {
+            "grid": {"size": 1e-3, **grid},
+            "surface": surface,
+            "material": {"model": "zener", "modulus_inf": 1e6, "branches": times},
+            "initial": {"state": "steady", "velocity": velocity, "pressure": 1e5},
+            "history": [{"pressure": 1e5, "velocity": velocity, "duration": 1e-4, "time_step": 1e-5}],
+            "numerics": {"branch_error": 0.0},
+        }
+    )
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_held_while_it_is_solved(comm: MPI.Intracomm, name: str) -> None:
+    """To the byte, by projected steps alone; or more, in a free box, for a moment, as the table of the wake is made."""
+    grid, surface, velocity = SCENES[name]
+    planned = job(grid, surface, velocity)
+    slab = Slab(comm, *planned.grid.points)
+    sliding = SteadySliding(scene.frame(planned, slab))
+    assert sliding.solve(velocity, 1e5).sets == 0
+    few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
+    held = slab.tally["map bytes at most"]
+    assert held == few < most or (name == "free" and few < held)
+
+
+@pytest.mark.mpi
+def test_no_more_than_steps_hold(comm: MPI.Intracomm) -> None:
+    """With twelve branches: the solver's maps are gone when those of the march are made."""
+    planned = job(*SCENES["along x"], branches=12)
+    slab = Slab(comm, *planned.grid.points)
+    march = start.first(planned, slab)
+    assert march.row.measures.friction > 0.0
+    assert slab.tally["map bytes at most"] == slab.tally["map bytes"] == memory.total(planned, comm.size, comm.rank)
+
+
+def test_plan_tells_both() -> None:
+    """In rows of their own, where there is a steady start."""
+    planned = job(*SCENES["along x"])
+    rows = {text[2:26].rstrip(): text[26:].split() for text in report.maps(planned, [1, 2])}
+    for what, sets in (("steady start, before", False), ("steady start, at worst", True)):
+        assert rows[what] == [f"{memory.steady_start(planned, ranks, sets=sets) / 1e6:.4g}" for ranks in (1, 2)]
+    virgin = planned.model_copy(update={"initial": type(planned.initial)()})
+    assert not any("steady" in text for text in report.maps(virgin, [1]))
+    assert memory.steady_start(virgin) == 0
