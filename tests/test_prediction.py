@@ -18,7 +18,7 @@ from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.record import theory_settings
+from parcontact.record import info_directory, theory_settings
 from parcontact.record.theory_settings import TheorySettings
 from parcontact.theory import full_contact
 
@@ -177,6 +177,21 @@ def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
         prediction.write(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]
     assert (paths[0] / "theory.csv").read_bytes() == table
     assert theory_settings.read(paths[0]) is None
+
+
+def test_damaged_settings_are_told_by_name(tmp_path: Path) -> None:
+    """By `parcontact info`, and where pictures and reports name them."""
+    one = job(output={"directory": str(tmp_path / "out")})
+    prediction.write(one, iter([]), TheorySettings(0.5, "lattice"))
+    path = tmp_path / "out" / "theory.yaml"
+    path.write_text("gamma: 0.5\n")
+    damaged = f"{path} is damaged: it does not say gamma and waves"
+    assert theory_settings.describe(path.parent) == f"theory of unknown settings: {damaged}"
+    (path.parent / "measures.csv").write_text("")
+    told, sound = info_directory.describe(path.parent)
+    assert not sound
+    assert "  Persson's theory: 0 rows, of unknown settings\n" in told
+    assert f"  {damaged}" in told.splitlines()
 
 
 def test_a_directory_that_cannot_be_written(tmp_path: Path) -> None:

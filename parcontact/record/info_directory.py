@@ -69,9 +69,13 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     table = directory / theory_settings.TABLE
     if table.exists():
-        settings = theory_settings.read(directory)
-        of = f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings"
-        yield f"  Persson's theory: {len(measures.read(table)['time'])} rows, {of}"
+        told = f"  Persson's theory: {len(measures.read(table)['time'])} rows, "
+        try:
+            settings = theory_settings.read(directory)
+        except InputError:
+            yield told + "of unknown settings"
+            raise
+        yield told + (f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings")
 
 
 def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

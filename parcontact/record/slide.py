@@ -66,16 +66,25 @@ def largest(values: Iterable[float]) -> float:
 
 
 def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
-    """Sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing has slid."""
-    found = measure(history, columns)
+    """Sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing has slid.
+
+    As long as the last slide has not begun, they are about the one before it, and say so.
+    """
+    last, begun = _slide(history), _begun(history, columns["time"])
+    waits = begun <= last.start
+    so_far = history[:begun] if waits else history
+    found = measure(so_far, columns)
     if found is None:
         return
-    distance = np.asarray(columns["distance"], float)[_during(history, np.asarray(columns["time"], float))]
+    if waits:
+        ends_with = _slide(so_far).stop - 1
+        yield f"the last slide has not begun; what follows is of the one before it, which ends with history.{ends_with}"
+    distance = np.asarray(columns["distance"], float)[_during(so_far, np.asarray(columns["time"], float))]
     yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}, after {found.mu_max_distance:.4g} m of it"
     length = f"{distance[-1] - distance[0]:.4g} m"
     yield f"mu_dyn, the mean friction over the last three quarters of its {length}, is {found.mu_dyn:.6g}"
     yield f"the mean contact area over the same is {found.contact_area:.6g}"
-    known = {name: value for name, value in errors(history, columns).items() if value == value}
+    known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
         told = ", ".join(f"{what[name]} {100 * value:.2g} %" for name, value in known.items())
@@ -85,15 +94,26 @@ def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -
 _COLUMNS = ("distance", "friction", "contact_area")
 
 
+def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:
+    """How many stages have begun before the last of the times."""
+    starts = np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
+    return int(np.count_nonzero(starts < times[-1] * (1.0 - SAME_INSTANT))) if len(times) else 0
+
+
+def _slide(history: Sequence[Stage]) -> range:
+    """The indices of the stages of the slide; none where nothing slides."""
+    last = max((index for index, stage in enumerate(history) if any(stage.velocity) and stage.seconds), default=-1)
+    same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
+    return range(min(same, default=0), last + 1)
+
+
 def _during(history: Sequence[Stage], time: NDArray[np.float64]) -> NDArray[np.intp]:
     """The rows of the slide: the last one before it begins, and those to its end."""
     ends = np.cumsum([0.0, *(stage.seconds for stage in history)])
-    sliding = [index for index, stage in enumerate(history) if any(stage.velocity) and stage.seconds]
-    if not sliding:
+    slide = _slide(history)
+    if not slide:
         return np.zeros(0, np.intp)
-    last = sliding[-1]
-    same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
-    start, end = ends[min(same)], ends[last + 1]
+    start, end = ends[slide.start], ends[slide.stop]
     round_off = SAME_INSTANT * (end - start)
     before = np.flatnonzero(time <= start + round_off)[-1:]
     return np.append(before, np.flatnonzero((time > start + round_off) & (time <= end + round_off)))

@@ -1,7 +1,6 @@
 """theory.yaml: with which settings the predictions in theory.csv beside it were made."""
 
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,20 +34,30 @@ def write(directory: Path, settings: TheorySettings) -> None:
 
 
 def read(directory: Path) -> TheorySettings | None:
-    """The settings of the table in a directory; None if they are not known."""
-    with suppress(OSError, InputError, KeyError, TypeError, ValueError):
-        data = yamltext.parse((directory / FILE).read_bytes(), FILE).data
+    """The settings of the table in a directory; None if there are none. Raises InputError for a damaged file."""
+    path = directory / FILE
+    try:
+        data = yamltext.parse(path.read_bytes(), FILE).data
         return TheorySettings(float(data["gamma"]), str(data["waves"]))
-    return None
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path} is damaged: it does not say gamma and waves") from error
 
 
 def shared(directories: Iterable[Path]) -> TheorySettings | None:
-    """The settings that the tables in these directories have in common; None if there are none."""
+    """The settings that the tables in these directories have in common; None if there are none. Raises as `read`."""
     found = {read(directory) for directory in directories if (directory / TABLE).is_file()}
     return found.pop() if len(found) == 1 else None
 
 
 def describe(directory: Path) -> str:
-    """The settings of the theory in a directory, or in the cases of a sweep there, if they are known; else ''."""
-    settings = shared([directory, *directory.glob("cases/*")])
+    """The settings of the theory in a directory, or in the cases of a sweep there, or why they cannot be read; '' if
+    there are none."""
+    try:
+        settings = shared([directory, *directory.glob("cases/*")])
+    except InputError as error:
+        return f"theory of unknown settings: {error}"
     return f"theory: {settings}" if settings else ""

@@ -81,3 +81,16 @@ def test_sentences_about_a_slide() -> None:
         "largest errors of the steps of the slide: friction 3 %",
     ]
     assert not list(describe(stages(REST), table))
+
+
+def test_sentences_about_a_slide_that_others_follow() -> None:
+    """As long as the last slide has not begun; then the sentences are about that one."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2))
+    history = stages(REST, CLIMB, REST, {**CLIMB, "velocity": 3.0})
+    told = list(describe(history, table))
+    assert told[0] == "the last slide has not begun; what follows is of the one before it, which ends with history.1"
+    assert told[1:] == list(describe(history[:2], table))
+    assert measure(history, table) is None
+    assert len(list(describe(stages(REST, CLIMB, SETTLE), rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5))))) == 3
+    begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
+    assert next(describe(history, begun)) == ("mu_max, the highest friction of the slide, is 7, after 1.5 m of it")
