@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from parcontact.job import Grid, Stage
-from parcontact.job.chosen import reached
+from parcontact.job.cells import first_between_cells
+from parcontact.job.chosen import ChosenSteps, reached
 from parcontact.job.division import divided
 from parcontact.job.timeline import Timeline
 
@@ -91,14 +92,41 @@ def test_steps_add_up(stages: list[dict[str, Any]], until: float, pressure: floa
     ],
 )
 def test_where_the_surface_first_is_between_cells(stages: list[dict[str, Any]], number: int | None) -> None:
-    """Against a look at every step; `WHOLE` is 1e-6 cells."""
+    """Against a look at every step; `SAME_PLACE` is 1e-6 cells."""
     found = timeline(*stages)
     cells = np.array([np.array(step.position) / (GRID.dx, GRID.dy) for step in found])
     off = (np.abs(cells[:, 0] - np.round(cells[:, 0])) >= 1e-6) | (cells[:, 1] != 0.0)
     expected = int(np.argmax(off)) + 1 if off.any() else None
-    step = found.first_between_cells(GRID)
+    step = first_between_cells(found, GRID)
     assert (step and step.number) == expected
     assert expected == number
+
+
+def test_chosen_steps_are_counted_as_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is known after each is what a look at the whole history tells; a new look is taken at one stage only."""
+    stage = {key: value for key, value in SLIDE.items() if key != "cells_per_step"} | {"distance": 2.0 * GRID.dx}
+    stages = [{**stage, "velocity": 0.1 * (1 + n % 3)} for n in range(30)]
+    stages[4:6] = [{"pressure": 2e4}, {"pressure": 1e4, "duration": 1.0, "time_step": 0.5}]
+    chosen, looks = ChosenSteps(), 0
+    found = timeline(*stages, chosen=chosen)
+    add_span = Timeline._add_span
+
+    def look(self: Timeline) -> None:
+        nonlocal looks
+        looks += self is found
+        add_span(self)
+
+    monkeypatch.setattr(Timeline, "_add_span", look)
+    number = 0
+    while (number := number + 1) <= len(found):
+        span = found.span(number)
+        if span.stage.chooses and number > span.before + span.jumps:
+            made = chosen.ends.setdefault(span.index, [])
+            made.append(span.stage.seconds * min(0.3 * (len(made) + 1), 1.0))
+        assert len(found) == len(timeline(*stages, chosen=chosen))
+    assert looks <= number + len(stages)
+    assert found.spans == timeline(*stages, chosen=chosen).spans
+    assert [span.count for span in found.spans[3:7]] == [4, 0, 2, 4]
 
 
 def test_a_million_steps_cost_nothing_before_they_are_made() -> None:
@@ -106,7 +134,7 @@ def test_a_million_steps_cost_nothing_before_they_are_made() -> None:
     tracemalloc.start()
     found = timeline(MILLION, until=1.2 * MILLION["distance"] / 0.1)
     assert len(found) == 1_200_001
-    assert found.first_between_cells(GRID) is None
+    assert first_between_cells(found, GRID) is None
     assert found.moves
     assert found.first_reaching(100.0) == pytest.approx(100.0 * 0.1 / GRID.dx, abs=2)
     assert next(found.after(999_999)).position[0] == pytest.approx(999_999 * GRID.dx, rel=1e-12)

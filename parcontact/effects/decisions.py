@@ -7,6 +7,7 @@ decision. An effect that is off allocates nothing, calls nothing and writes noth
 from collections.abc import Callable
 
 from ..job import Job, Spectral
+from ..job.cells import first_between_cells
 from . import folded_branches, relaxation
 from .effect import Decision
 
@@ -35,7 +36,7 @@ def _part_cells(job: Job) -> tuple[bool, str]:
         return True, "a free box is not cyclic: the heights are made anew"
     if whole_cells_at_times(job):
         return True, "stages that choose their own steps begin with parts of a cell where they must"
-    step = job.timeline().first_between_cells(job.grid)
+    step = first_between_cells(job.timeline(), job.grid)
     if step is None:
         return False, "every step is of whole cells along x"
     return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"

@@ -15,7 +15,6 @@ from .history import GeometricStep, Ramp, Stage
 from .sections import Grid
 
 ROUNDINGS = 4.0  # of an instant, between two that are the same
-WHOLE = 1e-6  # a displacement this close to whole cells, in cells, is one of whole cells
 
 
 class Step(NamedTuple):
@@ -157,32 +156,46 @@ class Timeline:
         self.history, self.grid, self.until, self.chosen = history, grid, until, chosen
         self.chooses = chosen is not None and any(stage.chooses for stage in history)
         self._before = None if pressure is None else ("pressure", pressure)
-        self._number_spans()
+        self._spans: list[Span] = []  # of the first stages
+        self._lasts: list[int] = []  # the numbers of their last steps
+        self._open, self._seen = 0, self._chosen_so_far()
+        total = self.spans[-1].last if history else 0
+        self._from = [*(total - span.before for span in self._spans), 0]  # steps from a stage on that has not begun
 
     @property
     def spans(self) -> list[Span]:
         """Those of all stages."""
-        if self.chooses and self.chosen is not None and self._known != self.chosen.count:
-            self._number_spans()
+        return self._first_spans(len(self.history))
+
+    def _first_spans(self, count: int) -> list[Span]:
+        """Those of so many stages, or more."""
+        if (now := self._chosen_so_far()) != self._seen:
+            self._seen = now
+            del self._spans[self._open :], self._lasts[self._open :]
+        while len(self._spans) < min(max(count, self._seen[0]), len(self.history)):
+            self._add_span()
         return self._spans
 
-    @property
-    def _lasts(self) -> list[int]:
-        return [span.last for span in self.spans] if self.chooses else self._numbers
+    def _chosen_so_far(self) -> tuple[int, int]:
+        """Up to which stage steps were chosen, and how many of its own."""
+        if self.chosen is None or not self.chosen.ends:
+            return 0, 0
+        last = next(reversed(self.chosen.ends))
+        return last + 1, len(self.chosen.ends[last])
 
-    def _number_spans(self) -> None:
-        self._spans: list[Span] = []
-        self._known = 0 if self.chosen is None else self.chosen.count
-        number, time, position = 0, 0.0, (0.0, 0.0)
-        before = self._before
-        for index, stage in enumerate(self.history):
-            ends = self._ends(index, stage, self.until - time)
-            more = ends.beyond((self.until - time) / stage.seconds) if ends.count and self._is_last(index) else 0
-            span = Span(index, stage, number, _jumps(stage, before), ends.count + more, ends, time, position)
-            self._spans.append(span)
-            number, time, position = span.last, span.time(ends.count), span.position(ends.count)
-            before = (stage.control, stage.load.end)
-        self._numbers = [span.last for span in self._spans]
+    def _add_span(self) -> None:
+        index, last = len(self._spans), self._spans[-1] if self._spans else None
+        stage, number, time, position, before = self.history[index], 0, 0.0, (0.0, 0.0), self._before
+        if last is not None:
+            number, time, position = last.last, last.time(last.ends.count), last.position(last.ends.count)
+            before = (last.stage.control, last.stage.load.end)
+        ends = self._ends(index, stage, self.until - time)
+        more = ends.beyond((self.until - time) / stage.seconds) if ends.count and self._is_last(index) else 0
+        span = Span(index, stage, number, _jumps(stage, before), ends.count + more, ends, time, position)
+        if self._open == index and not (isinstance(ends, ChosenEnds) and ends.ladder.count):
+            self._open = index + 1
+        self._spans.append(span)
+        self._lasts.append(span.last)
 
     def _is_last(self, index: int) -> bool:
         return index == len(self.history) - 1
@@ -196,19 +209,20 @@ class Timeline:
         """Take the times [s] of steps that were made, by their numbers, as those that the stages have chosen."""
         for index in range(len(self.history) if self.chooses else 0):
             assert self.chosen is not None
-            span = self.spans[index]
+            span = self._first_spans(index + 1)[index]
             while isinstance(span.ends, ChosenEnds) and span.ends.ladder.count:
                 number = span.before + span.jumps + len(span.ends.made) + 1
                 if number not in times:
                     return self
                 self.chosen.ends.setdefault(index, []).append(_elapsed(span, times[number]))
-                span = self.spans[index]
+                span = self._first_spans(index + 1)[index]
         return self
 
     @property
     def count(self) -> int:
         """The number of steps, however many."""
-        return self._lasts[-1] if self._lasts else 0
+        known = self._first_spans(1 if self.history else 0)
+        return (known[-1].last if known else 0) + self._from[len(known)]
 
     def __len__(self) -> int:
         return self.count
@@ -228,12 +242,14 @@ class Timeline:
 
     def span(self, number: int) -> Span:
         """That of a step."""
-        return self.spans[bisect_left(self._lasts, number)]
+        while self._first_spans(1)[-1].last < number and len(self._spans) < len(self.history):
+            self._add_span()
+        return self._spans[bisect_left(self._lasts, number)]
 
     @property
     def end(self) -> float:
         """When the last step ends [s]."""
-        return self[len(self)].time if self._lasts and len(self) else 0.0
+        return self[len(self)].time if len(self) else 0.0
 
     @property
     def lasts(self) -> bool:
@@ -248,25 +264,6 @@ class Timeline:
     def first_reaching(self, time: float) -> int:
         """The number of the first step that reaches a time [s], or that of the last step."""
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
-
-    def first_between_cells(self, grid: Grid) -> Step | None:
-        """The first step after which the surface is not moved by whole cells along x."""
-        for span in filter(lambda span: span.moves, self.spans):
-            if isinstance(span.ends, ChosenEnds):
-                return span.step(span.before + span.jumps + 1)
-            (x, _), (slid, _) = span.origin, span.position(span.ends.count)
-            start, each = x / grid.dx, (slid - x) / grid.dx / span.ends.count
-            worst = abs(start - round(start)) + abs(each - round(each)) * span.count
-            if span.ends.growth == 1.0 and not span.stage.velocity[1] and worst < WHOLE / 2:
-                continue
-            first = span.before + span.jumps + 1
-            if span.ends.growth == 1.0 and not span.stage.velocity[1] and (off := abs(each - round(each))):
-                first += max(0, int((WHOLE - abs(start - round(start))) / off) - 2)  # none before can be that far off
-            for step in (span.step(number) for number in range(first, span.last + 1)):
-                cells = step.position[0] / grid.dx
-                if step.position[1] != 0.0 or abs(cells - round(cells)) >= WHOLE:
-                    return step
-        return None
 
     def shared(self, other: "Timeline") -> int:
         """How many of the first steps are those of another history too, stage by stage."""

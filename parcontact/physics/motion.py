@@ -6,11 +6,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import DTypeLike
 
+from ..job.cells import SAME_PLACE
 from .body import Heights
 from .surface import Surface
 
 Vector = tuple[float, float]
-SAME_PLACE = 1e-6  # of a cell: a displacement this close to whole cells is one of whole cells
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:

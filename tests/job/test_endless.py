@@ -7,6 +7,7 @@ import pytest
 
 from parcontact import scene
 from parcontact.errors import InputError
+from parcontact.job.cells import first_between_cells
 from parcontact.job.timeline import Timeline
 from parcontact.record.resolved import shown_job
 
@@ -38,7 +39,7 @@ def test_the_first_step_between_cells_of_so_many(tmp_path: Path, count: int) -> 
     cell = 1e-3 / 64
     stage = f"{{pressure: 1e5, velocity: {cell * (1 + 1e-12)!r}, duration: {count}.0, time_step: 1.0}}"
     job = job_of(tmp_path, with_stage(stage))
-    step = job.timeline().first_between_cells(job.grid)
+    step = first_between_cells(job.timeline(), job.grid)
     assert step is not None
 
     def off(number: int) -> float:
