@@ -10,6 +10,7 @@ from .parallel.fft import FFT, Spectrum
 from .parallel.root import on_root
 from .parallel.slab import Array
 from .physics import heightfile
+from .physics.lowest import lowest
 from .physics.roughness import Roughness
 from .physics.shapes import Round, Shape
 from .physics.surface import Surface, single_wave
@@ -37,9 +38,22 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, list[str]]:
     surface = Surface(slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
     surface.level()
     if surface.waves is not None:
-        surface.waves = surface.waves.astype(fft.complex, copy=False)
+        surface.waves = lowest(surface.waves, fft, highest_waves(job))
         slab.tally.hold(surface.waves)
     return surface, told
+
+
+def highest_waves(job: Job) -> tuple[int, int]:
+    """The most waves in the box, along x and y, of what a job's surface gives by waves: there are no shorter ones."""
+    grid, found = job.grid, [(0, 0)]
+    for part in job.surface:
+        if isinstance(part, jobs.Wave):
+            found.append((abs(part.waves[0]), abs(part.waves[1])))
+        elif isinstance(part, jobs.Rough):
+            found.append((int(grid.lx / part.short_wavelength), int(grid.ly / part.short_wavelength)))
+        elif isinstance(part, jobs.Spectral):
+            found.append((grid.nx // 2, grid.ny // 2))
+    return max(x for x, _ in found), max(y for _, y in found)
 
 
 def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectrum:

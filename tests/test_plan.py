@@ -87,10 +87,13 @@ def test_memory(comm: MPI.Intracomm, name: str) -> None:
     assert sum(slab.from_all(saved)) == memory.saved(planned)
 
 
-def test_the_last_rank_has_the_most() -> None:
+def test_no_rank_has_more_than_is_planned() -> None:
+    """The last has the most but for the few waves of the surface, which another one may have."""
     for name, ranks in [("free", 7), ("mixed", 3), ("viscoelastic", 100)]:
         planned = job(**JOBS[name])
-        assert memory.total(planned, ranks) == max(memory.total(planned, ranks, rank) for rank in range(ranks))
+        most = max(memory.total(planned, ranks, rank) for rank in range(ranks))
+        waves = sum(held.bytes for held in memory.holdings(planned, ranks) if held.what == "surface spectrum")
+        assert most <= memory.total(planned, ranks) <= most + waves
 
 
 @pytest.mark.mpi

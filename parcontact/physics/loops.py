@@ -170,17 +170,20 @@ def travel(p, p_old, factor, factor_old, shift, out):
 
 
 @loop
-def tangential(p, h, along_x, along_y, weight):
+def tangential(p, h, rows, phase_x, phase_y, along_x, along_y, weight):
     """Tangential forces of a pressure on a surface from their spectra: `sum weight Re(conj(p) i along h)`.
 
-    Along x and y: `along_x`, `along_y` are the slope symbols (the wavenumber for the exact slope), `weight` the
-    multiplicity of a column of the half spectrum.
+    Of h there are only these rows and the first columns; it is moved by `phase_x phase_y`. Along x and y: `along_x`,
+    `along_y` are the slope symbols (the wavenumber for the exact slope), `weight` the multiplicity of a column of the
+    half spectrum.
     """
     force_x, force_y = 0.0, 0.0
-    for j in range(p.shape[0]):
+    for k in range(h.shape[0]):
+        j = rows[k]
         row_x, row_y = 0.0, 0.0
-        for i in range(p.shape[1]):
-            product = weight[i] * (p[j, i].imag * h[j, i].real - p[j, i].real * h[j, i].imag)
+        for i in range(h.shape[1]):
+            moved = phase_x[i] * phase_y[j] * h[k, i]
+            product = weight[i] * (p[j, i].imag * moved.real - p[j, i].real * moved.imag)
             row_x += along_x[i] * product
             row_y += along_y[j] * product
         force_x += row_x
@@ -189,8 +192,11 @@ def tangential(p, h, along_x, along_y, weight):
 
 
 @loop
-def displace(h, along_x, along_y, out):
-    """Spectrum of moved heights: `out = along_x along_y h`, the phases of the shift."""
-    for j in range(h.shape[0]):
+def displace(h, rows, along_x, along_y, out):
+    """Spectrum of moved heights, of which h has these rows and the first columns: `out = along_x along_y h` there, the
+    phases of the shift, 0 elsewhere."""
+    out[:] = 0.0
+    for k in range(h.shape[0]):
+        j = rows[k]
         for i in range(h.shape[1]):
-            out[j, i] = along_x[i] * along_y[j] * h[j, i]
+            out[j, i] = along_x[i] * along_y[j] * h[k, i]

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
 from .convolution import wavenumbers
+from .lowest import rows_of
 
 EDGE = 1.0 - 1e-9  # wavenumbers equal to a limit up to round-off are taken as equal to it
 
@@ -124,9 +125,12 @@ class Moments:
 
 
 def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
-    """m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = (3/8) <(laplace h)^2> of a map given by its transform; collective."""
-    q2 = np.hypot(*wavenumbers(fft, size)) ** 2
-    power = fft.multiplicity * np.abs(spectrum) ** 2 / (fft.mx * fft.my) ** 2
+    """m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = (3/8) <(laplace h)^2> of a map given by its transform, or by the lowest
+    waves of it if there are no others; collective."""
+    rows, columns = rows_of(len(spectrum), fft.my), slice(spectrum.shape[1])
+    qx, qy = wavenumbers(fft, size)
+    q2 = np.hypot(qx[:, columns], qy[rows]) ** 2
+    power = fft.multiplicity[:, columns] * np.abs(spectrum) ** 2 / (fft.mx * fft.my) ** 2
     power[q2 == 0.0] = 0.0
     m0, m2, m4 = fft.slab.sum(*(float(np.sum(power * weight)) for weight in (1.0, q2 / 2, 3 * q2**2 / 8)))
     return Moments(m0, m2, m4)

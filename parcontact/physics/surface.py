@@ -17,6 +17,7 @@ from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
 from . import loops
 from .convolution import wavenumbers
+from .lowest import rows_of
 from .shapes import Shape
 
 Indices = NDArray[np.intp]
@@ -26,7 +27,8 @@ Indices = NDArray[np.intp]
 class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
-    `waves` is this rank's part of the transform of the periodic heights or None; `periodic` wraps the shapes around the
+    `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`) if there are
+    no others, or None; `periodic` wraps the shapes around the
     box; `scale` turns m into the unit of heights; with `differences` slopes are central differences over a cell;
     `datum` [m] is the height from which heights are counted.
     """
@@ -68,7 +70,7 @@ class Surface:
         if self.waves is None:
             out.fill(0.0)
         else:
-            loops.displace(self.waves, *self._phases(shift), self.fft.spectrum)
+            loops.displace(self.waves, self._rows, *self._phases(shift), self.fft.spectrum)
             self.fft.backward(self.fft.spectrum, out)
         for shape in self.shapes:
             out += self.scale * shape.height(*self._distances(shape, shift))
@@ -82,9 +84,8 @@ class Surface:
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
             transform = self.fft.forward(pressure)
-            phase_x, phase_y = self._phases(shift)
-            loops.displace(transform, phase_x.conj(), phase_y.conj(), transform)
-            sums = loops.tangential(transform, self.waves, *self._slope_symbols, self.fft.multiplicity.ravel())
+            factors = *self._phases(shift), *self._slope_symbols, self.fft.multiplicity.ravel()
+            sums = loops.tangential(transform, self.waves, self._rows, *factors)
             along_x, along_y = (value / (self.fft.mx * self.fft.my) for value in sums)
         if self.shapes:
             points = np.nonzero(pressure)
@@ -96,6 +97,12 @@ class Surface:
         return self.slab.sum(along_x, along_y)
 
     # -- waves --------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _rows(self) -> NDArray[np.int64]:
+        """Which rows of a spectrum those of the waves are."""
+        assert self.waves is not None
+        return rows_of(len(self.waves), self.fft.my)
 
     def _phases(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
         """Factors along x and y that move a transform by `shift`; at the Nyquist wavenumber their real part."""

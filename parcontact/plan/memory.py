@@ -23,6 +23,8 @@ from ..physics.convolution import Convolution
 from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
+from ..physics.lowest import shape_of
+from ..rigid_surface import highest_waves
 from ..solve.contact import ContactSolver
 from ..solve.steady import SteadySolver
 from ..solve.surround import grids_for
@@ -52,8 +54,9 @@ class Maps:
 
 
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> list[Holding]:
-    """All maps and transform buffers of a rank in a run of a job; by default of the last one, which has the most."""
-    return list(_holdings(job, ranks, ranks - 1 if rank is None else rank))
+    """All maps and transform buffers of a rank in a run of a job; by default no rank has more: the last has the most
+    of all but the surface's waves."""
+    return list(_holdings(job, ranks, ranks - 1 if rank is None else rank, _surface_spectrum(job, ranks, rank)))
 
 
 def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
@@ -69,7 +72,8 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     """
     if not decisions.steady_start(job).on:
         return 0
-    return sum(_while_steady(job, ranks, ranks - 1 if rank is None else rank, sets))
+    waves = _surface_spectrum(job, ranks, rank)
+    return sum(_while_steady(job, ranks, ranks - 1 if rank is None else rank, waves, sets))
 
 
 def saved(job: Job) -> int:
@@ -78,7 +82,7 @@ def saved(job: Job) -> int:
     return sum(maps.count.saved * (nx * ny * maps.itemsize + 4 * ny) for maps in _maps(job))
 
 
-def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
+def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
     precision, part = np.dtype(job.numerics.map_type), deal(job.grid.ny, ranks)[rank]
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
@@ -96,20 +100,20 @@ def _holdings(job: Job, ranks: int, rank: int) -> Iterator[Holding]:
     grids = grids_for(job.grid.dx, job.grid.dy)
     yield Holding("solver", ContactSolver.footprint(*job.grid.points, precision.itemsize, ranks, rank, grids))
     if decisions.spectrum(job).on:
-        yield Holding("surface spectrum", spectrum)
+        yield Holding("surface spectrum", waves)
     for maps in _maps(job):
         if maps.count.held:
             yield Holding(maps.what, maps.count.held * maps.itemsize * cells)
 
 
-def _while_steady(job: Job, ranks: int, rank: int, sets: bool) -> Iterator[int]:
+def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> Iterator[int]:
     points, precision = job.grid.points, np.dtype(job.numerics.map_type)
     even = not job.initial.velocity[1]
     finest = _transform("", job, points, precision, ranks, rank).bytes
     spectrum, *_ = footprint(points, points, precision, ranks, rank)
     yield SteadySolver.footprint(*points, precision.itemsize, ranks, rank, sets)
     yield 2 * _map(points, precision, ranks, rank)  # the heights and the start
-    yield finest + decisions.spectrum(job).on * spectrum
+    yield finest + waves
     yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(points):
         padded, *_ = footprint(points, lengths, precision, ranks, rank)
@@ -119,6 +123,16 @@ def _while_steady(job: Job, ranks: int, rank: int, sets: bool) -> Iterator[int]:
         yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
     for coarse in coarser_points(*points):
         yield sum(footprint(coarse, coarse, precision, ranks, rank)) + _map(coarse, precision, ranks, rank)
+
+
+def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
+    """Bytes of the waves of the surface on a rank, or on that which has the most."""
+    if not decisions.spectrum(job).on:
+        return 0
+    points, waves = job.grid.points, highest_waves(job)
+    dealt = deal(points[0] // 2 + 1, ranks)
+    shapes = [shape_of(waves, points, columns) for columns in (dealt if rank is None else [dealt[rank]])]
+    return max(rows * columns for rows, columns in shapes) * 2 * np.dtype(job.numerics.map_type).itemsize
 
 
 def _map(points: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int) -> int:

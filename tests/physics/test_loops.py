@@ -110,19 +110,36 @@ def test_maps_of_either_precision(dtype: type[np.floating]) -> None:
 
 
 def test_tangential() -> None:
-    """The sum over the half spectrum is the sum of pressure times slope over the map."""
+    """The sum over the half spectrum is the sum of pressure times slope over the map, the heights moved by a cell."""
     p, h = maps(2, (6, 8))
     qx, qy = 2 * np.pi * np.fft.rfftfreq(8), 2 * np.pi * np.fft.fftfreq(6)
+    phases = np.exp(-1j * qx), np.exp(-2j * qy)
     qx[-1] = qy[3] = 0.0  # at the Nyquist wavenumber the slope is 0 on the grid
     weight = np.array([1.0, 2.0, 2.0, 2.0, 1.0])
-    slopes = [np.fft.irfft2(1j * q * np.fft.rfft2(h), s=(6, 8)) for q in (qx[None, :], qy[:, None])]
-    found = loops.tangential(np.fft.rfft2(p), np.fft.rfft2(h), qx, qy, weight)
+    moved = np.roll(h, (2, 1), axis=(0, 1))
+    slopes = [np.fft.irfft2(1j * q * np.fft.rfft2(moved), s=(6, 8)) for q in (qx[None, :], qy[:, None])]
+    found = loops.tangential(np.fft.rfft2(p), np.fft.rfft2(h), np.arange(6), *phases, qx, qy, weight)
     assert_allclose(np.array(found) / h.size, [(p * slope).sum() for slope in slopes], rtol=1e-12)
 
 
+def test_tangential_of_the_lowest_waves() -> None:
+    """The sum over some rows and columns is that over all, the heights 0 elsewhere."""
+    p, h = (np.fft.rfft2(field) for field in maps(2, (6, 8)))
+    rows, kept = np.array([0, 1, 5]), np.zeros_like(h)
+    kept[rows, :2] = h[rows, :2]
+    factors = np.exp(1j * np.arange(5)), np.exp(2j * np.arange(6)), np.arange(5.0), np.arange(6.0), np.ones(5)
+    assert_allclose(
+        loops.tangential(p, h[rows, :2], rows, *factors),
+        loops.tangential(p, kept, np.arange(6), *factors),
+        rtol=1e-13,
+    )
+
+
 def test_displace() -> None:
+    """Rows and columns that are not given are 0."""
     h = np.fft.rfft2(maps(1, (6, 8))[0])
     along_x, along_y = np.exp(1j * np.arange(5)), np.exp(-2j * np.arange(6))
-    out = np.empty_like(h)
-    loops.displace(h, along_x, along_y, out)
-    assert_allclose(out, along_x * along_y[:, None] * h, rtol=1e-14)
+    rows, out, expected = np.array([0, 1, 5]), np.full_like(h, np.nan), np.zeros_like(h)
+    loops.displace(h[rows, :2], rows, along_x, along_y, out)
+    expected[rows, :2] = (along_x * along_y[:, None] * h)[rows, :2]
+    assert_allclose(out, expected, rtol=1e-14)
