@@ -4,9 +4,13 @@ Sums may be reordered to use vector units; NaN and infinity keep their meaning, 
 is kept in a private directory, so that only a first run waits for the compiler; where there is none, every run does.
 """
 
-from collections.abc import Callable
-from contextlib import suppress
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
+from glob import escape
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,6 +21,8 @@ import numba
 from . import private
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+MAX_SECONDS_TO_WAIT = 20.0  # seconds for another process; then a function is compiled once more
+LOCK = ".lock"
 OPTIONS: dict[str, Any] = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
 
 
@@ -32,9 +38,73 @@ def pointwise(function: Function) -> Function:
 
 def cache_path(compiled: Any) -> Path | None:
     """The directory in which machine code of a compiled function is kept, if any."""
-    dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a function of points, or of a loop
-    kept = getattr(dispatcher, "_cache", None) or getattr(dispatcher, "cache", None)  # none if compiling is off
+    kept = getattr(*_store_of(compiled), None)
     return Path(kept.cache_path) if kept and kept.cache_path else None
+
+
+class _OneAtATime:
+    """numba's store of the machine code of a function, which nobody reads while another process writes to it.
+
+    numba writes down what is in its files before it writes these: who reads in between is given what was in them
+    before, the code of an older source or of other types.
+    """
+
+    def __init__(self, store: Any, lock: Path) -> None:
+        self._store, self._lock = store, lock
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._store, name)
+
+    def load_overload(self, *given: Any) -> Any:
+        """The machine code, None if there is none or it cannot be read now."""
+        with _locked(self._lock, fcntl.LOCK_SH) as locked:
+            return self._store.load_overload(*given) if locked else None
+
+    def save_overload(self, *given: Any) -> None:
+        """Keep machine code, unless others read and write for too long."""
+        with _locked(self._lock, fcntl.LOCK_EX) as locked:
+            if locked:
+                self._remove_code_of_older_source()
+                self._store.save_overload(*given)
+
+    def _remove_code_of_older_source(self) -> None:
+        """Were this process killed now, the next one would take it for the code of the new one."""
+        with suppress(AttributeError, OSError):  # another numba, or no room
+            files = self._store._cache_file
+            if not files._load_index():
+                for path in Path(self.cache_path).glob(f"{escape(files._index_name.removesuffix('.nbi'))}.*.nbc"):
+                    path.unlink()
+
+
+@contextmanager
+def _locked(path: Path, kind: int) -> Iterator[bool]:
+    """Lock a file meanwhile, where the file system knows locks; False if others have it for too long."""
+    with ExitStack() as stack:
+        handle = None
+        with suppress(OSError):  # on a full disk what is kept can still be read
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            stack.callback(os.close, handle)
+        yield handle is None or _lock(handle, kind)
+
+
+def _lock(handle: int, kind: int) -> bool:
+    deadline = time.monotonic() + MAX_SECONDS_TO_WAIT
+    while time.monotonic() < deadline:
+        try:
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.01)
+            continue
+        except OSError:
+            pass
+        return True
+    return False
+
+
+def _store_of(compiled: Any) -> tuple[Any, str]:
+    """What has numba's store of a compiled function, and under which name; it has none if compiling is off."""
+    dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a function of points, or of a loop
+    return dispatcher, "_cache" if hasattr(dispatcher, "_cache") else "cache"
 
 
 def _compiled(compiler: Callable[[bool], Any]) -> Any:
@@ -51,7 +121,11 @@ def _compiled(compiler: Callable[[bool], Any]) -> Any:
     finally:
         config.CACHE_DIR = others
     path = cache_path(compiled)
-    return compiled if path and path.is_relative_to(place) else compiler(False)  # numba has other places, for all
+    if not path or not path.is_relative_to(place):
+        return compiler(False)  # numba has other places, for all
+    holder, name = _store_of(compiled)
+    setattr(holder, name, _OneAtATime(getattr(holder, name), place / LOCK))
+    return compiled
 
 
 @cache

@@ -1,7 +1,10 @@
 """Compiled loops where nothing can be kept on disk, and what of numba they import."""
 
+import fcntl
 import subprocess
 import sys
+from pathlib import Path
+from unittest.mock import Mock
 
 import numba.core.caching
 import pytest
@@ -34,6 +37,72 @@ print(scipy.linalg.det(2.0 * np.eye(2)), np.linalg.norm([3.0, 4.0]))
 """
     done = subprocess.run([sys.executable, "-c", program], env=outside_mpi, capture_output=True, text=True)
     assert done.stdout.split() == ["[[11.]]", "4.0", "5.0"], done.stderr
+
+
+READER = "import work; print(work.add(2.0))"
+LATE = """
+import subprocess, sys, time
+import numba.core.caching
+readers, save = [], numba.core.caching.IndexDataCacheFile._save_data
+
+def save_late(self, name, data):
+    words = [sys.executable, "-c", "print(flush=True); import work; print(work.add(2.0))"]
+    readers.append(subprocess.Popen(words, stdout=subprocess.PIPE, text=True))
+    readers[-1].stdout.readline()
+    time.sleep(1.0)  # [s]: it could read what was in the file before
+    save(self, name, data)
+
+numba.core.caching.IndexDataCacheFile._save_data = save_late
+import work
+print(work.add(2.0), *(reader.communicate()[0] for reader in readers))
+"""
+
+
+KILLED = """
+import os
+import numba.core.caching
+numba.core.caching.IndexDataCacheFile._save_data = lambda *_: os._exit(0)
+import work
+work.add(2.0)
+"""
+
+
+def test_nobody_reads_what_is_being_written(tmp_path: Path, outside_mpi: dict[str, str]) -> None:
+    """A process that comes while another one keeps the code of a new source does not get that of the old one; nor does
+    it when that one was killed half-way."""
+    environment = outside_mpi | {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+    (tmp_path / "cache").mkdir(mode=0o700)
+    work = tmp_path / "work.py"
+
+    def said(program: str, added: float) -> list[str]:
+        source = f"from parcontact.compiled import loop\n\n@loop\ndef add(x):\n    return x + {added}\n"
+        if not work.exists() or work.read_text() != source:
+            work.write_text(source)
+        words = [sys.executable, "-c", program]
+        done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert said(READER, 1.0) == ["3.0"]
+    assert said(LATE, 10.25) == ["12.25", "12.25"]
+    assert said(KILLED, 100.125) == []
+    assert said(READER, 100.125) == ["102.125"]
+
+
+def test_a_function_that_cannot_be_read_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also when another process keeps something for ever."""
+    monkeypatch.setattr(compiled, "MAX_SECONDS_TO_WAIT", 0.1)
+    lock = tmp_path / "lock"
+    store = compiled._OneAtATime(Mock(load_overload=Mock(return_value="code")), lock)
+    assert store.load_overload("types") == "code"
+    with lock.open("w") as other:
+        fcntl.flock(other, fcntl.LOCK_SH)
+        assert store.load_overload("types") == "code"
+        store.save_overload("types", "code")
+        assert not store._store.save_overload.called
+        fcntl.flock(other, fcntl.LOCK_EX)
+        assert store.load_overload("types") is None
+    store.save_overload("types", "code")
+    assert store._store.save_overload.called
 
 
 def sum_to(n: int) -> int:
