@@ -157,7 +157,7 @@ def _judge(said: list[dict[str, float]], wanted: float) -> Found:
     tries = [one["seconds"] for one in said if "seconds" in one]
     began = [one["began"] for one in said if "began" in one]
     unfinished = [LIMIT - began[-1]] if len(began) > len(tries) else []
-    return Found(False, max(tries + unfinished), np.inf)
+    return Found(False, max(tries + unfinished, default=LIMIT), np.inf)
 
 
 # -- environments ------------------------------------------------------------------------------------------------------
