@@ -2,9 +2,9 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import pytest
+from job.texts import SMALL, job_of
 
 from parcontact.job import (
     Elastic,
@@ -15,7 +15,6 @@ from parcontact.job import (
     Stage,
     ZenerBranch,
     describe,
-    load,
     log_range,
 )
 from parcontact.job.advice import cells_per_wave
@@ -57,21 +56,6 @@ output:
   every: 64                     # steps between saved fields
 checkpoint: {every: 200, keep: 2}           # steps; {minutes: 10} also
 """
-
-SMALL = """\
-grid: {points: 64, size: 1e-3}
-surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
-material: {model: elastic, shear_modulus: 1e6}
-history:
-  - {pressure: 1e5}
-"""
-
-
-def job_of(tmp_path: Path, text: str, *overrides: str, name: str = "test.yaml") -> Any:
-    """The job of a text; Any, so that a test may say what it knows: this shape has a phase."""
-    path = tmp_path / name
-    path.write_text(text, encoding="utf-8")
-    return load(path, overrides)
 
 
 def replaced(text: str, **sections: str) -> str:

@@ -1,43 +1,19 @@
 """All mistakes of a job at once, and those that take several keys or sections to see."""
 
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
+from job import texts
+from job.texts import SMALL, with_material
 
-from parcontact.job import JobError, load
-
-SMALL = """\
-grid: {points: 64, size: 1e-3}
-surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
-material: {model: elastic, shear_modulus: 1e6}
-history:
-  - {pressure: 1e5}
-"""
+job_of, mistakes_of = partial(texts.job_of, Path()), partial(texts.mistakes_of, Path())
 
 
 @pytest.fixture(autouse=True)
 def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Messages call files by their path from the working directory."""
     monkeypatch.chdir(tmp_path)
-
-
-def job_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> Any:
-    """The job of a text; Any, so that a test may say what it knows: this material has branches."""
-    Path(path).parent.mkdir(exist_ok=True, parents=True)
-    Path(path).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return load(path, overrides)
-
-
-def mistakes_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> list[str]:
-    with pytest.raises(JobError) as caught:
-        job_of(text, *overrides, path=path)
-    assert str(caught.value) == "\n".join(caught.value.mistakes)
-    return caught.value.mistakes
-
-
-def with_material(line: str) -> str:
-    return SMALL.replace("{model: elastic, shear_modulus: 1e6}", line)
 
 
 BAD = """\

@@ -1,19 +1,13 @@
 """Where a job's text comes from: YAML and its mistakes, overrides, included materials."""
 
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
+from job import texts
+from job.texts import SMALL, with_material
 
 from parcontact.job import JobError, load
-
-SMALL = """\
-grid: {points: 64, size: 1e-3}
-surface: {shape: wave, amplitude: 1e-6, waves: [1, 0]}
-material: {model: elastic, shear_modulus: 1e6}
-history:
-  - {pressure: 1e5}
-"""
 
 COMPOUND = """\
 model: zener
@@ -24,28 +18,13 @@ branches:
 """
 
 
+job_of, mistakes_of = partial(texts.job_of, Path()), partial(texts.mistakes_of, Path())
+
+
 @pytest.fixture(autouse=True)
 def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Messages call files by their path from the working directory."""
     monkeypatch.chdir(tmp_path)
-
-
-def job_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> Any:
-    """The job of a text; Any, so that a test may say what it knows: this material has branches."""
-    Path(path).parent.mkdir(exist_ok=True, parents=True)
-    Path(path).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return load(path, overrides)
-
-
-def mistakes_of(text: str | bytes, *overrides: str, path: str = "job.yaml") -> list[str]:
-    with pytest.raises(JobError) as caught:
-        job_of(text, *overrides, path=path)
-    assert str(caught.value) == "\n".join(caught.value.mistakes)
-    return caught.value.mistakes
-
-
-def with_material(line: str) -> str:
-    return SMALL.replace("{model: elastic, shear_modulus: 1e6}", line)
 
 
 # --- YAML
@@ -173,7 +152,7 @@ def write(path: str, text: str) -> None:
 
 def test_include_by_name() -> None:
     write("paper/materials/rubber.yaml", COMPOUND)
-    job = job_of(with_material("{include: rubber, poisson: 0.4}"), path="paper/fig.yaml")
+    job = job_of(with_material("{include: rubber, poisson: 0.4}"), name="paper/fig.yaml")
     assert (job.material.model, job.material.poisson, job.material.modulus_inf) == ("zener", 0.4, 1e6)
     assert [branch.modulus for branch in job.material.branches] == [3e6, 2e6]
     assert "include" not in job.resolved()
@@ -189,12 +168,12 @@ def test_a_compound_of_the_program() -> None:
 def test_the_nearest_material_wins() -> None:
     write("materials/m.yaml", "{model: elastic, shear_modulus: 1}")
     write("near/materials/m.yaml", "{model: elastic, shear_modulus: 2}")
-    assert job_of(with_material("{include: m}"), path="near/job.yaml").material.shear_modulus == 2.0
+    assert job_of(with_material("{include: m}"), name="near/job.yaml").material.shear_modulus == 2.0
 
 
 def test_include_by_path_and_a_file_that_says_material() -> None:
     write("jobs/mine.yaml", "material:\n  model: elastic\n  shear_modulus: 3\n")
-    assert job_of(with_material("{include: mine.yaml}"), path="jobs/job.yaml").material.shear_modulus == 3.0
+    assert job_of(with_material("{include: mine.yaml}"), name="jobs/job.yaml").material.shear_modulus == 3.0
 
 
 def test_overrides_reach_into_an_included_material() -> None:

@@ -1,10 +1,11 @@
 """Jobs as texts: a sound one, and what tests make of it."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from parcontact.job import Job, JobError, load
+from parcontact.job import JobError, load
 
 SMALL = """\
 grid: {points: 64, size: 1e-3}
@@ -15,18 +16,21 @@ history:
 """
 
 
-def job_of(directory: Path, text: str | bytes, *overrides: str) -> Job:
-    """The job of a text."""
-    path = directory / "job.yaml"
+def job_of(directory: Path, text: str | bytes, *overrides: str, name: str = "job.yaml") -> Any:
+    """The job of a text; Any, so that a test may say what it knows: this material has branches."""
+    path = directory / name
+    path.parent.mkdir(exist_ok=True, parents=True)
     path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"))
     return load(path, overrides)
 
 
-def mistakes_of(directory: Path, text: str | bytes, *overrides: str) -> list[str]:
-    """The sentences about a job that cannot be read, without the name of its directory."""
+def mistakes_of(directory: Path, text: str | bytes, *overrides: str, name: str = "job.yaml") -> list[str]:
+    """The sentences about a job that cannot be read, without the name of its directory, if that is absolute."""
     with pytest.raises(JobError) as caught:
-        job_of(directory, text, *overrides)
-    return [mistake.replace(f"{directory}/", "") for mistake in caught.value.mistakes]
+        job_of(directory, text, *overrides, name=name)
+    assert str(caught.value) == "\n".join(caught.value.mistakes)
+    mistakes = caught.value.mistakes
+    return [mistake.replace(f"{directory}/", "") for mistake in mistakes] if directory.is_absolute() else mistakes
 
 
 def with_surface(line: str) -> str:
