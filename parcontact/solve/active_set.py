@@ -73,7 +73,7 @@ class _Search:
         iterations = 0
         while self._residual(u, r) > goal and iterations < solver.max_iterations:
             z = solver.preconditioner.apply(r, w)
-            sum_z, sum_t, _, r_z, _, _ = slab.sum(*kernels.products(working, u, self.h, self.d, r, z, t))
+            sum_z, sum_t, _, r_z, _, _ = slab.sum(*kernels.products(working, u, self.h, self.d, u, z, t))
             beta, product = r_z / product if product > 0.0 else 0.0, r_z
             mean = (sum_z + beta * sum_t) / self.members if self.load is not None else 0.0
             kernels.turn(working, z, beta, mean, t)

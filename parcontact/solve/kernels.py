@@ -63,28 +63,29 @@ def residual(working, u, h, d, r):
 
 
 @loop
-def products(working, u, h, d, r_old, z, t):
-    """Over the working set, with `r = u - h - d` in the precision of maps: sums of z, t, r_old, r z, r_old z, r t."""
-    sum_z, sum_t, sum_old, r_z, old_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def products(working, u, h, d, u_old, z, t):
+    """Over the working set, with `r = u - h - d` in the precision of maps and `c = u - u_old`: sums of z, t, c, r z,
+    c z and r t."""
+    sum_z, sum_t, sum_change, r_z, change_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
-        row_z, row_t, row_old, row_r_z, row_old_z, row_r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        row_z, row_t, row_change, row_r_z, row_change_z, row_r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(z.shape[1]):
             weight = 1.0 if working[j, i] else 0.0
             r = z.dtype.type(u[j, i] - h[j, i] - d)
-            z_here, t_here, old_here = weight * z[j, i], weight * t[j, i], weight * r_old[j, i]
+            z_here, t_here, change_here = weight * z[j, i], weight * t[j, i], weight * (u[j, i] - u_old[j, i])
             row_z += z_here
             row_t += t_here
-            row_old += old_here
+            row_change += change_here
             row_r_z += r * z_here
-            row_old_z += old_here * z_here
+            row_change_z += change_here * z_here
             row_r_t += r * t_here
         sum_z += row_z
         sum_t += row_t
-        sum_old += row_old
+        sum_change += row_change
         r_z += row_r_z
-        old_z += row_old_z
+        change_z += row_change_z
         r_t += row_r_t
-    return sum_z, sum_t, sum_old, r_z, old_z, r_t
+    return sum_z, sum_t, sum_change, r_z, change_z, r_t
 
 
 @loop

@@ -25,8 +25,8 @@ from ..compiled import loop
 from ..parallel.slab import Array, Slab, deal
 from . import kernels
 from .certificate import Certificate
-from .contact import certify, weigh
 from .gcr import Directions, gaps_on
+from .iterate import certify, weigh
 from .operator import Operator
 from .projected import DIRECTIONS, GRIDS, Projected
 from .surround import Surround

@@ -70,13 +70,13 @@ def test_residual(shape: tuple[int, int], dtype: type[np.floating]) -> None:
 
 @SHAPES
 def test_products(shape: tuple[int, int], dtype: type[np.floating]) -> None:
-    """Of the residual that `residual` makes, to the precision of the maps; the last one's is another set."""
+    """Of the residual that `residual` makes, to the precision of the maps, and of the change of the displacement."""
     maps = Maps(shape, dtype)
     inside = maps.working
     kernels.residual(maps.working, maps.u, maps.h, 0.3, maps.r)
     sums = kernels.products(maps.working, maps.u, maps.h, 0.3, maps.old, maps.z, maps.t)
-    r, old, z, t = (maps.wide(name)[inside] for name in ("r", "old", "z", "t"))
-    for found, terms in zip(sums, (z, t, old, r * z, old * z, r * t), strict=True):
+    r, u, old, z, t = (maps.wide(name)[inside] for name in ("r", "u", "old", "z", "t"))
+    for found, terms in zip(sums, (z, t, u - old, r * z, (u - old) * z, r * t), strict=True):
         assert maps.close(found, terms)
 
 

@@ -1,0 +1,62 @@
+"""An iterate of the contact solver in numbers, and how wrong it is."""
+
+import math
+from dataclasses import dataclass, replace
+
+from ..parallel.slab import Array, Slab
+from . import kernels
+from .certificate import Certificate
+
+LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
+LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements that are only rounding
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """An iterate in numbers, for an approach d: the sums of p, of `p (A p)^2` and of p g, and `energy = <p, A p>/2`."""
+
+    d: float
+    load: float
+    gaps: float
+    energy: float
+    squares: float
+
+    @property
+    def f(self) -> float:
+        """`<p, A p>/2 - <p, h + d>`, with `h + d = A p - g`: no large numbers where h has a large offset."""
+        return self.gaps - self.energy
+
+    def settled(self) -> "Iterate":
+        """The same iterate, for the d at which `<p, g> = 0`, but for the rounding of d."""
+        d = self.d + self.gaps / self.load
+        return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load)
+
+    def length(self, height: float) -> float:
+        """What gaps are compared with (`Certificate`): at most the surface's height, at least LEAST_HEIGHT of it."""
+        least = LEAST_HEIGHT * height
+        if self.load <= 0.0:
+            return least
+        mean = 2.0 * self.energy / self.load
+        spread = math.sqrt(max(self.squares / self.load - mean**2, 0.0))
+        return max(min(max(spread, LEAST_SHARE * abs(mean)), height), least)
+
+
+def certify(
+    slab: Slab, p: Array, u: Array, h: Array, iterate: Iterate, mean: float | None, height: float, working: Array
+) -> tuple[float, float, Certificate]:
+    """Mark the working set of a pressure and its image u; its size, its sum of gaps, and the certificate; collective.
+
+    `mean` is the mean pressure asked for, None with a given approach; `height` is that of the surface.
+    """
+    *sums, deepest = kernels.certify(p, u, h, iterate.d, working)
+    wrong, members, excess, deepest = slab.reduce(sums, [deepest])
+    length = iterate.length(height)
+    complementarity = wrong / (iterate.load or 1.0) / length
+    load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
+    return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length)
+
+
+def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:
+    """A pressure and its image u in numbers, for an approach d; collective."""
+    load, work, gaps, squares = slab.sum(*kernels.weigh(p, u, h, d))
+    return Iterate(d, load, gaps, 0.5 * work, squares)
