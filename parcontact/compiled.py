@@ -89,16 +89,17 @@ def _locked(path: Path, kind: int) -> Iterator[bool]:
 
 def _lock(handle: int, kind: int) -> bool:
     deadline = time.monotonic() + MAX_SECONDS_TO_WAIT
-    while time.monotonic() < deadline:
+    while True:
         try:
             fcntl.flock(handle, kind | fcntl.LOCK_NB)
         except BlockingIOError:
+            if time.monotonic() > deadline:
+                return False
             time.sleep(0.01)
-            continue
         except OSError:
-            pass
-        return True
-    return False
+            return True
+        else:
+            return True
 
 
 def _store_of(compiled: Any) -> tuple[Any, str]:
