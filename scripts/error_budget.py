@@ -1,12 +1,13 @@
 """How honest the error budget is: estimated over true errors of friction and area, for solver and time steps.
 
-    .venv/bin/python scripts/error_budget.py [points] [how many times finer steps are the reference] [seed] [velocity]
+    .venv/bin/python scripts/error_budget.py [points] [times finer steps of the reference] [seed] [velocity] [cells]
 
 Each scene is marched with its own settings, with a tolerance 1e-4 of that, and with a sixteenth of its time steps (and
 the small tolerance). The first two differ by the solver's error, the last two by that of the time steps. Errors are
-those of friction and area over the last two thirds of the history: by the solver, and those of area, which change their
-sign from step to step, as rms; that of friction by the time steps, which does not, of the mean. Another seed of the
-surfaces, and velocities times that number, make other cases than those by which the estimates were found (0 and 1).
+those of friction and area over the last two thirds of the history: of friction by the solver, which change their sign
+from step to step, as rms, by the time steps, which do not, of the mean; of area, which are some points in some of the
+steps, the mean of their size. Another seed of the surfaces, and velocities and cells per step times these numbers, make
+other cases than those by which the estimates were found.
 """
 
 import sys
@@ -46,10 +47,13 @@ def sphere(points: int, velocity: float) -> Json:
     return {"grid": grid, "surface": ball, "material": SOLID, "history": [stage]}
 
 
-def change(data: Json, seed: int, faster: float) -> Json:
-    """A scene with another rough surface, and other velocities."""
+def change(data: Json, seed: int, faster: float, cells: float) -> Json:
+    """A scene with another rough surface, and other velocities and steps."""
     surface = {**data["surface"], "seed": seed} if data["surface"]["shape"] == "rough" else data["surface"]
-    stages = [{**s, "velocity": s["velocity"] * faster} if "velocity" in s else s for s in data["history"]]
+    stages = [
+        {**s, "velocity": s["velocity"] * faster, "cells_per_step": cells} if "velocity" in s else s
+        for s in data["history"]
+    ]
     return {**data, "surface": surface, "history": stages}
 
 
@@ -62,6 +66,7 @@ def scenes(points: int) -> dict[str, Json]:
     return {
         "sphere": sphere(points, 0.046765),
         "cylinder": {**line, "material": SOLID},
+        "rough, very light": rough(points, 1e2, 1.0),
         "rough, light": rough(points, 2e3, 1.0),
         "rough": rough(points, 2e4, 1.0),
         "rough, heavy": rough(points, 1e5, 1.0),
@@ -104,21 +109,23 @@ def compare(data: Json, integrator: str, finer: int) -> dict[str, tuple[float, f
     for measure, name in (("friction", "friction"), ("area", "contact_area_corrected")):
         a, b, c = (series(rows, times, name) for rows in (own, exact, finest))
         size = np.sqrt(np.mean(c**2))
-        apart = abs(np.mean(b - c)) if measure == "friction" else np.sqrt(np.mean((b - c) ** 2))
-        true = {"solver": np.sqrt(np.mean((a - b) ** 2)) / size, "time": apart / size}
+        true = {
+            "solver": np.sqrt(np.mean((a - b) ** 2)) if measure == "friction" else np.mean(abs(a - b)),
+            "time": abs(np.mean(b - c)) if measure == "friction" else np.mean(abs(b - c)),
+        }
         for part, error in true.items():
             parts: list[Parts] = [getattr(row.errors, measure) for row in late if row.errors]
             estimate = np.mean([getattr(one, part) * v for one, v in zip(parts, a, strict=True)]) / np.mean(a)
-            found[f"{part} {measure}"] = float(estimate), float(error)
+            found[f"{part} {measure}"] = float(estimate), float(error / size)
     return found
 
 
-def main(points: int = 128, finer: int = 16, seed: int = 0, faster: float = 1.0) -> None:
+def main(points: int = 128, finer: int = 16, seed: int = 0, faster: float = 1.0, cells: float = 1.0) -> None:
     print(f"{'estimated/true':28}" + "".join(f"{part:>24}" for part in PARTS))
     honest: dict[str, list[float]] = {part: [] for part in PARTS}
     for integrator in ("exponential", "backward-euler"):
         for name, data in scenes(points).items():
-            found = compare(change(data, seed, faster), integrator, finer)
+            found = compare(change(data, seed, faster, cells), integrator, finer)
             print(f"{name + ', ' + integrator[:3]:28}", end="")
             for part in PARTS:
                 estimate, true = found[part]

@@ -14,7 +14,8 @@ from parcontact.job import Job
 from parcontact.job.advice import cells_per_wave
 from parcontact.job.table import plain
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import SPOTS_ORDER, TIME_ORDER, Summary
+from parcontact.physics.budget import SPOTS_ORDER, Summary
+from parcontact.physics.time_error import TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.report import Costs
 from parcontact.plan.sample import Sample, StageCost, sample
@@ -81,12 +82,12 @@ def test_fast_lengths(count: int) -> None:
 
 @pytest.mark.parametrize(("integrator", "order"), [("exponential", TIME_ORDER), ("backward-euler", 1.0)])
 def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) -> None:
-    """On the own mesh: the error of steps three times as long. Steps of a slide are cells, halves, quarters, ..."""
+    """On the own mesh: the error of steps three times as long. Steps of a slide are cells, halves, thirds, ..."""
     stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-5}
     planned = job(grid=FINE, history=[stage, SLIDE], numerics={"integrator": integrator})
     found = price.offer(costs(planned, time=3.0**order * price.TIME_SHARE * 0.01), 0.01)
     steps = [stage.steps for stage in found.costs.scaling.samples[0].stages]
-    assert steps == [1 + 300, 4 * 80]  # quarters of a cell: the power of two not below 3
+    assert steps == [1 + 300, 3 * 80]
 
 
 def test_steps_are_never_longer_than_a_cell() -> None:

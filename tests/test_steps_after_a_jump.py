@@ -9,6 +9,7 @@ from marching import begun, column, example, marched
 
 from parcontact.job import Job
 from parcontact.job.timeline import Step
+from parcontact.march.choosing import LEAST_WAY, cells_per_step
 from parcontact.march.rest import steps_to_make
 
 POINTS = 32
@@ -55,14 +56,23 @@ def test_a_step_that_is_made_anew_leaves_nothing() -> None:
 
 
 def test_steps_double_at_most() -> None:
-    """After a jump, until they are whole cells: each but the first ends at a multiple of its own length."""
+    """After a jump, until they are whole cells: but for the part that leads to a multiple of a new length."""
     for accuracy in (3e-3, 1e-2, 2e-2):
         march, _ = marched(data(accuracy))
         assert march.chosen is not None
         ends = np.array([0.0, *march.chosen.ends[0]]) / CELL
         steps = np.diff(ends)
-        assert (steps[1:] <= 2.0 * steps[:-1] * (1 + 1e-9)).all()
-        np.testing.assert_allclose(ends[1:] / steps, np.round(ends[1:] / steps), rtol=0, atol=1e-6)
+        assert (steps[1:] <= (1.0 + LEAST_WAY) * 2.0 * steps[:-1]).all()
+        for end in range(1, 7):
+            assert min(abs(ends - end)) < 1e-9
+
+
+def test_lengths_of_steps() -> None:
+    """Whole cells in powers of two; then every part of one, and four to each factor of two below an eighth."""
+    parts = sorted({round(1.0 / cells_per_step(1.0 / most), 9) for most in np.arange(1.0, 40.0, 0.25)})
+    assert parts == [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40]
+    assert [cells_per_step(most) for most in (1.0, 1.9, 2.0, 3.9, 4.0)] == [1, 1, 2, 2, 4]
+    assert all(cells_per_step(1.0 / most) <= (1.0 + 1e-5) / most for most in np.arange(1.0, 100.0, 0.3))
 
 
 def test_a_jump_of_velocity_needs_one_stage() -> None:

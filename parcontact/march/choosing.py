@@ -21,17 +21,28 @@ from ..job.chosen import Bounds, ChosenEnds, ChosenSteps, reached
 from ..job.limits import one_cell
 from ..job.timeline import Span, Step
 from ..physics.body import ZenerBody
-from ..physics.budget import TIME_ORDER
+from ..physics.time_error import TIME_ORDER
 from ..scene import Scene
 
-TIME_SHARE = 0.7  # of numerics.accuracy, for the error of a step
-SAFETY = 0.9
-REJECTED = 1.5  # times the error allowed: the error of a slide varies from step to step, and its mean counts
+TIME_SHARE = 0.85  # of numerics.accuracy, for the error of a step
+SAFETY = 0.95
+REJECTED = 1.2  # times the error allowed: the error of a slide varies from step to step, and its mean counts
 MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0
-REST_LEVELS = 4  # lengths of steps at rest per factor of two
+LEVELS = 2  # the power of two of lengths, of steps below a quarter of a cell, per factor of two
+REST_LEVELS = 4  # the same at rest
+LEAST_WAY = 0.35  # of a step that ends at a multiple of its length
 STRETCH = 1.1  # of the last step of a stage: no step shorter than a tenth of the one before is left over
 RELAXING = 0.1  # of the shortest relaxation time: the first step at rest after a jump
 SAME_LEVEL = 1e-6  # of a level
+
+
+def cells_per_step(most: float) -> float:
+    """The longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of one."""
+    if most >= 1.0 - SAME_LEVEL:
+        return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
+    count = (1.0 - SAME_LEVEL) / most
+    unit = max(1, 2 ** (math.floor(math.log2(count)) - LEVELS))
+    return 1.0 / (math.ceil(count / unit) * unit)
 
 
 @dataclass
@@ -92,17 +103,16 @@ class StepChooser:
         assert isinstance(span.ends, ChosenEnds)
         return span.ends.limits
 
-    def _levels(self, span: Span) -> int:
-        """Lengths of steps per factor of two."""
-        return 1 if span.stage.speed else REST_LEVELS
-
     def _level(self, span: Span, dt: float) -> float:
         """The longest of the lengths that steps may have which is no longer than dt."""
-        limits, levels = self._bounds(span), self._levels(span)
+        limits = self._bounds(span)
         if dt <= limits.least or dt >= limits.most:
             return min(max(dt, limits.least), limits.most)
-        power = math.floor(levels * math.log2(dt / limits.least) + SAME_LEVEL)
-        return min(limits.least * 2.0 ** (power / levels), limits.most)
+        if span.stage.speed:
+            cell = one_cell(span.stage, self.scene.job.grid)
+            return min(cell * cells_per_step(dt / cell), limits.most)
+        power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
+        return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
 
     def _first(self, span: Span) -> float:
         """How long to try the first step of a stage."""
@@ -137,7 +147,7 @@ class StepChooser:
         return self._made(span, number, dt)
 
     def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
-        """How long until the surface is at a multiple of the way of such a step: a half to one and a half of one.
+        """How long until the surface is at a multiple of the way of such a step: LEAST_WAY of it, or longer.
 
         From half a multiple it is half of one: a step that has just grown is not three times the one before.
         """
@@ -147,7 +157,7 @@ class StepChooser:
         cell = one_cell(span.stage, self.scene.job.grid)
         at = math.copysign(1.0, along) * x / self.scene.job.grid.dx + now / cell
         size = dt / cell
-        way = (math.ceil(at / size + 0.5 - SAME_LEVEL) * size - at) * cell
+        way = (math.ceil(at / size + LEAST_WAY) * size - at) * cell
         return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
 
     def _made(self, span: Span, number: int, dt: float) -> Step:

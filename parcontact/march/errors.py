@@ -3,6 +3,7 @@
 What the embedded pair shows changes slowly while steps are alike: then it is looked at in every few of them only.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass, replace
 from typing import Any
@@ -12,10 +13,12 @@ import numpy as np
 from ..job import Rough
 from ..job.timeline import Step
 from ..physics.body import Trial, ZenerBody
-from ..physics.budget import ErrorBudget, Known, Seen, estimate, time_error
+from ..physics.budget import ErrorBudget, estimate
 from ..physics.embedded import Embedded, Look
 from ..physics.entries import Entry
 from ..physics.measures import Measures
+from ..physics.seen import Known, Seen
+from ..physics.time_error import time_error
 from ..scene import Scene
 from ..solve.contact import Contact
 
@@ -63,9 +66,11 @@ class Errors:
             1 in grid.points,
             scene.folded.bound,
             scene.job.numerics.integrator == "exponential",
+            material.prony if isinstance(material, ZenerBody) else None,
         )
         self._slope_unit = scene.units.height / scene.units.length
         self._pressure_unit = scene.units.pressure
+        self._cell = grid.dx, grid.dy
         cell = grid.dx / scene.units.length
         self._pair = Embedded(self.slab, material, cell) if isinstance(material, ZenerBody) else None
         self._last = self._before = LastLook()
@@ -76,7 +81,8 @@ class Errors:
         if measures.contact_area == 0.0:
             if step.judge is not None and self._pair is not None:
                 look = self._pair.look_without_load(step.dt, trial)
-            return Estimate(None, time_error(self.known, Seen(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)))
+            still = Seen(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
+            return Estimate(None, time_error(self.known, still, self.slab.points))
         seen = Seen(
             contact.certificate.complementarity,
             look.difference,
@@ -85,8 +91,12 @@ class Errors:
             measures.friction,
             measures.contact_area,
             measures.contact_area_corrected,
+            math.hypot(step.velocity[0] / self._cell[0], step.velocity[1] / self._cell[1]) * step.dt,
+            step.dt,
+            max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
         )
-        return Estimate(estimate(self.known, seen, self.slab.points), time_error(self.known, seen))
+        points = self.slab.points
+        return Estimate(estimate(self.known, seen, points), time_error(self.known, seen, points))
 
     def take_back(self) -> None:
         """Forget the look at a step that is made anew."""

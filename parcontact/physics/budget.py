@@ -2,21 +2,19 @@
 
 Each part is an estimate of a relative error (1 is all of it), found by experiment: spheres, cylinders and rough
 surfaces from 0.4 % to full contact, bodies of one to twelve branches, starts and jumps of velocity, against runs with
-finer steps, meshes and tolerances (`scripts/error_budget.py 64 8`, which makes eight scenes with both integrators). In
-brackets: the same with other surfaces at three times the velocity, `scripts/error_budget.py 64 8 7 3`, by which nothing
-was found. Estimates are so many times the true errors:
+finer steps, meshes and tolerances. `scripts/error_budget.py 64 8` makes nine scenes with both integrators; in brackets
+54 others by which nothing was found, with other surfaces, speeds, steps and meshes (`64 8 7 3`, `64 8 8 0.1 0.5`,
+`128 8 9 2`). Estimates are so many times the true errors:
 
-    of friction, by the solver 0.7 to 2.9 (0.6 to 5), by time steps 0.8 to 2.6 (0.4 to 3.4);
-    of area, by the solver 0.4 to 2.6 (0.4 to 2.7), by time steps 0.6 to 4.9 (0.3 to 7.5), but far too small where it is
-    below 0.1 %, next to full contact, and a fifth of it where 0.4 % of the points touch.
+    of friction, by the solver 0.5 to 3.4 (0.2 to 5), by time steps 0.6 to 2.1 (0.4 to 4.3; `exponential` 0.5 to 4.3);
+    of area, by the solver 0.4 to 1.7 (0.7 to 2.3; more below 0.002 %, 0.04 where 18 points touch), by time steps, as it
+    changes its sign, 0.25 to 6 (0.2 to 7).
 
 solver: from the `complementarity` C of the certificate (see `solve.contact.Certificate`). Friction is wrong in
-    proportion to it, area, which edges decide that carry little pressure, to C^0.7.
-time: from the embedded pair (see `embedded`). Over one step the pair differs in the second order of the step where all
-    branches are slow, in the first where some are as fast as the step is short. The error that all steps of the
-    exponential integrator leave in the end is of an order of 1.7 in contacts, and little in full contact, where the
-    displacement is smooth in time; that of backward Euler is of the first order and goes with the root. The area, which
-    is wrong now by more and now by less than none, has a share of the error of friction: less where little is open.
+    proportion to it, less where many spots of contact average it out, by the root of the root of their number. Area is
+    wrong by the points that penetrate and have no pressure, which the working set of the last iterate counts; and
+    somewhat, as C^0.7, where there happen to be none.
+time: from how far the spots of contact pass in a step, and from the embedded pair (see `time_error`).
 folded: the bound of the branches without a map.
 mesh: of friction from the cells per shortest wave of a rough surface, or per radius of a contact spot; of the corrected
     area from the correction itself. Where there is a run on half the mesh, both from their difference to it.
@@ -35,18 +33,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .measures import SIDE
+from .seen import Known, Seen, count_spots, spot_radius
+from .time_error import share_of_area, time_error
 
-SOLVER_FRICTION = 0.5  # times the complementarity
-SOLVER_AREA, SOLVER_AREA_POWER = 0.4, 0.7  # times this power of it
-EXPONENTIAL_FRICTION = 1.7  # times the difference of the pair
-LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least
-TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
-EQUAL_DIFFERENCE = 0.0072  # of the pair, at which a material of many branches is no worse than one of a single branch
-FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
-EULER_FRICTION = 0.8  # times its root
-EXPONENTIAL_AREA, NEARLY_CLOSED = 0.1, 0.2  # of the error of friction; in proportion below this share of open points
-EULER_AREA, EULER_OPEN_POWER = 0.35, 1.5  # of it, times this power of the share of open points
+SOLVER_FRICTION, SPOTS_POWER = 1.1, 0.25  # times the complementarity, over this power of the number of spots
+SOLVER_AREA, SOLVER_AREA_POWER = 0.1, 0.7  # times this power of it
+PENETRATING = 0.8  # of the points that penetrate without pressure are missing in the contact, but for those in excess
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 CORRECTED_ORDER = 1.0  # of the corrected area
@@ -54,7 +46,6 @@ EDGES, STRAIGHT_EDGES = 0.25, 2.0  # of the correction of the area; along edges 
 ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
 AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
 LEAST_WAY = 1e-60  # m: smaller weights are those of rest
-ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
 
 
 @dataclass(frozen=True)
@@ -90,58 +81,16 @@ class ErrorBudget:
     area: Parts
 
 
-@dataclass(frozen=True)
-class Known:
-    """What is known of a run before it begins.
-
-    `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
-    column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator.
-    """
-
-    cells_per_wave: float | None
-    straight: bool
-    folded: float
-    exponential: bool
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What a step has shown: the certificate's complementarity; by how much the embedded pair differs, with its order
-    in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
-    shares."""
-
-    complementarity: float
-    difference: float
-    order: float
-    slope: float
-    friction: float
-    area: float
-    corrected: float
-
-
 def estimate(known: Known, seen: Seen, points: int) -> ErrorBudget:
     """The budget of a step on a grid of so many points."""
     noise = seen.slope * max(seen.complementarity, ROUNDING)
-    return ErrorBudget(_friction(known, seen, points) if seen.friction > noise else None, _area(known, seen))
+    return ErrorBudget(_friction(known, seen, points) if seen.friction > noise else None, _area(known, seen, points))
 
 
 def _friction(known: Known, seen: Seen, points: int) -> Parts:
-    more = math.sqrt(max(1.0, seen.slope / seen.friction))
+    more = math.sqrt(max(1.0, seen.slope / seen.friction)) / count_spots(known, seen, points) ** SPOTS_POWER
     solver = SOLVER_FRICTION * seen.complementarity * more
-    return Parts(solver, time_error(known, seen), known.folded, _mesh(known, seen, points))
-
-
-def time_error(known: Known, seen: Seen) -> float:
-    """What the length of a step adds to the error of friction, or would where something slides.
-
-    In contacts the error of the exponential integrator goes with the power TIME_ORDER of the step, the difference of
-    the pair with `order`.
-    """
-    if not known.exponential:
-        return EULER_FRICTION * seen.difference**0.5
-    power = max(LEAST_POWER, TIME_ORDER / max(seen.order, 1.0) - 1.0)
-    fixed = 1.0 - FIXED_EDGES * seen.area**2
-    return fixed * EXPONENTIAL_FRICTION * seen.difference * (seen.difference / EQUAL_DIFFERENCE) ** power
+    return Parts(solver, time_error(known, seen, points), known.folded, _mesh(known, seen, points))
 
 
 def _mesh(known: Known, seen: Seen, points: int) -> float:
@@ -149,13 +98,6 @@ def _mesh(known: Known, seen: Seen, points: int) -> float:
         return WAVES_FRICTION * (4.0 / known.cells_per_wave) ** WAVES_ORDER
     radius = spot_radius(seen, points)
     return min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
-
-
-def spot_radius(seen: Seen, points: int) -> float:
-    """Of round spots of contact, or of the gaps between them where these are the smaller, in cells; infinite where
-    there are no edges."""
-    sides = (seen.area - seen.corrected) * points / SIDE
-    return ROUND * min(seen.area, 1.0 - seen.area) * points / sides if sides > 0.0 else math.inf
 
 
 def compared_with_half_mesh(
@@ -173,19 +115,13 @@ def compared_with_half_mesh(
     return ErrorBudget(found and replace(found, mesh=friction), replace(budget.area, mesh=area))
 
 
-def _area(known: Known, seen: Seen) -> Parts:
+def _area(known: Known, seen: Seen, points: int) -> Parts:
     open_share = 1.0 - seen.area
-    solver = SOLVER_AREA * seen.complementarity**SOLVER_AREA_POWER
+    solver = SOLVER_AREA * seen.complementarity**SOLVER_AREA_POWER + PENETRATING * seen.penetrating
     edges = STRAIGHT_EDGES if known.straight else EDGES
-    mesh = edges * (seen.area - seen.corrected) / seen.corrected if seen.corrected > 0.0 else 0.0
-    return Parts(solver, _share_of_area(known, open_share) * time_error(known, seen), known.folded * open_share, mesh)
-
-
-def _share_of_area(known: Known, open_share: float) -> float:
-    """What the error of area by the time steps is of that of friction."""
-    if known.exponential:
-        return EXPONENTIAL_AREA * min(1.0, open_share / NEARLY_CLOSED)
-    return EULER_AREA * open_share**EULER_OPEN_POWER
+    mesh = edges * seen.correction
+    time = share_of_area(known, seen) * time_error(known, seen, points)
+    return Parts(solver, time, known.folded * open_share, mesh)
 
 
 class Summary:

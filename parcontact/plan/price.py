@@ -5,7 +5,7 @@ time steps TIME_SHARE, the solver the rest. The mesh has the cells per shortest 
 (`job.advice.cells_per_wave`); where no wave is given the part that the mesh makes, which the trial saw, goes with the
 power of the cell that the budget knows (`physics.budget`). Heights from a file stay on their mesh. The part that time
 steps make, seen too, goes with the power 1.7 of the step for the exponential integrator, with the first for backward
-Euler; where a slide has cells per step they are one, a half, a quarter, ... as it needs. A step has as many operator
+Euler; where a slide has cells per step they are one, a half, a third, ... as it needs. A step has as many operator
 calls as seen, times what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in proportion
 to N log N.
 """
@@ -21,7 +21,8 @@ from ..job import GeometricStep, HeightFile, Job, Rough, Stage
 from ..job.advice import STEPS_PER_WAVE, cells_per_wave
 from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.table import plain
-from ..physics.budget import SPOTS_ORDER, TIME_ORDER
+from ..physics.budget import SPOTS_ORDER
+from ..physics.time_error import TIME_ORDER
 from .report import MARK, Costs, duration_text, ranks_text, unit_of
 from .sample import Sample, StageCost
 from .scaling import Scaling
@@ -180,7 +181,7 @@ def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple
     if not stage.speed or stage.chooses or isinstance(stage.time_step, GeometricStep):
         return math.ceil(stage.seconds / longest * (1.0 - SAME)), 1.0
     way, cell = stage.seconds * stage.speed, max(job.grid.dx, job.grid.dy)
-    cells = min(1.0, 2.0 ** math.floor(math.log2(longest * stage.speed / cell) + SAME))
+    cells = 1.0 / math.ceil(max(1.0, cell / (longest * stage.speed)) * (1.0 - SAME))
     whole = way >= count * max(own.grid.dx, own.grid.dy) * (1.0 - SAME)
     return math.ceil(way / (cells * cell) * (1.0 - SAME)), BETWEEN_CELLS if cells < 1.0 and whole else 1.0
 

@@ -11,6 +11,7 @@ class Certificate:
     complementarity: `sum(p |g|) / sum(p)`, the gap where there is pressure, weighted by it, over the `length`;
     penetration: `max(-g, 0)` over all points, over the `length`;
     load: `|mean(p)/P0 - 1|` (0 with a given approach);
+    members: points with pressure or penetration, as a share of all;
     length: by how much the displacement u varies within the contact, its standard deviation there, weighted by the
     pressure,
 
@@ -31,6 +32,7 @@ class Certificate:
     penetration: float
     load: float
     length: float = math.nan
+    members: float = 0.0
 
     @property
     def worst(self) -> float:

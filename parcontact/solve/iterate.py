@@ -53,7 +53,8 @@ def certify(
     length = iterate.length(height)
     complementarity = wrong / (iterate.load or 1.0) / length
     load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
-    return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length)
+    share = members / slab.points
+    return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length, share)
 
 
 def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:

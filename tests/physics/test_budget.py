@@ -3,13 +3,22 @@
 import math
 from dataclasses import astuple, replace
 
+import numpy as np
 import pytest
 
-from parcontact.physics.budget import Known, Seen, Summary, estimate, spot_radius
+from parcontact.physics.budget import Summary, estimate
 from parcontact.physics.measures import SIDE
+from parcontact.physics.prony import Prony
+from parcontact.physics.seen import Known, Seen, count_spots, spot_radius
+from parcontact.physics.time_error import time_error
 
 KNOWN = Known(8.0, False, 1e-4, True)
 SEEN = Seen(1e-3, 4e-4, 2.0, 0.02, 0.02, 0.1, 0.095)
+
+
+def spots(seen: Seen, points: int) -> float:
+    """As many as there are, of the radius of a spot, in the contact."""
+    return max(1.0, seen.area * points / (math.pi * min(spot_radius(seen, points), 4.0) ** 2))
 
 
 def test_parts_add_up() -> None:
@@ -17,29 +26,36 @@ def test_parts_add_up() -> None:
     budget = estimate(KNOWN, SEEN, 10_000)
     assert budget.friction is not None
     assert astuple(budget.friction) == pytest.approx(
-        (0.5e-3, 1.7 * 4e-4 * (4e-4 / 7.2e-3) ** 0.25 * (1 - 0.9 * 0.1**2), 1e-4, 0.05 * 2**-2.5)
+        (
+            1.1e-3 / spots(SEEN, 10_000) ** 0.25,
+            1.7 * 4e-4 * (4e-4 / 7.2e-3) ** 0.25 * (1 - 0.9 * 0.1**2),
+            1e-4,
+            0.05 * 2**-2.5,
+        )
     )
-    solver, time = 0.4 * 1e-3**0.7, 0.1 * budget.friction.time
+    solver, time = 0.1 * 1e-3**0.7, 0.15 * 0.9 ** (1 / 3) * budget.friction.time
     assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, 0.25 / 19))
     assert budget.area.total == pytest.approx(solver + time + 0.9e-4 + 0.25 / 19)
 
 
 @pytest.mark.parametrize("exponential", [True, False])
 def test_area_has_no_error_of_time_in_full_contact(exponential: bool) -> None:
-    """And less than in proportion to what is open, for backward Euler, near it; friction has one."""
+    """And less where less is open; friction has one."""
     known, seen = replace(KNOWN, exponential=exponential), replace(SEEN, area=1.0, corrected=1.0)
-    full, nearly, open_ = (estimate(known, replace(seen, area=area), 10_000) for area in (1.0, 0.9, 0.2))
+    full, nearly, open_ = (
+        estimate(known, replace(seen, area=area, corrected=area), 10_000) for area in (1.0, 0.9, 0.2)
+    )
     assert full.area.time == 0.0
     assert full.friction is not None
     assert full.friction.time > 0.0
-    assert 0.0 < nearly.area.time < open_.area.time / 2
+    assert 0.0 < nearly.area.time < open_.area.time
 
 
 def test_backward_euler_is_of_the_first_order() -> None:
     budget = estimate(Known(8.0, False, 0.0, False), SEEN, 10_000)
     assert budget.friction is not None
-    assert budget.friction.time == pytest.approx(0.8 * 0.02)
-    assert budget.area.time == pytest.approx(0.8 * 0.02 * 0.35 * 0.9**1.5)
+    assert budget.friction.time == pytest.approx(0.9 * 0.02)
+    assert budget.area.time == pytest.approx(0.9 * 0.02 * (0.15 * 0.9**0.8 + 0.005 / 0.095))
 
 
 def test_little_friction_counts_more() -> None:
@@ -48,7 +64,7 @@ def test_little_friction_counts_more() -> None:
     other = estimate(KNOWN, Seen(1e-3, 4e-4, 2.0, 0.08, 0.02, 0.1, 0.095), 10_000).friction
     assert one is not None
     assert other is not None
-    assert other.solver == 2 * one.solver
+    assert other.solver == pytest.approx(2 * one.solver)
     assert (other.time, other.folded, other.mesh) == (one.time, one.folded, one.mesh)
     assert estimate(KNOWN, Seen(1e-3, 4e-4, 2.0, 0.08, 0.0, 0.1, 0.095), 10_000).friction is None
 
@@ -63,6 +79,40 @@ def test_radius_of_a_spot() -> None:
     assert spot_radius(Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
 
 
+def test_points_that_penetrate_are_missing_in_the_area() -> None:
+    """Eight of ten of them, of the points in contact; friction does not change."""
+    one, other = (estimate(KNOWN, replace(SEEN, penetrating=share), 10_000) for share in (0.0, 0.02))
+    assert other.area.solver - one.area.solver == pytest.approx(0.016)
+    assert other.friction == one.friction
+
+
+def test_spots_are_counted() -> None:
+    """Four circles of ten cells; one strip of forty; in full contact those of half the shortest wave."""
+    points, cells, sides = 10_000, 400 * math.pi, 4 * 80
+    four = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
+    strip = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 40 / 100, (40 - SIDE * 2) / 100)
+    full = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0)
+    bare = Known(None, False, 0.0, True)
+    assert count_spots(bare, four, points) == pytest.approx(4.0)
+    assert count_spots(replace(bare, straight=True), strip, 100) == pytest.approx(1.0)
+    assert count_spots(KNOWN, full, points) == pytest.approx(points / (16 * math.pi))
+    assert count_spots(bare, full, points) == 1.0
+
+
+def test_spots_that_pass_within_a_step() -> None:
+    """Of the module of `time_error`: a circle of ten cells passes by one; a branch that is as fast as the step, one far
+    slower, one far faster. Where the pair shows more, half of that counts, all of it where nothing slides."""
+    points, cells, dt = 10_000, 100 * math.pi, 1e-3
+    seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * 80) / points, 1.0, dt)
+    edges = 1.0 - seen.area**2
+    for tau, relaxed in ((dt, 0.5), (1e6 * dt, 0.0), (1e-6 * dt, 1.0)):
+        known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([tau])))
+        assert time_error(known, seen, points) == pytest.approx(0.36 * edges * 0.1 * (relaxed + 0.05), rel=1e-4)
+    jump = replace(seen, difference=1.0)
+    still = time_error(known, replace(jump, slid=0.0), points)
+    assert time_error(known, jump, points) == pytest.approx(0.5 * (1.0 + seen.area**2) * still)
+
+
 def test_summary() -> None:
     """Without a slide means over time, of friction in proportion to it; in sentences."""
     summary = Summary()
@@ -71,11 +121,12 @@ def test_summary() -> None:
     summary.add(estimate(KNOWN, Seen(5e-3, 0.0, 2.0, 0.02, 0.0, 0.1, 0.1), 10_000), 0.0, 1.0)
     assert summary.friction is not None
     assert summary.area is not None
-    assert summary.friction.solver == pytest.approx((0.06 * 0.5e-3 + 0.02 * 1.5e-3) / 0.08)
-    assert summary.area.solver == pytest.approx(0.4 * (3 * 1e-3**0.7 + 2 * 3e-3**0.7 + 1 * 5e-3**0.7) / 6)
+    one = 1.1e-3 / spots(SEEN, 10_000) ** 0.25
+    assert summary.friction.solver == pytest.approx((0.06 * one + 0.02 * 3 * one) / 0.08)
+    assert summary.area.solver == pytest.approx(0.1 * (3 * 1e-3**0.7 + 2 * 3e-3**0.7 + 1 * 5e-3**0.7) / 6)
     friction, area = summary.lines(0.012)
     assert friction.startswith("friction is wrong by about ")
-    assert "solver 0.075 %" in friction
+    assert "solver 0.078 %" in friction
     assert "try" not in friction
     assert area.startswith("contact area, corrected, is wrong by about ")
     assert area.endswith(", more than numerics.accuracy = 0.012: try a finer grid")
@@ -106,7 +157,7 @@ def test_friction_that_is_noise_has_no_budget(friction: float, known: bool) -> N
     assert (budget.friction is not None) == known
     assert budget.area.total > 0.0
     if budget.friction:
-        assert budget.friction.solver <= 0.5 * 1e-3**0.5
+        assert budget.friction.solver <= 1e-3**0.5
 
 
 def test_summary_goes_on() -> None:
@@ -130,6 +181,6 @@ def test_steps_that_last_no_time_count_where_none_does() -> None:
         summary.add(estimate(KNOWN, Seen(complementarity, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0)
     assert summary.friction is None
     assert summary.area is not None
-    assert summary.area.solver == pytest.approx(0.4 * (1e-3**0.7 + 2e-3**0.7 + 6e-3**0.7) / 3)
+    assert summary.area.solver == pytest.approx(0.1 * (1e-3**0.7 + 2e-3**0.7 + 6e-3**0.7) / 3)
     summary.add(estimate(KNOWN, Seen(8e-3, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9)
-    assert summary.area.solver == pytest.approx(0.4 * 8e-3**0.7)
+    assert summary.area.solver == pytest.approx(0.1 * 8e-3**0.7)
