@@ -35,6 +35,7 @@ MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 WAYS = ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
 MAX_DIRECTIONS = 10  # of the linear steps on a set
+KAPPA = 0.1  # times the stiffness of a point
 MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which sets have stalled
 
 
@@ -64,8 +65,8 @@ class SteadySolver:
     """Loop on one grid, and the maps that it works in: seven, a byte per point, and those of `Surround`; where the
     active set goes on, one more and two for each linear step on a set beyond the third.
 
-    Parameters: `operator` A and `preconditioner` K near its inverse; `stiffness`, the pressure on a point over the
-    displacement it causes there; `height` of the surface; `tolerance` on the certificate;
+    Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
+    certificate;
     `max_steps` of the linear solves in all; `directions` kept in each.
     """
 
@@ -74,7 +75,6 @@ class SteadySolver:
         slab: Slab,
         operator: Operator,
         preconditioner: Operator,
-        stiffness: float,
         height: float,
         tolerance: float,
         max_steps: int,
@@ -82,7 +82,6 @@ class SteadySolver:
         dtype: type[np.floating] = np.float64,
     ) -> None:
         self.slab, self.operator = slab, operator
-        self.kappa = 0.1 * stiffness
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self._projected = Projected(slab, operator, preconditioner, dtype)
         self._linear = Directions(slab, operator, preconditioner, directions, dtype, self._projected.lend())
@@ -139,6 +138,7 @@ class SteadySolver:
         well. Sets may stall still, and then the other way often leads on.
         """
         u, slab, working, linear = self._u, self.slab, self._working, self._linear
+        kappa = KAPPA * self._stiffness()
         guess, best, since, sets, steps = np.inf, np.inf, 0, 0, 0
         (rounds, reduction), *others = WAYS
         while True:
@@ -152,7 +152,7 @@ class SteadySolver:
                 if made < limit:
                     break
             sets += 1
-            guess = self._next_set(x, h)
+            guess = self._next_set(x, h, kappa)
             if guess <= self.tolerance:
                 self._admit(x, mean)
                 d, certificate = self._certify(x, h, mean)
@@ -170,6 +170,17 @@ class SteadySolver:
                 failure = self._failure(certificate, since, steps)
                 return SteadyContact(x, u, d, certificate, projections, sets, steps, failure)
 
+    def _stiffness(self) -> float:
+        """Pressure on one point over the displacement it causes there; collective."""
+        impulse, answer = self._projected.lend()[0]
+        impulse.fill(0.0)
+        owner = self.slab.rows.start == 0 < self.slab.rows.stop
+        if owner:
+            impulse[0, 0] = 1.0
+        self.operator.apply(impulse, answer)
+        displacement = self.slab.sum(float(answer[0, 0]) if owner else 0.0)[0]
+        return 1.0 / displacement if displacement else 0.0  # one point, whose mean displacement is not counted
+
     def _failure(self, certificate: Certificate, since: int, steps: int) -> str:
         if certificate.worst <= self.tolerance:
             return ""
@@ -178,10 +189,10 @@ class SteadySolver:
         )
         return f"{reason}: certificate {certificate.worst:.3g}"
 
-    def _next_set(self, x: Array, h: Array) -> float:
+    def _next_set(self, x: Array, h: Array, kappa: float) -> float:
         """Mark the next set; returns how far from a solution x seems to be."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
-        *sums, deepest = _choose(x, self._u, h, gaps / count, self.kappa, self._working)
+        *sums, deepest = _choose(x, self._u, h, gaps / count, kappa, self._working)
         positive, negative, wrong, members, deepest = self.slab.reduce(sums, [deepest])
         if members == 0.0 or positive <= 0.0:
             return np.inf

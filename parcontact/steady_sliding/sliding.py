@@ -194,7 +194,6 @@ class SteadySliding:
             level.slab,
             operator,
             preconditioner,
-            _stiffness(level.slab, operator, base.dtype),
             base.height / base.units.height,
             numerics.tolerance if finest else max(numerics.tolerance, COARSE_TOLERANCE),
             20 * numerics.max_iterations,
@@ -223,14 +222,3 @@ def branch_maps(base: Frame, contact: SteadyContact, velocity: Vector, out: Arra
         for rows in deal(fft.my, PARTS):
             np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
         yield fft.backward(fft.spectrum, out)
-
-
-def _stiffness(slab: Slab, operator: Convolution, dtype: type[np.floating]) -> float:
-    """Pressure on one point over the displacement it causes there; collective."""
-    impulse, answer = slab.zeros(dtype), slab.empty(dtype)
-    owner = slab.rows.start == 0 < slab.rows.stop
-    if owner:
-        impulse[0, 0] = 1.0
-    operator.apply(impulse, answer)
-    displacement = slab.sum(float(answer[0, 0]) if owner else 0.0)[0]
-    return 1.0 / displacement if displacement else 0.0  # one point, whose mean displacement is not counted

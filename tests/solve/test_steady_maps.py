@@ -28,7 +28,7 @@ def test_maps_are_made_when_they_are_needed(comm: MPI.Intracomm, monkeypatch: py
     slab = Slab(comm, NX, NY)
     operator = HalfSpace(SIZE).operator(FFT(slab))
     before = slab.tally["map bytes"]
-    solver = SteadySolver(slab, operator, Identity(), 1.0, 1.0, 1e-8, 1000)
+    solver = SteadySolver(slab, operator, Identity(), 1.0, 1e-8, 1000)
     few, most = (SteadySolver.footprint(NX, NY, 8, comm.size, comm.rank, sets) for sets in (False, True))
 
     def held() -> int:
