@@ -21,8 +21,13 @@ from .surround import Surround
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
-GRIDS, FLOOR = 5, 0.5  # of `Surround`: four grids and 1.0 take a fifth more calls; where waves along the slide are far
-# stiffer than those across, all grids or a floor much smaller make sets of points come and go
+ON_A_PLANE, ON_A_LINE = (5, 0.5), (4, 1.0)  # grids and floor of `Surround`: the latter take a fifth more calls on a
+# plane; on a line larger cells or a smaller floor make sets of points come and go where a body is far stiffer at once
+
+
+def surround_on(nx: int, ny: int) -> tuple[int, float]:
+    """The grids and the floor of `Surround` on so many points."""
+    return ON_A_LINE if 1 in (nx, ny) else ON_A_PLANE
 
 
 class Projected:
@@ -31,7 +36,8 @@ class Projected:
     def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, dtype: type) -> None:
         self.slab, self.operator = slab, operator
         self.t, self.w = ([slab.empty(dtype) for _ in range(DIRECTIONS)] for _ in range(2))
-        self.surround = Surround(slab, preconditioner, FLOOR, GRIDS)
+        grids, floor = surround_on(slab.nx, slab.ny)
+        self.surround = Surround(slab, preconditioner, floor, grids)
         self.local_load = LocalLoad(slab)
 
     def lend(self) -> list[tuple[Array, Array]]:

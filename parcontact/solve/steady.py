@@ -28,7 +28,7 @@ from .certificate import Certificate
 from .gcr import Directions, gaps_on
 from .iterate import certify, weigh
 from .operator import Operator
-from .projected import DIRECTIONS, GRIDS, Projected
+from .projected import DIRECTIONS, Projected, surround_on
 from .surround import Surround
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
@@ -94,7 +94,7 @@ class SteadySolver:
         """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
         rows = deal(ny, ranks)[rank]
         maps = 1 + 2 * DIRECTIONS + sets * (1 + 2 * (MAX_DIRECTIONS - DIRECTIONS))
-        surround = Surround.footprint(nx, ny, ranks, rank, GRIDS)
+        surround = Surround.footprint(nx, ny, ranks, rank, surround_on(nx, ny)[0])
         return (maps * itemsize + 1) * (rows.stop - rows.start) * nx + surround
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
