@@ -1,17 +1,18 @@
 """Time steps that follow the error of a step.
 
-The embedded pair estimates the error E of a step of length dt from that step alone. It is to be `allowed` E0, a share
-of `numerics.accuracy`. As E goes with dt^p (p = 1.7 for the exponential integrator, 1 for backward Euler), the next is
+The error E of a step of length dt is estimated from that step alone (`physics.time_error`). It is to be `allowed` E0, a
+share of `numerics.accuracy`. As E goes with dt^p (p = 1.7 for the exponential integrator, 1 for backward Euler), the
+next is
 
     dt <- dt clip(SAFETY (E0/E)^(1/p), MOST_SHRINK, MOST_GROWTH),
 
 and a step with E > REJECTED E0 is made anew from the same state, shorter; the one after it does not grow (E. Hairer,
-S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993), II.4). Steps are a shortest one times powers
-of two, at rest of its fourth root, so that rounding has no part in their length.
+S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993), II.4). At rest steps are a shortest one
+times powers of the fourth root of two, so that rounding has no part in their length.
 
 While the surface slides, steps end at multiples of their length, counted in cells from where the surface was at first
 (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump,
-halves, quarters, ... lead back to whole cells, by which heights are moved without a transform.
+parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a transform.
 """
 
 import math

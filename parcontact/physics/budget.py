@@ -6,9 +6,9 @@ finer steps, meshes and tolerances. `scripts/error_budget.py 64 8` makes nine sc
 54 others by which nothing was found, with other surfaces, speeds, steps and meshes (`64 8 7 3`, `64 8 8 0.1 0.5`,
 `128 8 9 2`). Estimates are so many times the true errors:
 
-    of friction, by the solver 0.5 to 3.4 (0.2 to 5), by time steps 0.6 to 2.1 (0.4 to 4.3; `exponential` 0.5 to 4.3);
-    of area, by the solver 0.4 to 1.7 (0.7 to 2.3; more below 0.002 %, 0.04 where 18 points touch), by time steps, as it
-    changes its sign, 0.25 to 6 (0.2 to 7).
+    of friction, by the solver 1.0 to 3.3 (0.3 to 4.2), by time steps 0.6 to 1.8 (0.4 to 3.6);
+    of area, by the solver 0.9 to 2 (0.5 to 2.3; more below 0.003 %), by time steps, as it changes its sign, 0.25 to 6
+    (0.2 to 6).
 
 solver: from the `complementarity` C of the certificate (see `solve.contact.Certificate`). Friction is wrong in
     proportion to it, less where many spots of contact average it out, by the root of the root of their number. Area is

@@ -104,13 +104,13 @@ def test_spots_that_pass_within_a_step() -> None:
     slower, one far faster. Where the pair shows more, half of that counts, all of it where nothing slides."""
     points, cells, dt = 10_000, 100 * math.pi, 1e-3
     seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * 80) / points, 1.0, dt)
-    edges = 1.0 - seen.area**2
+    edges = 1.0 - seen.area**4
     for tau, relaxed in ((dt, 0.5), (1e6 * dt, 0.0), (1e-6 * dt, 1.0)):
         known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([tau])))
         assert time_error(known, seen, points) == pytest.approx(0.36 * edges * 0.1 * (relaxed + 0.05), rel=1e-4)
     jump = replace(seen, difference=1.0)
     still = time_error(known, replace(jump, slid=0.0), points)
-    assert time_error(known, jump, points) == pytest.approx(0.5 * (1.0 + seen.area**2) * still)
+    assert time_error(known, jump, points) == pytest.approx((0.5 * edges + seen.area**4) * still)
 
 
 def test_summary() -> None:
