@@ -21,6 +21,7 @@ from ..solve.certificate import Certificate
 from ..solve.steady import SteadyContact, SteadySolver
 
 COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
+LOOSE, SHARE = 1e-3, 0.6  # so much of a tolerance above LOOSE leaves the contact area as right as in a march
 NEAR = 1.1  # a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 
@@ -189,13 +190,14 @@ class SteadySliding:
     def _solver(self, level: Level, velocity: Vector) -> SteadySolver:
         base, numerics = self.base, self.base.job.numerics
         finest = level is self.levels[0]
+        tolerance = max(SHARE * numerics.tolerance, min(LOOSE, numerics.tolerance))
         operator, preconditioner = self.operators(level, velocity, base.prony)
         return SteadySolver(
             level.slab,
             operator,
             preconditioner,
             base.height / base.units.height,
-            numerics.tolerance if finest else max(numerics.tolerance, COARSE_TOLERANCE),
+            tolerance if finest else max(tolerance, COARSE_TOLERANCE),
             20 * numerics.max_iterations,
             dtype=base.dtype,
         )
