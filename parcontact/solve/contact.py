@@ -20,7 +20,7 @@ iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C
 The exact step would be `<r, t>/<t, A t>`, for one more application of the operator in each iteration. It is 0.95 within
 0.03 at 0.4 to 60 % of contact, where K E is nearly the inverse, and 1 in full contact. Afterwards `A p` is known anyway
 and `<t, A t>` with it: where the exact step is seen to be far from that, or steps do not help, the rest of the solve
-makes exact ones.
+makes exact ones. On lines of points, and with cells much longer than wide, all are exact.
 
 With d given there is neither centring nor scaling. With P0 given, d is the mean of `A p - h` weighted by p, so that
 `<p, g> = 0`: scaling p then does not change f to first order, and cutting t off at p = 0, which a small step does only
@@ -45,7 +45,7 @@ from .surround import Surround
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
 STEP = 0.95  # beside edges of contact, and 1 far from them
-UNLIKE = 1.4  # times a step: an exact one that is longer, or shorter by as much, is far from it
+UNLIKE = 1.25  # times a step: an exact one that is longer, or shorter by as much, is far from it
 PATIENCE = 5  # iterations without a better certificate until steps are exact
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
@@ -114,6 +114,7 @@ class ContactSolver:
         self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
         self._working = slab.zeros(np.bool_)
         self._surround = Surround(slab, preconditioner, most=grids)
+        self._rough_inverse = grids == 0 or min(slab.nx, slab.ny) == 1  # K E is no more than roughly the inverse
         self._local_load = LocalLoad(slab)
 
     @staticmethod
@@ -137,7 +138,7 @@ class ContactSolver:
         p, other = start, self._other
         iterate = self._begin(p, h, control)
         best, slope, iteration = (np.inf, 0), 0.0, 0
-        exact = length != 1.0
+        exact = self._rough_inverse or length != 1.0
         while True:
             members, excess, certificate = self._certify(p, h, iterate, mean)
             best = min(best, (certificate.worst, iteration))
