@@ -21,22 +21,24 @@ from .surround import Surround
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
-ON_A_PLANE, ON_A_LINE = (5, 0.5), (4, 1.0)  # grids and floor of `Surround`: the latter take a fifth more calls on a
-# plane; on a line larger cells or a smaller floor make sets of points come and go where a body is far stiffer at once
+WIDE, NARROW = (5, 0.5), (4, 1.0)  # grids and floor of `Surround`: the latter take a fifth more calls, but where a body
+# is far stiffer at once, as on a line of points, larger cells or a smaller floor may make sets of points come and go
 
 
-def surround_on(nx: int, ny: int) -> tuple[int, float]:
+def surround_on(nx: int, ny: int, narrow: bool = False) -> tuple[int, float]:
     """The grids and the floor of `Surround` on so many points."""
-    return ON_A_LINE if 1 in (nx, ny) else ON_A_PLANE
+    return NARROW if narrow or 1 in (nx, ny) else WIDE
 
 
 class Projected:
     """Holds DIRECTIONS maps t and as many of their images w, and those of `Surround`."""
 
-    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, dtype: type) -> None:
+    def __init__(
+        self, slab: Slab, operator: Operator, preconditioner: Operator, dtype: type, narrow: bool = False
+    ) -> None:
         self.slab, self.operator = slab, operator
         self.t, self.w = ([slab.empty(dtype) for _ in range(DIRECTIONS)] for _ in range(2))
-        grids, floor = surround_on(slab.nx, slab.ny)
+        grids, floor = surround_on(slab.nx, slab.ny, narrow)
         self.surround = Surround(slab, preconditioner, floor, grids)
         self.local_load = LocalLoad(slab)
 

@@ -67,7 +67,8 @@ class SteadySolver:
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate;
-    `max_steps` of the linear solves in all; `directions` kept in each.
+    `max_steps` of the linear solves in all; `directions` kept in each; whether residuals are carried on in a `narrow`
+    neighbourhood of the set only.
     """
 
     def __init__(
@@ -80,10 +81,11 @@ class SteadySolver:
         max_steps: int,
         directions: int = MAX_DIRECTIONS,
         dtype: type[np.floating] = np.float64,
+        narrow: bool = False,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
-        self._projected = Projected(slab, operator, preconditioner, dtype)
+        self._projected = Projected(slab, operator, preconditioner, dtype, narrow)
         self._linear = Directions(slab, operator, preconditioner, directions, dtype, self._projected.lend())
         self._u = slab.zeros(dtype)
         self._length = height  # of the last certificate

@@ -93,15 +93,15 @@ class SteadySliding:
         mean = pressure / self.base.units.pressure
         speed, calls = math.hypot(*velocity), 0.0
         reduced = self._slow * speed
-        for start in self._starts(reduced, pressure):
-            contact, more = self._descend(velocity, mean, start)
+        for start, narrow in self._starts(reduced, pressure):
+            contact, more = self._descend(velocity, mean, start, narrow)
             calls += more
             if contact.converged:
                 break
         else:
             raise RunError(
                 f"steady sliding at {speed:g} m/s under {pressure:g} Pa: {contact.failure}. Try a "
-                "velocity nearer to one that works, a finer grid, or a larger numerics.tolerance."
+                "velocity nearer to one that works, a finer grid, or another numerics.tolerance."
             )
         self._remember(contact, reduced, pressure)
         heights = self.levels[0].heights
@@ -152,31 +152,33 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(self, speed: float, pressure: float) -> Iterator[Array | None]:
-        """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure.
+    def _starts(self, speed: float, pressure: float) -> Iterator[tuple[Array | None, bool]]:
+        """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
+        each, whether the solver is to be the `narrow` one, the last resort.
 
         The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
         appear and vanish.
         """
         if self.contact is None:
-            yield None
+            yield None, False
         elif pressure == self._pressure and max(speed, self._speed) <= NEAR * min(speed, self._speed):
-            yield from (self.contact.p, None)
+            yield from ((self.contact.p, False), (None, False))
         else:
-            yield from (None, self.contact.p)
+            yield from ((None, False), (self.contact.p, False))
+        yield None, True
 
     def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
         self.contact, self._speed, self._pressure = contact, speed, pressure
 
-    def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float]:
+    def _descend(self, velocity: Vector, mean: float, start: Array | None, narrow: bool) -> tuple[SteadyContact, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took."""
         tally, calls = self.base.slab.tally, 0.0
 
         def solve(level: Level, p: Array) -> SteadyContact:
             nonlocal calls
             before = tally["operator"]
-            contact = self._solver(level, velocity).solve(level.heights, mean, p)
+            contact = self._solver(level, velocity, narrow).solve(level.heights, mean, p)
             calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
             return contact
 
@@ -187,7 +189,7 @@ class SteadySliding:
             p[...] = start
         return solve(self.levels[0], p), calls
 
-    def _solver(self, level: Level, velocity: Vector) -> SteadySolver:
+    def _solver(self, level: Level, velocity: Vector, narrow: bool) -> SteadySolver:
         base, numerics = self.base, self.base.job.numerics
         finest = level is self.levels[0]
         tolerance = max(SHARE * numerics.tolerance, min(LOOSE, numerics.tolerance))
@@ -200,6 +202,7 @@ class SteadySliding:
             tolerance if finest else max(tolerance, COARSE_TOLERANCE),
             20 * numerics.max_iterations,
             dtype=base.dtype,
+            narrow=narrow,
         )
 
     def operators(self, level: Level, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
