@@ -10,7 +10,7 @@ Identity = tuple[int, ...]
 
 @dataclass(frozen=True)
 class StopFile:
-    """One for all programs that work on the same sweep, and so removed by none of them before it ends.
+    """One for all programs that work on the same sweep, and so removed by none of them.
 
     It asks those that run when it is made or touched. One that was there `before` a program began asks nothing of it:
     it is what others have left.

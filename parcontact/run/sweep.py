@@ -54,8 +54,7 @@ def run(
     A case that fails does not stop the others: the code is 1 in the end. One that another program runs is passed over,
     like those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint
     stops the sweep, with its code, and the cases beside it: the same command goes on with them. So do the file `stop`,
-    and the end of the wall time. Who does all cases removes the file in the end; who does some leaves it to the
-    programs that do the others.
+    and the end of the wall time. The file stays: other programs may not have seen it yet, and it stops no later one.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
     code = _go(cases, dealt(chosen, groups), groups, act, stop, manner, doubts)
@@ -65,8 +64,6 @@ def run(
     if groups.root:
         for text in doubts.summary([kinds for _, kinds in found]):
             warn(text)
-        if AGAIN in codes and len(chosen) == len(cases):
-            stopfile.remove(stop.path)  # one that stays stops no later program
         if AGAIN not in codes and not manner.quiet:
             _say(f"results of all cases: {_directory(cases) / sweep_table.TABLE}")
     return AGAIN if AGAIN in codes else max(codes)
