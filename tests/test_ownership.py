@@ -245,7 +245,7 @@ def test_loser_of_a_race_writes_nothing(main: Main, tmp_path: Path, monkeypatch:
 
 
 def test_directory_taken_and_given_back_meanwhile(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The other run may even have ended by then."""
+    """The other run may even have ended by then; that of another job is no reason to go on with it."""
     main("job.yaml", "--out", "first")
     make = Directory.make
 
@@ -255,10 +255,15 @@ def test_directory_taken_and_given_back_meanwhile(main: Main, tmp_path: Path, mo
         make(self, *arguments)
 
     monkeypatch.setattr(Directory, "make", late)
-    code, said = main("job.yaml", "--out", "out")
-    assert code == BAD_INPUT
-    assert "out has been taken by another run meanwhile" in said
-    assert contents(tmp_path / "out") == contents(tmp_path / "first")
+    for changes, advice in (
+        ((), "run again to go on with it"),
+        (("--set", "material.modulus_inf=2e6"), "give --restart never to start afresh"),
+    ):
+        code, said = main("job.yaml", "--out", "out", *changes)
+        assert code == BAD_INPUT
+        assert f"out has been taken by another run meanwhile; {advice}" in said
+        assert contents(tmp_path / "out") == contents(tmp_path / "first")
+        shutil.rmtree(tmp_path / "out")
 
 
 # -- planted links ----------------------------------------------------------------------------------------------------

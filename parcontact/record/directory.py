@@ -16,11 +16,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, InUseError
+from ..errors import InputError, InUseError, TakenError
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from . import checkpoint, files, hdf5, marker, stopfile
-from .marker import SCENE, VERBS, Claim
+from .marker import SCENE, SECTIONS, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
 RESULTS = {
@@ -96,7 +96,8 @@ class Directory:
         self._on_root(look)
 
     def make(self, job: Path, resolved: str, claim: Claim) -> None:
-        """Make the directory with the job in it; collective. Raises InputError where it cannot be written."""
+        """Make the directory with the job in it; collective. Raises InputError where it cannot be written, TakenError
+        where another run of the same job has been in it meanwhile."""
 
         def act() -> str:
             seen = self.claims
@@ -105,7 +106,10 @@ class Directory:
                 if problem := self._lock_if_there():
                     return problem
                 if self.claims != seen or (self._foreign(job) and not self.claims):
-                    return f"the output directory {self.path} has been taken by another run meanwhile; {ADVICE}"
+                    taken = f"the output directory {self.path} has been taken by another run meanwhile"
+                    if self.claims and self._are_of(claim):
+                        raise TakenError(f"{taken}; run again to go on with it")
+                    return f"{taken}; {ADVICE}"
             self._put_aside_what_is_not_ours(job)
             self.claims = {**self.claims, self.verb: claim}
             marker.write(self.path, self.claims)
@@ -185,6 +189,13 @@ class Directory:
             path.name
             for path in self.path.iterdir()
             if not path.name.startswith(".") and path.name not in BESIDE and not _same(path, job)
+        )
+
+    def _are_of(self, claim: Claim) -> bool:
+        """Whether all claims here are of the job of this one."""
+        return not any(
+            list(marker.differences(found.job, claim.job, SECTIONS if verb == self.verb else SCENE))
+            for verb, found in self.claims.items()
         )
 
     def _proven(self) -> bool:

@@ -7,10 +7,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError, InUseError, RunError
+from ..errors import InputError, InUseError, RunError, TakenError
 from ..job import Case, Job
 from ..job.reading import CASES
 from ..parallel.groups import Groups
+from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..record import marker, stopfile, sweep_table
@@ -20,8 +21,15 @@ from . import watch
 from .journey import AGAIN, DONE
 from .sweep_warnings import SweepWarnings, warn
 
-FAILED, ELSEWHERE = 1, -1  # the latter is no exit code: of a case that another program runs
-ENDS = {DONE: "done", AGAIN: "stopped early", FAILED: "failed", ELSEWHERE: "passed over"}
+FAILED = 1
+ELSEWHERE, DONE_ELSEWHERE = -1, -2  # no exit codes: of a case that another program runs, or has finished meanwhile
+ENDS = {
+    DONE: "done",
+    AGAIN: "stopped early",
+    FAILED: "failed",
+    ELSEWHERE: "passed over",
+    DONE_ELSEWHERE: "done by another program",
+}
 
 Shows = Callable[[str], bool]
 Act = Callable[[Job, Slab, Shows], int]
@@ -51,10 +59,11 @@ def run(
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
     and what says whether a warning is shown.
 
-    A case that fails does not stop the others: the code is 1 in the end. One that another program runs is passed over,
-    like those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint
-    stops the sweep, with its code, and the cases beside it: the same command goes on with them. So do the file `stop`,
-    and the end of the wall time. The file stays: other programs may not have seen it yet, and it stops no later one.
+    A case that fails does not stop the others: the code is 1 in the end. One that another program runs, or has run
+    while this one made ready for it, is passed over, like those that have finished; if it is the only one, and not
+    done, InUseError is raised. One that stops early with a checkpoint stops the sweep, with its code, and the cases
+    beside it: the same command goes on with them. So do the file `stop`, and the end of the wall time. The file stays:
+    other programs may not have seen it yet, and it stops no later one.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
     code = _go(cases, dealt(chosen, groups), groups, act, stop, manner, doubts)
@@ -113,13 +122,10 @@ def _go(
         try:
             ended = _attempt(case, slab, lambda job, slab: act(job, slab, doubts.shows), manner.runs)
         except InUseError as error:
-            if groups.count == len(own) == 1:
-                raise
-            ended = ELSEWHERE
-            _complain(slab, f"case {case.number} is being run by another program: {error}")
+            ended = _elsewhere(case, slab, error, alone=groups.count == len(own) == 1)
         if slab.root:
             sweep_table.write(directory, cases)
-        if speaks and groups.count > 1:
+        if speaks and (groups.count > 1 or ended == DONE_ELSEWHERE):
             _say(f"case {case.number}: {ENDS[ended]}")
         if ended == AGAIN:
             if slab.root and groups.count > 1 and not stop.asks:
@@ -168,7 +174,7 @@ def _directory(cases: Sequence[Case]) -> Path:
 
 
 def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool) -> int:
-    """The code with which a case ends; raises InUseError if another program runs it."""
+    """The code with which a case ends; raises InUseError if another program runs it, or has done so meanwhile."""
     reason = ""
     try:
         code = act(case.job, slab)
@@ -181,6 +187,18 @@ def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool
     if reason:
         _complain(slab, f"case {case.number}: {reason}")
     return code
+
+
+def _elsewhere(case: Case, slab: Slab, error: InUseError, alone: bool) -> int:
+    """What is to be said of a case that another program runs, or has run meanwhile; collective. Raises the error if it
+    is not done, and is `alone`."""
+    taken = isinstance(error, TakenError)
+    if taken and on_root(slab.comm, lambda: sweep_table.state(case) == "done"):
+        return DONE_ELSEWHERE
+    if alone:
+        raise error
+    _complain(slab, f"case {case.number} {'has been' if taken else 'is being'} run by another program: {error}")
+    return ELSEWHERE
 
 
 def _complain(slab: Slab, text: str) -> None:
