@@ -184,7 +184,8 @@ def _install_aspher(python: Path) -> None:
         _call(python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS)
         zipfile.ZipFile(next(Path(where).glob("*.whl"))).extractall(where)
         include = Path(where, "cmeel.prefix", "include", "eigen3")
-        _call(python, "-m", "pip", "install", "-q", "aspher", more={"CPATH": str(include)})
+        found = {"CPATH": str(include), "CMAKE_ARGS": f"-DFETCHCONTENT_SOURCE_DIR_EIGEN3_SRC={include}"}
+        _call(python, "-m", "pip", "install", "-q", "aspher", more=found)
 
 
 def _call(*words: object, more: Mapping[str, str] | None = None) -> None:
