@@ -1,6 +1,9 @@
 """Steady sliding against tables of other methods, closed forms, and its own residual recomputed."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +14,11 @@ from parcontact import job as jobs
 from parcontact import scene
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
-from parcontact.parallel.slab import Slab
+from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve import local_load, steady
+from parcontact.solve.steady import SteadyContact, SteadySolver
+from parcontact.steady_sliding import sliding as steady_sliding
 from parcontact.steady_sliding.sliding import Point, SteadySliding, branch_maps
 from parcontact.theory import cylinder_sliding, full_contact
 
@@ -154,6 +159,44 @@ def test_starts(shared_path: Path, comm: MPI.Intracomm) -> None:
     ]
     assert calls[1] < 0.8 * fresh[0]
     assert calls[2:] == pytest.approx(fresh[1:], abs=1)  # not three, a step on the finest grid
+
+
+WAVY = (
+    "surface: {shape: rough, hurst: 0.8, long_wavelength: 5.0e-4, short_wavelength: 1.25e-4, rms_slope: 0.05}\n"
+    "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-3}]}\n"
+    "history: [{pressure: 1.0}]\n"
+)
+
+
+@pytest.mark.parametrize("speed", [0.03, 0.1, 0.3, 1.0])
+def test_loose_tolerances_are_met_with_a_margin(shared_path: Path, comm: MPI.Intracomm, speed: float) -> None:
+    """The certificate is below 0.6 of the default tolerance, 5e-3, by which it would end between the two here."""
+    states = sliding(shared_path, "grid: {points: 64, size: 1.0e-3}\n" + WAVY, comm)
+    assert states.solve((speed, 0.0), 1e5).certificate.worst <= 0.6 * 5e-3
+
+
+@pytest.mark.parametrize(("points", "helps"), [("64", True), ("[64, 1]", False)])
+def test_a_narrow_neighbourhood_is_the_last_resort(
+    shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, points: str, helps: bool
+) -> None:
+    """On a line of points it is not tried twice."""
+    tried: list[bool] = []
+
+    class Solver(SteadySolver):
+        def __init__(self, *given: Any, **more: Any) -> None:
+            super().__init__(*given, **more)
+            self.narrow = bool(more["narrow"])
+            tried.append(self.narrow)
+
+        def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
+            found = super().solve(h, mean, start)
+            return found if self.narrow else replace(found, failure="as it is told to")
+
+    monkeypatch.setattr(steady_sliding, "SteadySolver", Solver)
+    states = sliding(shared_path, f"grid: {{points: {points}, size: 1.0e-3}}\n" + WAVY, comm)
+    with nullcontext() if helps else pytest.raises(RunError, match="as it is told to"):
+        states.solve((0.1, 0.0), 1e5)
+    assert any(tried) == helps
 
 
 def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:

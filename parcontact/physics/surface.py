@@ -28,9 +28,8 @@ class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
     `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`) if there are
-    no others, or None; `periodic` wraps the shapes around the
-    box; `scale` turns m into the unit of heights; with `differences` slopes are central differences over a cell;
-    `datum` [m] is the height from which heights are counted.
+    no others, or None; `periodic` wraps the shapes around the box; `scale` turns m into the unit of heights; with
+    `differences` slopes are central differences over a cell; `datum` [m] is the height from which heights are counted.
     """
 
     slab: Slab

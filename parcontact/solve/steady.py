@@ -66,9 +66,8 @@ class SteadySolver:
     active set goes on, one more and two for each linear step on a set beyond the third.
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
-    certificate;
-    `max_steps` of the linear solves in all; `directions` kept in each; whether residuals are carried on in a `narrow`
-    neighbourhood of the set only.
+    certificate; `max_steps` of the linear solves in all; `directions` kept in each; whether residuals are carried on in
+    a `narrow` neighbourhood of the set only, as they always are on a line of points.
     """
 
     def __init__(

@@ -154,7 +154,7 @@ class SteadySliding:
 
     def _starts(self, speed: float, pressure: float) -> Iterator[tuple[Array | None, bool]]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
-        each, whether the solver is to be the `narrow` one, the last resort.
+        each, whether the solver is to be the `narrow` one: the last resort, but on a line of points it always is.
 
         The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
@@ -166,7 +166,8 @@ class SteadySliding:
             yield from ((self.contact.p, False), (None, False))
         else:
             yield from ((None, False), (self.contact.p, False))
-        yield None, True
+        if 1 not in self.base.job.grid.points:
+            yield None, True
 
     def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
         self.contact, self._speed, self._pressure = contact, speed, pressure
