@@ -14,6 +14,7 @@ import pytest
 from _pytest.config import create_terminal_writer
 from marching import load_script
 from mpi4py import MPI
+from restarting import Bench
 
 from parcontact import __main__
 
@@ -47,6 +48,12 @@ def communicators() -> list[MPI.Comm]:
 def shared_path(tmp_path: Path) -> Path:
     """A temporary directory that is the same on all ranks."""
     return WORLD.bcast(tmp_path)
+
+
+@pytest.fixture
+def bench(comm: MPI.Intracomm, shared_path: Path) -> Bench:
+    """Runs on all ranks."""
+    return Bench(comm, shared_path)
 
 
 Main = Callable[..., tuple[int, str, str]]

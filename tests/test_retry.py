@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from marching import begun, marched
-from mpi4py import MPI
 from numpy.typing import NDArray
-from test_restart import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
+from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.errors import RunError
 from parcontact.march.failure import StepError
@@ -22,11 +21,6 @@ from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
 
 GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
-
-
-@pytest.fixture
-def bench(comm: MPI.Intracomm, shared_path: Path) -> Bench:
-    return Bench(comm, shared_path)
 
 
 # -- tried again ------------------------------------------------------------------------------------------------------

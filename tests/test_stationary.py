@@ -2,15 +2,13 @@
 
 import re
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from marching import begun, column, marched
-from mpi4py import MPI
-from test_restart import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
+from restarting import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
 
 from parcontact.march import rest
 from parcontact.march.loop import run
@@ -169,11 +167,6 @@ def test_energies_are_those_of_all_steps() -> None:
 
 
 # -- runs -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def bench(comm: MPI.Intracomm, shared_path: Path) -> Bench:
-    return Bench(comm, shared_path)
 
 
 def dwelling(bench: Bench, **changes: Any) -> dict[str, Any]:
