@@ -24,6 +24,7 @@ ROOT = Path(__file__).parents[1]
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
 SURFACE = ("tests/physics/test_surface.py", "tests/physics/test_surface_forces.py")
+CONTACT = tuple(f"tests/solve/test_contact{part}.py" for part in ("", "_symmetries", "_cost", "_failures"))
 PARTS = {  # files of the program, and the tests that answer for them
     "physics/body.py": ("tests/physics/test_material.py", "tests/test_viscoelastic.py"),
     "physics/energy.py": ("tests/physics/test_energy.py",),
@@ -36,8 +37,8 @@ PARTS = {  # files of the program, and the tests that answer for them
     "physics/roughness.py": ("tests/physics/test_roughness.py",),
     "parallel/fft.py": ("tests/parallel/test_fft.py",),
     "parallel/slab.py": ("tests/parallel/test_slab.py",),
-    "solve/contact.py": ("tests/solve/test_contact.py", "tests/stability/test_descent.py"),
-    "solve/kernels.py": ("tests/solve/test_kernels.py", "tests/solve/test_contact.py"),
+    "solve/contact.py": (*CONTACT, "tests/stability/test_descent.py"),
+    "solve/kernels.py": ("tests/solve/test_kernels.py", *CONTACT),
     "solve/steady.py": ("tests/test_steady_states.py",),
     "solve/projected.py": ("tests/solve/test_projected.py", "tests/test_steady_states.py"),
     "solve/local_load.py": ("tests/solve/test_local_load.py",),

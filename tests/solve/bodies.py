@@ -12,9 +12,13 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
 from parcontact.solve.certificate import Certificate
-from parcontact.solve.contact import Contact, ContactSolver
+from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
 
 Map = NDArray[np.float64]
+TIGHT = 1e-11  # a certificate to this makes pressures agree to 1e-9 of the highest
+ROUNDING = 1e-13
+MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
+BODIES = [("periodic", "spectral"), ("periodic", "love"), ("free", "love")]
 
 
 def solver(
@@ -72,3 +76,8 @@ def keep(contact: Contact) -> Kept:
         contact.iterations,
         contact.failure,
     )
+
+
+def solve(h: Map, mean: float, **options: Any) -> Kept:
+    """The contact under a mean pressure, from nothing; the options are those of `solver`."""
+    return keep(solver(h, **options).solve(h, MeanPressure(mean), np.zeros_like(h)))

@@ -13,9 +13,7 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve import active_set
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
 
-from .bodies import keep, rough, solver, white
-
-TIGHT = 1e-11  # certificates to this make pressures agree to 1e-9 of the highest, as in test_contact
+from .bodies import TIGHT, keep, rough, solver, white
 
 
 @pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])

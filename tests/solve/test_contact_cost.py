@@ -1,0 +1,69 @@
+"""What a contact costs: starts, messages and operator calls of an iteration, single precision."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.solve.contact import MeanPressure
+from parcontact.solve.local_load import LocalLoad
+
+from .bodies import Map, keep, rough, solve, solver
+
+
+def test_warm_start_from_the_solution() -> None:
+    """Nothing is left to do but to see that it is one."""
+    h = rough(64)
+    solving = solver(h)
+    p = np.zeros_like(h)
+    first = keep(solving.solve(h, MeanPressure(0.4), p))
+    operators = solving.slab.tally["operator"]
+    again = keep(solving.solve(h, MeanPressure(0.4), p))
+    assert again.iterations == 0
+    assert solving.slab.tally["operator"] == operators + 1
+    assert_allclose(again.p, first.p, rtol=1e-14)
+
+
+def test_cost_of_an_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At most three operators and five messages, however many numbers they carry; one message more where so much is
+    cut off that it is taken back near by, which is so in the first iterations only."""
+    h, taken = rough(64), list[float]()
+    solving = solver(h)
+    before, cut_off = solving.slab.tally.copy(), LocalLoad.cut_off
+
+    def note(local: LocalLoad, p: Map, load: float) -> float:
+        taken.append(load)
+        return cut_off(local, p, load)
+
+    monkeypatch.setattr(LocalLoad, "cut_off", note)
+    found = solving.solve(h, MeanPressure(0.4), np.zeros_like(h))
+    spent = solving.slab.tally.since(before)
+    assert spent["operator"] <= 1 + 3 * found.iterations
+    assert spent["allreduce"] <= 3 + 5 * found.iterations + len(taken)
+    assert 0 < len(taken) <= 6 < found.iterations
+    assert "map bytes" not in spent
+
+
+def test_single_precision() -> None:
+    """To the default tolerance; the pressures then agree to some ten times it."""
+    h = rough(128)
+    double = solve(h, 0.4, tolerance=1e-4)
+    single = solve(h.astype(np.float32), 0.4, tolerance=1e-4, dtype=np.float32)
+    assert abs(single.iterations - double.iterations) <= 2
+    assert_allclose(single.p, double.p, atol=1e-3 * double.p.max())
+    assert_allclose(single.p.mean(), 0.4, rtol=1e-6)
+
+
+def test_preconditioner_in_single_precision() -> None:
+    """It need not be exact: as many iterations, the same pressures in double precision."""
+    h = rough(128)
+    double = solve(h, 0.4, tolerance=1e-9)
+    solving = solver(h, tolerance=1e-9)
+    narrow = FFT(Slab(MPI.COMM_SELF, 128, 128), dtype=np.float32)
+    solving.preconditioner = HalfSpace((1.0, 1.0)).inverse(narrow)
+    mixed = keep(solving.solve(h, MeanPressure(0.4), np.zeros_like(h)))
+    assert abs(mixed.iterations - double.iterations) <= 2
+    assert_allclose(mixed.p, double.p, atol=1e-7 * double.p.max())
