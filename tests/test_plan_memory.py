@@ -1,0 +1,63 @@
+"""The memory that a plan tells: to the byte what each rank holds and a checkpoint has."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from marching import marched
+from mpi4py import MPI
+from planned import JOBS, MACHINE, ROUGH, job
+
+from parcontact.parallel.slab import Slab
+from parcontact.plan import memory, report, trial
+from parcontact.plan.report import Costs
+from parcontact.plan.sample import sample
+from parcontact.plan.scaling import Scaling
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", JOBS)
+def test_memory(comm: MPI.Intracomm, name: str) -> None:
+    """What each rank holds after a run, and what a checkpoint has in maps, to the byte."""
+    planned = job(**JOBS[name])
+    march, _ = marched(planned, comm=comm)
+    slab = march.scene.slab
+    assert memory.total(planned, comm.size, comm.rank) == slab.tally["map bytes"]
+    maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
+    saved = sum(rows.nbytes + 4 * len(rows) for rows in maps)
+    assert sum(slab.from_all(saved)) == memory.saved(planned)
+
+
+def test_no_rank_has_more_than_is_planned() -> None:
+    """The last has the most but for the few waves of the surface, which another one may have."""
+    for name, ranks in [("free", 7), ("mixed", 3), ("viscoelastic", 100)]:
+        planned = job(**JOBS[name])
+        most = max(memory.total(planned, ranks, rank) for rank in range(ranks))
+        waves = sum(held.bytes for held in memory.holdings(planned, ranks) if held.what == "surface spectrum")
+        assert most <= memory.total(planned, ranks) <= most + waves
+
+
+def test_the_most_that_is_held() -> None:
+    """The first solve of 256 x 256 points is found on nested grids, whose maps are gone afterwards."""
+    planned = job(grid={"points": 256}, surface={**ROUGH, "short_wavelength": 6.25e-5})
+    seen = sample(planned, Slab(MPI.COMM_SELF, 256, 256), 1e6)
+    march, _ = marched(planned)
+    tally = march.scene.slab.tally
+    assert tally["map bytes at most"] > 1.1 * tally["map bytes"]
+    assert Costs(Scaling.of(planned, [seen], MACHINE), 1e9).held(1) == tally["map bytes at most"]
+    assert Costs(Scaling.of(planned, [replace(seen, held=0)], MACHINE), 1e9).held(1) == tally["map bytes"]
+
+
+def test_too_large_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is no memory for any grid, nothing is tried."""
+    monkeypatch.setattr(trial, "free_bytes", lambda: 1000)
+    assert trial.grid_for(job(), 1, 10.0) is None
+
+
+@pytest.mark.parametrize(("points", "unit"), [(64, "MB"), (2**15, "GB")])
+def test_units_of_memory(points: int, unit: str) -> None:
+    """A number that a reader can take in: never one of seven digits."""
+    head, *rows, _ = report.maps(job(grid={"points": points}), [1, 64])
+    assert head.startswith(f"memory per rank [{unit}]")
+    assert all(0.0 <= float(number) < 1e6 for row in rows for number in row.split()[-2:])
+    assert all("e+" not in row for row in rows)
