@@ -237,12 +237,9 @@ class ContactSolver:
         `_w`; returns the new iterate and how much of its load was cut off at 0, infinity where the step was halved."""
         step = usual if usual is not None else self._exact(slope)
         for halvings in range(MAX_HALVINGS + 1):
-            load, cut = self.slab.sum(*kernels.advance(old_p, self._t, step, p))
+            load, cut = self._local_load.advance(old_p, self._t, step, p)
             if mean is not None and cut:
-                if cut > LEAST * load and halvings == 0:
-                    kernels.move(old_p, self._t, step, p)
-                    load = self._local_load.cut_off(p, load)
-                kernels.scale(p, mean * self.slab.points / load)
+                self._local_load.restore(p, load, mean * self.slab.points, cut > LEAST * load and halvings == 0)
             self._u, self._w = self.operator.apply(p, self._w), self._u
             new = weigh(self.slab, p, self._u, h, old.d)
             if new.f - old.f <= self._rounding * new.energy or halvings == MAX_HALVINGS:

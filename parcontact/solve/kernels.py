@@ -121,33 +121,17 @@ def total(a):
 
 
 @loop
-def advance(p_old, t, step, p):
-    """`p = max(p_old - step t, 0)`; returns the sum of p and how much of it was added by cutting off at 0."""
-    load, cut = 0.0, 0.0
-    for j in range(p.shape[0]):
-        row_load, row_cut = 0.0, 0.0
-        for i in range(p.shape[1]):
-            value = p_old[j, i] - step * t[j, i]
-            kept = 0.0 if value < 0.0 else value
-            p[j, i] = kept
-            row_load += kept
-            row_cut += kept - value
-        load += row_load
-        cut += row_cut
-    return load, cut
-
-
-@loop
-def move(p_old, t, step, p):
-    """`p = p_old - step t`, which may be negative."""
-    for j in range(p.shape[0]):
-        for i in range(p.shape[1]):
-            p[j, i] = p_old[j, i] - step * t[j, i]
-
-
 def clip(p):
-    """`p <- max(p, 0)`; returns the sum of p and how much of it was added by cutting off at 0."""
-    return advance(p, p, 0.0, p)
+    """`p <- max(p, 0)`; returns the sum of p."""
+    load = 0.0
+    for j in range(p.shape[0]):
+        row = 0.0
+        for i in range(p.shape[1]):
+            kept = 0.0 if p[j, i] < 0.0 else p[j, i]
+            p[j, i] = kept
+            row += kept
+        load += row
+    return load
 
 
 @loop

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
-from . import kernels
 from .gcr import centre, gaps_on, residual, sum_on
-from .local_load import LocalLoad
+from .local_load import LEAST, LocalLoad
 from .operator import Operator
 from .surround import Surround
 
@@ -65,8 +64,8 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
-        now = self.local_load.cut_off(x) if self.near_by else self.slab.sum(*kernels.clip(x))[0]
-        kernels.scale(x, load / now)
+        now, cut = self.local_load.advance(x, x, 0.0, x)
+        self.local_load.restore(x, now, load, self.near_by and cut > LEAST * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 

@@ -201,7 +201,7 @@ class SteadySolver:
 
     def _admit(self, x: Array, mean: float) -> None:
         """Make x admissible: not negative, under the load; and u its image."""
-        load = self.slab.sum(*kernels.clip(x))[0]
+        load = self.slab.sum(kernels.clip(x))[0]
         kernels.scale(x, mean * self.slab.points / load)
         self.operator.apply(x, self._u)
 

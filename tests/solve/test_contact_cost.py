@@ -32,13 +32,13 @@ def test_cost_of_an_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
     cut off that it is taken back near by, which is so in the first iterations only."""
     h, taken = rough(64), list[float]()
     solving = solver(h)
-    before, cut_off = solving.slab.tally.copy(), LocalLoad.cut_off
+    before, restore = solving.slab.tally.copy(), LocalLoad.restore
 
-    def note(local: LocalLoad, p: Map, load: float) -> float:
-        taken.append(load)
-        return cut_off(local, p, load)
+    def note(local: LocalLoad, p: Map, load: float, total: float, near_by: bool) -> None:
+        taken.extend([load] * near_by)
+        restore(local, p, load, total, near_by)
 
-    monkeypatch.setattr(LocalLoad, "cut_off", note)
+    monkeypatch.setattr(LocalLoad, "restore", note)
     found = solving.solve(h, MeanPressure(0.4), np.zeros_like(h))
     spent = solving.slab.tally.since(before)
     assert spent["operator"] <= 1 + 3 * found.iterations

@@ -97,28 +97,12 @@ def test_dot_and_total(shape: tuple[int, int], dtype: type[np.floating]) -> None
 
 
 @SHAPES
-def test_advance(shape: tuple[int, int], dtype: type[np.floating]) -> None:
-    maps = Maps(shape, dtype)
-    free = maps.wide("p") - 0.3 * maps.wide("t")
-    load, cut = kernels.advance(maps.p, maps.t, 0.3, maps.r)
-    assert np.allclose(maps.r, np.maximum(free, 0.0), rtol=0.0, atol=8 * ROUNDING[dtype])
-    assert maps.r.min(initial=0.0) >= 0.0
-    assert maps.close(load, np.maximum(free, 0.0))
-    assert maps.close(cut, np.maximum(-free, 0.0))
-    assert kernels.advance(maps.p, maps.t, 0.0, maps.r)[1] == 0.0
-    assert np.array_equal(maps.r, maps.p)
-    kernels.move(maps.p, maps.t, 0.3, maps.r)
-    assert np.allclose(maps.r, free, rtol=0.0, atol=8 * ROUNDING[dtype])
-
-
-@SHAPES
 def test_clip(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
     before, expected = maps.wide("z").copy(), np.maximum(maps.z, 0.0)
-    load, cut = kernels.clip(maps.z)
+    load = kernels.clip(maps.z)
     assert np.array_equal(maps.z, expected)
     assert maps.close(load, np.maximum(before, 0.0))
-    assert maps.close(cut, np.maximum(-before, 0.0))
 
 
 @SHAPES
@@ -134,7 +118,7 @@ def test_sums_are_double_whatever_the_maps_are(dtype: type[np.floating]) -> None
     p = np.full((1000, 1000), 0.1, dtype=dtype)
     zero = np.zeros_like(p)
     exact = 1e6 * float(p[0, 0])
-    for found in (kernels.total(p), kernels.weigh(p, zero, zero, 0.0)[0], kernels.advance(p, zero, 0.0, p)[0]):
+    for found in (kernels.total(p), kernels.weigh(p, zero, zero, 0.0)[0], kernels.clip(p)):
         assert abs(found / exact - 1.0) < 1e-14
 
 
@@ -147,8 +131,6 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
         assert np.isnan(kernels.weigh(maps.p, maps.u, maps.h, 0.0)[2])
     maps = Maps((5, 32), dtype)
     maps.t[2, 3] = np.nan
-    load, cut = kernels.advance(maps.p, maps.t, 0.1, maps.r)
-    assert np.isnan(load)
-    assert np.isnan(cut)
-    assert np.isnan(maps.r[2, 3])
+    assert np.isnan(kernels.clip(maps.t))
+    assert np.isnan(maps.t[2, 3])
     assert np.isnan(kernels.dot(maps.t, maps.t))

@@ -10,18 +10,23 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
-from parcontact.solve.local_load import CELL, LEAST, MOST, LocalLoad
+from parcontact.solve.local_load import CELL, MOST, LocalLoad
 
 Map = NDArray[np.float64]
-ROUNDING = 1e-13
+ROUNDING, TOTAL = 1e-13, 3.0
 ANY_RANKS = pytest.mark.parametrize("shape", [(1, 1), (7, 40), (33, 16), (50, 37), (64, 64)])
 
 
-def cut_off(values: Map) -> tuple[slice, Map, float]:
-    """The rows that this rank has, their pressure after the cut, and the sum that is returned."""
+def cut_off(values: Map, near_by: bool = True) -> tuple[slice, Map, float, float]:
+    """The rows that this rank has, their pressure after the cut, made to have the sum TOTAL, and the load and the cut
+    that are returned."""
     slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
-    p = values[slab.rows].copy()
-    return slab.rows, p, LocalLoad(slab).cut_off(p)
+    p, t = values[slab.rows] + 2.0, np.full(values[slab.rows].shape, 4.0)
+    local = LocalLoad(slab)
+    load, cut = local.advance(p, t, 0.5, p)
+    if load > 0.0:
+        local.restore(p, load, TOTAL, near_by)
+    return slab.rows, p, load, cut
 
 
 def expected(values: Map) -> Map:
@@ -44,23 +49,16 @@ def pressures(shape: tuple[int, int], sunk: float) -> Map:
 @pytest.mark.mpi
 @ANY_RANKS
 @pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
-def test_each_cell_gives_back_what_was_added_in_it(shape: tuple[int, int], sunk: float) -> None:
-    values = pressures(shape, sunk)
-    rows, p, load = cut_off(values)
-    assert_allclose(p, expected(values)[rows], rtol=ROUNDING)
-    assert_allclose(load, expected(values).sum(), rtol=ROUNDING)
-
-
-@pytest.mark.mpi
-@ANY_RANKS
-def test_little_is_not_taken_back(shape: tuple[int, int]) -> None:
-    """Nothing else than a cut where that adds a third of LEAST."""
-    values = pressures(shape, 0.0)
-    rest = values.sum() - values[0, 0]
-    values[0, 0] = -LEAST / 3 * rest
-    rows, p, load = cut_off(values)
-    assert np.array_equal(p, np.maximum(values, 0.0)[rows])
-    assert_allclose(load, rest, rtol=ROUNDING)
+@pytest.mark.parametrize("near_by", [True, False])
+def test_each_cell_gives_back_what_was_added_in_it(shape: tuple[int, int], sunk: float, near_by: bool) -> None:
+    values = pressures(shape, sunk) + 2.0 - 2.0  # with the rounding of what is advanced
+    rows, p, load, cut = cut_off(values, near_by)
+    whole = np.maximum(values, 0.0)
+    assert_allclose(load, whole.sum(), rtol=ROUNDING)
+    assert_allclose(cut, (whole - values).sum(), rtol=ROUNDING, atol=ROUNDING)
+    if load > 0.0:
+        kept = expected(values) if near_by else whole
+        assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=ROUNDING)
 
 
 def test_nothing_and_not_a_number() -> None:
@@ -68,4 +66,7 @@ def test_nothing_and_not_a_number() -> None:
     assert cut_off(np.full((20, 20), -1.0))[2] == 0.0
     values = pressures((20, 20), 0.4)
     values[3, 3] = np.nan
-    assert np.isnan(cut_off(values)[2])
+    _, p, load, cut = cut_off(values)
+    assert np.isnan(load)
+    assert np.isnan(cut)
+    assert np.isnan(p[3, 3])
