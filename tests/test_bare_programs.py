@@ -1,0 +1,89 @@
+"""A job without effects counts what a program counts that never had them, and no more."""
+
+from collections import Counter
+
+import pytest
+from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
+from mpi4py import MPI
+
+from parcontact import scene
+from parcontact.job import Job
+from parcontact.parallel.slab import Slab
+from parcontact.physics import loops
+from parcontact.physics.body import ElasticBody, ZenerBody
+from parcontact.physics.embedded import Embedded
+from parcontact.physics.ledger import Ledger
+from parcontact.physics.motion import WholeCells
+from parcontact.solve.contact import ContactSolver, MeanPressure
+
+
+def bare(planned: Job) -> Counter[str]:
+    """A surface that stands on an elastic body: a solver, and measures. Nothing lasts, moves or remembers."""
+    slab = Slab(MPI.COMM_SELF, NX, NY)
+    base = scene.frame(planned, slab)
+    heights = base.surface.heights((0.0, 0.0), slab.empty())
+    solver = bare_solver(base)
+    last, p = slab.zeros(), slab.zeros()
+    ledger = Ledger(slab, base.surface, base.units)
+    for stage in planned.history:
+        load = MeanPressure(stage.load.end / (base.prony.modulus_inf * base.units.pressure))
+        p[...] = last
+        contact = solver.solve(heights, load, p)
+        last, p = p, last
+        ledger.measures(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, (0.0, 0.0))
+    return slab.tally.copy()
+
+
+def lasting(planned: Job) -> Counter[str]:
+    """The same for a body with or without memory under stages that last; the surface stands or moves by whole cells."""
+    slab = Slab(MPI.COMM_SELF, NX, NY)
+    base = scene.frame(planned, slab)
+    path = WholeCells(base.surface)
+    memory = base.prony.moduli.size > 0
+    body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
+    solver = bare_solver(base)
+    ledger = Ledger(slab, base.surface, base.units)
+    earlier, last, p = (slab.zeros() for _ in range(3))
+    moduli, cells, dt = [0.0, 0.0], 0, -1.0
+    for step in planned.timeline():
+        heights = path.at(step.position)
+        trial = body.begin(step.dt, heights)
+        alpha = trial.alpha
+        now, before = (1.0 + step.growth) * moduli[1] / alpha, step.growth * moduli[0] / alpha
+        loops.travel(last, earlier, now, before, heights.offset - cells, p)
+        moduli, cells = [moduli[1], alpha], heights.offset
+        contact = solver.solve(trial.effective, MeanPressure(step.load / (alpha * base.units.pressure)), p)
+        found = ledger.measures(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
+        body.commit(trial, contact.u)
+        if isinstance(body, ZenerBody) and step.dt != dt:
+            # The error budget looks at what the other integrator would have done, once for some steps that are alike.
+            load, dt = found.pressure * slab.points / (alpha * base.units.pressure), step.dt
+            pair = Embedded(slab, body, base.job.grid.dx / base.units.length)
+            pair.look(step.dt, trial, contact.p, contact.u, load, found.contact_area)
+        earlier, last, p = last, p, earlier
+    return slab.tally.copy()
+
+
+def bare_solver(base: scene.Frame) -> ContactSolver:
+    operator, inverse = base.half_space.operator(base.fft), base.half_space.inverse(base.fft)
+    return ContactSolver(base.slab, operator, inverse, base.height / base.units.height, 1e-15, ITERATIONS)
+
+
+def test_elastic_static() -> None:
+    """No branch map, no shift, no earlier pressure, no padding, no energy: exactly the solver's operator calls."""
+    planned = job(history=[STAND, {"pressure": 4e3}])
+    counts = whole(planned)
+    assert counts == bare(planned)
+    assert counts["operator"] == 2 * (1 + 2 * ITERATIONS)
+    assert counts["shift"] == 0
+    assert not any(
+        effect.on for effect in scene.effects(planned) if effect.name not in ("surface spectrum", "checkpoints")
+    )
+
+
+@pytest.mark.parametrize("stage", [PRESS, SLIDE])
+@pytest.mark.parametrize("material", [ELASTIC, RUBBER])
+def test_lasting_stages(material: Json, stage: Json) -> None:
+    """Only what is on: memory, whole cells, an earlier pressure."""
+    planned = job(material=material, history=[stage])
+    assert whole(planned) == lasting(planned)

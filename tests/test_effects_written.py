@@ -1,0 +1,92 @@
+"""What a run writes where it is asked for, and that nothing is made for it elsewhere."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
+from mpi4py import MPI
+
+from parcontact.parallel.slab import Slab
+from parcontact.record import fields, measures
+from parcontact.run import journey, runner
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Callable[..., Path]:
+    """Run a job, into a directory of its own."""
+
+    def go(name: str, **changes: Any) -> Path:
+        output = {**changes.pop("output", {}), "directory": str(tmp_path / name)}
+        planned = job(history=[PRESS], output=output, **changes)
+        planned._path = tmp_path / "job.yaml"
+        planned.path.write_text(planned.resolved())
+        assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), runner.Options(quiet=True)) == journey.DONE
+        return tmp_path / name
+
+    return go
+
+
+def test_fields(run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Off: no file, no byte, no map made for it; on: at their instants only, every third step and the last."""
+    saved: list[int] = []
+    save = fields.FieldsFile.save
+
+    def noted(self: fields.FieldsFile, step: int, *args: Any) -> None:
+        saved.append(step)
+        save(self, step, *args)
+
+    monkeypatch.setattr(fields.FieldsFile, "save", noted)
+    off, on = run("off"), run("on", output={"fields": ["pressure"], "every": 3})
+    assert not list(off.glob("fields*"))
+    assert saved == [3, 5]
+    with_maps = {path.name for path in on.iterdir()} - {path.name for path in off.iterdir()}
+    assert with_maps == {"fields.h5", "fields.xdmf"}
+    assert not row(job(), "fields").on
+    assert row(job(output={"fields": ["gap"]}), "fields").on
+
+
+def test_checkpoints(run: Callable[..., Path]) -> None:
+    """The last step's always; others at their steps only."""
+    names = sorted(path.stem for path in (run("last") / "checkpoint").iterdir())
+    assert names == ["step-5"]
+    often = run("often", checkpoint={"every": 2, "keep": 9})
+    assert sorted(path.stem for path in (often / "checkpoint").iterdir()) == ["step-2", "step-4", "step-5"]
+
+
+def test_dissipation_per_branch(run: Callable[..., Path]) -> None:
+    """A column per branch where it is asked for and there are branches; energies alone have none, and no energies no
+    numbers."""
+    name = "dissipation per branch"
+    off: Json = {}
+    energies, on = {"energy": True}, {"energy": True, "branch_dissipation": True}
+    assert [row(job(material=RUBBER, output=out), name).on for out in (off, energies, on)] == [False, False, True]
+    assert not row(job(output=on), name).on
+    found = [
+        measures.read(run(str(n), material=RUBBER, output=out) / "measures.csv")
+        for n, out in enumerate((off, energies, on))
+    ]
+    assert ["dissipated_0" in columns for columns in found] == [False, False, True]
+    assert np.isnan(found[0]["work"]).all()
+    assert not np.isnan(found[1]["work"]).any()
+
+
+def test_run_on_half_the_mesh(run: Callable[..., Path]) -> None:
+    """Only where it is asked for, and then no map more in the run itself."""
+    name, found = "run on half the mesh", {}
+    for mesh_check in (False, True):
+        output = {"mesh_check": mesh_check}
+        assert row(job(output=output), name).on == mesh_check
+        out = run(str(mesh_check), output=output)
+        assert (out / "half_mesh").exists() == mesh_check
+        (found[mesh_check],) = re.findall(r"map bytes (\d+)", (out / "run.log").read_text())
+    assert found[True] == found[False]
+
+
+def test_counts_are_in_the_log(run: Callable[..., Path]) -> None:
+    log = (run("logged") / "run.log").read_text()
+    for name in ("allreduce", "fft", TRANSFORM, "map bytes", "operator"):
+        assert f" {name} " in log
