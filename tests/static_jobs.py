@@ -1,0 +1,30 @@
+"""Jobs of static solves: what each of their steps gave."""
+
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact import job, scene
+from parcontact.march.loop import run as run_march
+from parcontact.march.step import March
+from parcontact.parallel.slab import Slab
+from parcontact.record.row import Row
+
+Fields = dict[str, NDArray[Any]]
+
+
+def run(path: Path, *overrides: str) -> list[tuple[Row, Fields]]:
+    """What each step of a job gave: its row and fields. The steps of these jobs are static solves."""
+    loaded = job.load(path, overrides)
+    ready = March(scene.build(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points)))
+    steps = []
+
+    def note(state: March) -> None:
+        if state.row.step > 0:
+            fields = {name: state.field(name).copy() for name in ("pressure", "displacement", "gap")}
+            steps.append((state.row, fields))
+
+    run_march(ready, [note])
+    return steps

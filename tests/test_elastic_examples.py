@@ -1,0 +1,175 @@
+"""The elastic examples of jobs/ against closed forms.
+
+Tolerances are what the examples promise: Hertz's approach and peak pressure to 0.5 %, Westergaard's contact to one cell
+and pressures to 1 % of the highest, Johnson's mean gap to 1e-3 of the amplitude and peak pressure to 0.2 %. What is
+measured is given where it is far better.
+"""
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import JOBS, load_script, marched
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from static_jobs import run
+
+from parcontact.record.row import Row
+from parcontact.theory import hertz, jgh, westergaard
+
+SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
+WAVE = (5e-7, 2.5e-4, 1e6)  # amplitude [m], wavelength [m], shear modulus [Pa] of jobs/westergaard.yaml and waves.yaml
+X = WAVE[1] / 1024 * np.arange(1024.0)  # where the points of jobs/westergaard.yaml are [m]
+
+
+def test_hertz() -> None:
+    """Measured: approach 5e-6, peak pressure 8e-6; the displacement 1e-4 of the approach everywhere."""
+    [(row, fields)] = run(JOBS / "hertz.yaml")
+    assert_allclose(row.measures.approach, hertz.approach(*SPHERE), rtol=5e-3)
+    assert_allclose(row.measures.max_pressure, hertz.peak_pressure(*SPHERE), rtol=5e-3)
+    x = np.linspace(-0.75e-3, 0.75e-3, 256, endpoint=False)
+    r = np.hypot(x[None, :], x[:, None])
+    wrong = np.abs(fields["displacement"] - hertz.displacement(r, *SPHERE))
+    assert wrong.max() < 1e-3 * hertz.approach(*SPHERE)
+    wrong = np.abs(fields["pressure"] - hertz.pressure(r, *SPHERE))
+    assert wrong[r < 0.95 * hertz.contact_radius(*SPHERE)].max() < 1e-3 * hertz.peak_pressure(*SPHERE)
+    assert_allclose(row.measures.pressure * 1.5e-3**2, 0.15, rtol=1e-13)
+
+
+def test_hertz_converges() -> None:
+    """Orders over 64, 128, 256 points; measured: approach 1.8, peak 2.1, pressures 1.55, where the edge allows 1.5."""
+    script = load_script("convergence")
+    points = [64, 128, 256]
+    table = [script.errors(count) for count in points]
+    for name, least, wrong in zip(script.NAMES, (1.5, 1.8, 1.4), zip(*table, strict=True), strict=True):
+        observed = script.order(points, list(wrong))
+        print(f"{name}: errors {', '.join(f'{error:.2e}' for error in wrong)}, order {observed:.2f}")
+        assert observed > least
+
+
+def test_hertz_area_corrected() -> None:
+    """Counted areas are 1.4 % too large in the mean at 17 cells per radius; corrected by their edges 0.4 % too small.
+
+    Five loads, each with the sphere over a point and beside one; a circle of the right size that falls badly between
+    points stays wrong by 1 %, measured 0.9 %.
+    """
+    counted, corrected = [], []
+    cell = 1.5e-3 / 64
+    for force, beside in itertools.product((0.05, 0.07, 0.1, 0.15, 0.2), ([0.0, 0.0], [0.31, 0.17])):
+        centre = [0.75e-3 + share * cell for share in beside]
+        sphere = {"shape": "sphere", "radius": SPHERE[1], "center": centre}
+        _, rows = marched(
+            {
+                "grid": {"points": 64, "size": 1.5e-3, "boundary": "free"},
+                "surface": sphere,
+                "material": {"model": "elastic", "poisson": 0.5, "shear_modulus": SPHERE[2]},
+                "history": [{"force": force}],
+                "numerics": {"tolerance": 1e-6},
+            }
+        )
+        area = math.pi * float(hertz.contact_radius(force, *SPHERE[1:])) ** 2 / 1.5e-3**2
+        counted.append(rows[-1].measures.contact_area / area - 1)
+        corrected.append(rows[-1].measures.contact_area_corrected / area - 1)
+    print(f"counted {np.mean(counted):.4f}, corrected {np.mean(corrected):.4f}, at most {np.abs(corrected).max():.4f}")
+    assert 0.01 < np.mean(counted) < 0.018
+    assert -0.006 < np.mean(corrected) < 0.0
+    assert np.abs(corrected).max() < 0.01
+
+
+def test_johnson_area_corrected() -> None:
+    """The surface wavy in two directions, mean over 16 loads from 11 to 90 % of contact, of waves between the points.
+
+    The reference is the counted area at 128 and 256 cells per wave, extrapolated to the first order: in this mean it is
+    good to 1e-3. At 64 cells counted areas are then 1.3 % too large, corrected ones right to 2e-4.
+    """
+    full = float(jgh.full_contact_pressure(*WAVE))
+    areas = {}
+    for points in (64, 128, 256):
+        waves = [
+            {"shape": "wave", "amplitude": WAVE[0] / 2, "waves": [1, sign], "phase": phase}
+            for sign, phase in ((1, 0.48), (-1, 0.14))
+        ]
+        _, rows = marched(
+            {
+                "grid": {"points": points, "size": WAVE[1]},
+                "surface": waves,
+                "material": {"model": "elastic", "poisson": 0.5, "shear_modulus": WAVE[2]},
+                "history": [{"pressure": share * full} for share in np.linspace(0.05, 0.8, 16).tolist()],
+                "numerics": {"tolerance": 1e-6},
+            }
+        )
+        both = [(row.measures.contact_area, row.measures.contact_area_corrected) for row in rows[1:]]
+        areas[points] = np.array(both)
+    reference = 2 * areas[256][:, 0] - areas[128][:, 0]
+    counted, corrected = (areas[64] / reference[:, None] - 1).mean(axis=0)
+    print(f"counted {counted:.4f}, corrected {corrected:.4f}")
+    assert 0.01 < counted < 0.02
+    assert abs(corrected) < 2e-3
+
+
+def check_westergaard(row: Row, pressures: NDArray[Any], edge: float, wrong: float) -> None:
+    """Each of the two edges of the contact to `edge` cells, and the pressures to `wrong` of the highest."""
+    mean = row.measures.pressure
+    cells = X.size * (row.measures.contact_area - float(westergaard.contact_fraction(mean, *WAVE)))
+    assert abs(cells) <= 2 * edge
+    expected = westergaard.pressure(X, mean, *WAVE)
+    assert np.abs(pressures - expected).max() <= wrong * expected.max()
+    assert_allclose(row.measures.max_pressure, expected.max(), rtol=1e-3)
+    assert_allclose(row.measures.mean_gap, westergaard.mean_gap(mean, *WAVE), atol=1e-5 * WAVE[0])
+
+
+def test_westergaard() -> None:
+    """The contact to one cell. Measured: pressures 0.8 % of the highest, in the last cell of the contact."""
+    steps = run(JOBS / "westergaard.yaml")
+    assert len(steps) == 5
+    for row, fields in steps:
+        check_westergaard(row, fields["pressure"], 0.5, 0.01)
+        expected = westergaard.gap(X, row.measures.pressure, *WAVE)
+        assert np.abs(fields["gap"] - expected).max() <= 1e-4 * WAVE[0]
+    closed = westergaard.pressure(X, steps[-1][0].measures.pressure, *WAVE)
+    assert np.abs(steps[-1][1]["pressure"] - closed).max() <= 1e-9 * closed.max()
+
+
+def test_westergaard_at_all_loads() -> None:
+    """Each edge to one cell (measured 0.7). Where an edge falls just so, the pressure next to it misses 1.8 %."""
+    full = float(westergaard.full_contact_pressure(*WAVE))
+    history = ", ".join(f"{{pressure: {share * full / 50}}}" for share in range(1, 50))
+    for row, fields in run(JOBS / "westergaard.yaml", "grid.points=[1024, 1]", f"history=[{history}]"):
+        check_westergaard(row, fields["pressure"], 1.0, 0.02)
+
+
+def test_product_of_cosines() -> None:
+    """Against boundary elements good to 1e-4. Measured: mean gaps 5e-6, peak pressures 3e-5."""
+    full = float(jgh.full_contact_pressure(*WAVE))
+    references = {reference.load: reference for reference in jgh.REFERENCE}
+    for row, _ in run(JOBS / "waves.yaml"):
+        reference = references[round(row.measures.pressure / full, 4)]
+        assert_allclose(row.measures.mean_gap / WAVE[0], reference.mean_gap, atol=1e-3)
+        assert_allclose(row.measures.max_pressure / full, reference.peak_pressure, rtol=2e-3)
+
+
+@pytest.mark.parametrize("reference", jgh.REFERENCE, ids=lambda reference: str(reference.load))
+def test_product_of_cosines_at_all_loads(reference: jgh.Reference) -> None:
+    full = float(jgh.full_contact_pressure(*WAVE))
+    [(row, _)] = run(JOBS / "waves.yaml", f"history=[{{pressure: {reference.load * full}}}]")
+    assert_allclose(row.measures.mean_gap / WAVE[0], reference.mean_gap, atol=1e-3)
+    assert_allclose(row.measures.max_pressure / full, reference.peak_pressure, rtol=2e-3)
+    assert abs(row.measures.contact_area - reference.contact_fraction) < reference.contact_fraction_error + 0.002
+
+
+def test_rough() -> None:
+    """On a coarser grid. Contact grows with the load, and at the lightest is 2 to 2.5 times p/(E* slope).
+
+    The tolerance is 1e-4 of the surface's height.
+    """
+    steps = run(JOBS / "rough.yaml", "grid.points=256", "numerics.tolerance=1e-3")
+    areas = [row.measures.contact_area for row, _ in steps]
+    assert areas == sorted(areas)
+    assert 2.0 < areas[0] / (2e4 / (4e6 * 0.25)) < 2.6
+    assert areas[-1] < 2.0 * 2.5e5 / (4e6 * 0.25)
+    for row, fields in steps:
+        assert row.certificate.worst <= 1e-3
+        assert fields["pressure"].min() >= 0.0
+        assert_allclose(fields["gap"].mean(), row.measures.mean_gap, rtol=1e-9)
