@@ -1,10 +1,10 @@
-"""Jobs that are right: the contract's own example, short forms, defaults, round trips, warnings."""
+"""Jobs that are right: the contract's own example, short forms, defaults, round trips."""
 
 import math
 from pathlib import Path
 
 import pytest
-from job.texts import SMALL, job_of
+from job.texts import SMALL, job_of, replaced
 
 from parcontact.job import (
     Elastic,
@@ -56,12 +56,6 @@ output:
   every: 64                     # steps between saved fields
 checkpoint: {every: 200, keep: 2}           # steps; {minutes: 10} also
 """
-
-
-def replaced(text: str, **sections: str) -> str:
-    """SMALL with whole sections exchanged; sections are one line each."""
-    kept = [line for line in text.split("\n") if line.split(":")[0] not in sections]
-    return "\n".join([*(f"{name}: {value}" for name, value in sections.items()), *kept])
 
 
 def test_contract_loads(tmp_path: Path) -> None:
@@ -219,8 +213,6 @@ def test_overrides_of_every_kind(tmp_path: Path) -> None:
     assert (job.history[1].distance, job.history[1].seconds) == (None, 1.0)
 
 
-# --- the job as text --------------------------------------------------------------------------------------------------
-
 ROUND_TRIPS = {
     "small": SMALL,
     "contract": CONTRACT,
@@ -271,59 +263,6 @@ def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:
         "time_step (first 1e-07 s, growth 1.2)", "numerics.accept_unconverged no", "cell [9.76563e-07, 9.76563e-07] m",
     ):  # fmt: skip
         assert part in table
-
-
-# --- warnings ---------------------------------------------------------------------------------------------------------
-
-ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1}"
-SLIDING = "[{pressure: 1, velocity: 1, distance: 1e-4, cells_per_step: 2}]"
-
-
-def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
-    long, short = job_of(tmp_path, replaced(SMALL, surface=ROUGH)).warnings
-    assert "only 2 long waves fit into the box along x" in long
-    assert "a size of 0.002 m or a long_wavelength of 0.00025 m" in long
-    assert "only 4 cells per shortest wave along x" in short
-    assert (
-        "128 points (4 times the memory, some 8 times the time in sliding) or a short_wavelength of 0.000125 m" in short
-    )
-
-
-def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:
-    zener = "{model: zener, branches: [{modulus: 1e6, relaxation_time: 1e-3}, {modulus: 1e6, relaxation_time: 1}]}"
-    history = "[{pressure: 1, duration: 1, time_step: {first: 1e-5, growth: 1.25}}]"
-    text = replaced(SMALL.split("history")[0], material=zener, history=history)
-    (warning,) = job_of(tmp_path, text, "numerics.integrator=backward-euler").warnings
-    assert "time steps up to 0.2 s are longer than the shortest relaxation time 0.001 s" in warning
-    assert job_of(tmp_path, text).warnings == ()
-    assert job_of(tmp_path, text, "numerics.integrator=backward-euler", "history.0.time_step=1e-3").warnings == ()
-
-
-def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
-    text = replaced(SMALL.split("history")[0], surface=ROUGH, history=SLIDING)
-    fine = ("grid.points=128", "surface.long_wavelength=2.5e-4")
-    assert job_of(tmp_path, text, *fine).warnings == ()
-    (warning,) = job_of(tmp_path, text, *fine, "history.0.cells_per_step=4").warnings
-    assert "0.5 of its shortest wave" in warning
-    assert "cells_per_step up to 2)" in warning
-
-
-def test_warning_of_a_tolerance_below_rounding(tmp_path: Path) -> None:
-    """Of the precision that maps have: mixed is double there."""
-    for precision, low, other in (
-        ("single", 4e-7, "use precision: mixed or a larger"),
-        ("mixed", 8e-16, "use a larger"),
-    ):
-        chosen = f"numerics.precision={precision}"
-        (warning,) = job_of(tmp_path, SMALL, chosen, f"numerics.tolerance={low:e}").warnings
-        assert f"which {precision} precision reaches" in warning
-        assert warning.endswith(f"{other} tolerance")
-        assert job_of(tmp_path, SMALL, chosen, f"numerics.tolerance={1.3 * low:e}").warnings == ()
-
-
-def test_warning_of_velocity_without_duration(tmp_path: Path) -> None:
-    (warning,) = job_of(tmp_path, SMALL, "history.0.velocity=3").warnings
-    assert warning == "history.0: nothing slides in a stage without duration or distance; its velocity has no effect"
 
 
 def test_parts_can_be_made_without_a_file() -> None:

@@ -43,3 +43,9 @@ def with_material(line: str) -> str:
 
 def with_stage(line: str) -> str:
     return SMALL.replace("{pressure: 1e5}", line)
+
+
+def replaced(text: str, **sections: str) -> str:
+    """SMALL with whole sections exchanged; sections are one line each."""
+    kept = [line for line in text.split("\n") if line.split(":")[0] not in sections]
+    return "\n".join([*(f"{name}: {value}" for name, value in sections.items()), *kept])
