@@ -1,0 +1,141 @@
+"""What is taken away, locked or asked for while a run writes, and runs that keep no checkpoint."""
+
+import fcntl
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from parcontact.record import checkpoint
+
+from .jobs import AGAIN, DONE, FAILED, STEPS, Main, contents, steps
+
+# -- while it runs ----------------------------------------------------------------------------------------------------
+
+
+def remove(path: Path) -> None:
+    path.unlink()
+
+
+def replace(path: Path) -> None:
+    path.unlink()
+    path.write_text("mine")
+
+
+@pytest.mark.parametrize("act", [remove, replace])
+def test_measures_taken_away(
+    main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path, act: Callable[[Path], None]
+) -> None:
+    """The rows are written again, what stands in their place is put aside, and a warning says so."""
+    out = tmp_path / "out"
+    at_step(6, lambda: act(out / "measures.csv"))
+    code, said = main("job.yaml", "--out", "out")
+    assert code == DONE
+    assert "measures.csv was re" in said
+    assert steps(out) == list(range(STEPS + 1))
+    if act is replace:
+        assert (out / "measures.csv.aside").read_text() == "mine"
+
+
+def test_measures_cut_short(main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path) -> None:
+    """Rows are lost, so the run ends with 1, its state saved, and goes on when asked to."""
+    out = tmp_path / "out"
+    at_step(6, lambda: os.truncate(out / "measures.csv", 100))
+    code, said = main("job.yaml", "--out", "out")
+    assert code == FAILED
+    assert "measures.csv was cut short by another program during the run: rows are lost" in said
+    assert "the newest checkpoint is out/checkpoint/step-6.h5" in said
+    assert checkpoint.inspect(out / "checkpoint" / "step-6.h5").step == 6
+
+
+def test_fields_taken_away(main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path) -> None:
+    """The state is saved before the run ends with 1; the same command goes on."""
+    out = tmp_path / "out"
+    at_step(6, (out / "fields.h5").unlink)
+    code, said = main("job.yaml", "--out", "out", "--set", "checkpoint.every=100")
+    assert code == FAILED
+    assert "fields.h5" in said
+    assert "the newest checkpoint is out/checkpoint/step-6.h5" in said
+    code, said = main("job.yaml", "--out", "out")
+    assert code == DONE
+    assert "fields.h5 is missing" in said
+    with h5py.File(out / "fields.h5") as file:
+        assert file["step"][...].tolist() == list(range(6, STEPS + 1))
+        assert not np.isnan(file["t"][...]).any()
+
+
+def test_locked_fields_do_not_disturb_a_run(
+    main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path
+) -> None:
+    """HDF5's lock, taken by another program while it runs."""
+    path, locks = tmp_path / "out" / "fields.h5", list[int]()
+
+    def lock() -> None:
+        locks.append(os.open(path, os.O_RDONLY))
+        fcntl.flock(locks[0], fcntl.LOCK_EX)
+
+    at_step(6, lock)
+    try:
+        assert main("job.yaml", "--out", "out") == (DONE, "")
+    finally:
+        os.close(locks[0])
+    with h5py.File(path) as file:
+        assert not np.isnan(file["t"][...]).any()
+
+
+def test_xdmf_that_cannot_be_written(
+    main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path
+) -> None:
+    """It is beside the point: a warning, and every checkpoint."""
+    out = tmp_path / "out"
+
+    def block() -> None:
+        (out / "fields.xdmf").unlink()
+        (out / "fields.xdmf").mkdir()
+
+    at_step(3, block)
+    code, said = main("job.yaml", "--out", "out")
+    assert code == DONE
+    assert "warning: cannot write out/fields.xdmf" in said
+    assert len(list(out.glob("checkpoint/step-*.h5"))) == STEPS
+
+
+def test_directory_named_stop(main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path) -> None:
+    """`mkdir out/stop` is a wish to stop like any other; one that cannot be removed ends with 1, saved too."""
+    out = tmp_path / "out"
+
+    def ask(stop: Path) -> None:
+        stop.mkdir(parents=True)
+        time.sleep(0.25)  # longer than between two looks
+
+    at_step(4, lambda: ask(out / "stop"))
+    code, said = main("job.yaml", "--out", "out")
+    assert (code, said) == (AGAIN, "")
+    assert not (out / "stop").exists()
+    last = steps(out)[-1]
+    assert checkpoint.inspect(out / "checkpoint" / f"step-{last}.h5").step == last < STEPS
+    at_step(last + 1, lambda: ask(out / "stop" / "full"))
+    code, said = main("job.yaml", "--out", "out")
+    assert code == FAILED
+    assert "stop, which cannot be removed: Directory not empty; remove it; the newest checkpoint is " in said
+
+
+# -- no checkpoints ---------------------------------------------------------------------------------------------------
+
+
+def test_keep_none(main: Main, tmp_path: Path) -> None:
+    """A short run leaves no checkpoint; one that stops early leaves one, and goes on from it."""
+    out, none = tmp_path / "out", ("--set", "checkpoint={every: 3, keep: 0}")
+    assert main("job.yaml", "--out", "out", *none, "--until", "0.003")[0] == DONE
+    assert len(list(out.glob("checkpoint/*"))) == 1
+    assert main("job.yaml", "--out", "out", *none) == (DONE, "")
+    assert list(out.glob("checkpoint/*")) == []
+    assert steps(out) == list(range(STEPS + 1))
+    before = contents(out)
+    assert main("job.yaml", "--out", "out", *none) == (DONE, "")
+    assert contents(out) == before
