@@ -1,0 +1,180 @@
+"""A viscoelastic body in other forms of its material, in other units, and its energies."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import BRANCHES, SLS, begun, column, marched
+from numpy.testing import assert_allclose
+
+from parcontact.march.step import March
+from parcontact.physics.body import ZenerBody
+from parcontact.physics.energy import ElasticPressure, ZenerEnergy
+
+Json = dict[str, Any]
+
+# -- branches and scales -----------------------------------------------------------------------------------------------
+
+
+def bumps(**changes: Any) -> Json:
+    return {
+        "grid": {"points": [32, 24], "size": [1e-3, 0.75e-3]},
+        "surface": [
+            {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
+            {"shape": "wave", "amplitude": 5e-7, "waves": [-1, 3], "phase": 0.4},
+            {"shape": "sphere", "radius": 0.05},
+        ],
+        "material": SLS,
+        "history": [
+            {"pressure": 2e4, "duration": 2e-3, "time_step": {"first": 1e-4, "growth": 1.5}},
+            {"pressure": 3e4, "velocity": [0.1, 0.02], "duration": 2e-3, "time_step": 2e-4},
+            {"pressure": 0.0, "duration": 1e-3, "time_step": 5e-4},
+            {"pressure": {"from": 0.0, "to": 2e4}, "velocity": -0.05, "duration": 2e-3, "time_step": 5e-4},
+        ],
+        "numerics": {"tolerance": 1e-9},
+        "output": {"energy": True},
+        **changes,
+    }
+
+
+MEASURES = ("pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure")
+ENERGIES = ("work", "stored", "dissipated")
+
+
+def numbers(data: Json) -> dict[str, np.ndarray]:
+    _, rows = marched(data)
+    return {name: column(rows, name) for name in ("time", *MEASURES, *ENERGIES)}
+
+
+def zener(*branches: Json, modulus_inf: float = 0.0) -> Json:
+    return bumps(material={"model": "zener", "modulus_inf": modulus_inf, "branches": list(branches)})
+
+
+def test_forms_of_one_material() -> None:
+    """The paper's branch; the Maxwell branch and spring that it is; with useless branches beside it. To 1e-9.
+
+    G1 = 0 is a Maxwell branch, eta1 = 0 leaves two springs in series, eta1 = inf the spring G0.
+    """
+    maxwell = {"G0": 2.475e6, "G1": 0.0, "eta1": 2475.0}
+    zeners = [{"G0": 2.75e6, "G1": 2.75e6 / 9, "eta1": 2.75e4 / 9}]
+    series = {"G0": 0.2e6, "G1": 0.2e6, "eta1": 0.0}
+    spring = {"G0": 0.175e6, "G1": 1e6, "eta1": np.inf}
+    reference = numbers(bumps())
+    for same in (zener(*zeners), zener(maxwell, modulus_inf=0.275e6), zener(maxwell, series, spring)):
+        for name, values in numbers(same).items():
+            scale = np.abs(reference[name]).max()
+            assert_allclose(values, reference[name], rtol=0, atol=1e-9 * scale, err_msg=name)
+
+
+@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
+def test_branches_far_from_the_time_steps(integrator: str) -> None:
+    """A relaxation time of 1e9 s is a spring, one of 1e-15 s nothing (after a jump it would be felt). To 1e-8."""
+    load = {"pressure": {"from": 0.0, "to": 2e4}, "velocity": 0.1, "duration": 2e-3, "time_step": 2e-4}
+    common = {"history": [load], "numerics": {"tolerance": 1e-9, "integrator": integrator}}
+
+    def measures(modulus_inf: float, *more: Json) -> dict[str, np.ndarray]:
+        material = {"model": "zener", "modulus_inf": modulus_inf, "branches": [*BRANCHES, *more]}
+        return numbers(bumps(material=material, **common))
+
+    slow = measures(0.275e6, {"modulus": 1e6, "relaxation_time": 1e9})
+    fast = measures(0.275e6, {"modulus": 1e6, "relaxation_time": 1e-15})
+    for found, expected in ((slow, measures(1.275e6)), (fast, measures(0.275e6))):
+        for name in MEASURES:
+            scale = np.abs(expected[name]).max()
+            assert_allclose(found[name], expected[name], rtol=0, atol=1e-8 * scale, err_msg=name)
+
+
+def scaled(pressure: float, length: float, time: float) -> Json:
+    """`bumps` with all pressures and moduli, all lengths and all times multiplied."""
+    data = bumps()
+    data["grid"]["size"] = [length * size for size in data["grid"]["size"]]
+    for shape in data["surface"]:
+        for name in {"amplitude", "radius"} & shape.keys():
+            shape[name] *= length
+    branches = [{"modulus": pressure * b["modulus"], "relaxation_time": time * b["relaxation_time"]} for b in BRANCHES]
+    data["material"] = {"model": "zener", "modulus_inf": pressure * 0.275e6, "branches": branches}
+    for stage in data["history"]:
+        ramp = stage["pressure"]
+        stage["pressure"] = {k: pressure * v for k, v in ramp.items()} if isinstance(ramp, dict) else pressure * ramp
+        stage["duration"] *= time
+        step = stage["time_step"]
+        stage["time_step"] = {**step, "first": time * step["first"]} if isinstance(step, dict) else time * step
+        if "velocity" in stage:
+            stage["velocity"] = (np.array(stage["velocity"]) * (length / time)).tolist()
+    return data
+
+
+@pytest.mark.parametrize(("pressure", "length", "time"), [(1e6, 1.0, 1.0), (1.0, 1e-6, 1.0), (1.0, 1.0, 1e3)])
+def test_scales(pressure: float, length: float, time: float) -> None:
+    """Results scale with the units of pressure, length and time to the rounding of solves at 1e-9."""
+    plain, other = numbers(bumps()), numbers(scaled(pressure, length, time))
+    powers = {"pressure": (1, 0), "max_pressure": (1, 0), "force_x": (1, 2), "force_y": (1, 2)}
+    powers |= {"friction": (0, 0), "contact_area": (0, 0), "approach": (0, 1), "mean_gap": (0, 1)}
+    powers |= dict.fromkeys(ENERGIES, (1, 3))
+    assert_allclose(other["time"], time * plain["time"], rtol=1e-12)
+    for name, (of_pressure, of_length) in powers.items():
+        expected = plain[name] * pressure**of_pressure * length**of_length
+        assert_allclose(other[name], expected, rtol=0, atol=1e-11 * np.abs(expected).max(), err_msg=name)
+
+
+# -- energy ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])
+def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
+    """Stored energy from the branch maps themselves and A^-1, and the balance, after jumps, sliding, no contact.
+
+    In a free scene the inverse of the operator is known only through what has been: the body's laws in pressures.
+    """
+    data = bumps(numerics={"tolerance": 1e-6, "kernel": kernel})
+    data["grid"]["boundary"] = boundary
+    checked = []
+
+    def check(march: March) -> None:
+        energy, body = march.scene.energy, march.scene.material
+        assert isinstance(energy, ZenerEnergy)
+        assert isinstance(body, ZenerBody)
+        body.settle()
+        if isinstance(energy.inverse, ElasticPressure):
+            memory = energy.inverse.body
+            memory.settle()
+            assert_allclose(applied(march, memory.u), body.u, rtol=0, atol=1e-12 * np.abs(body.u).max())
+        maps = [body.u, *body.branches]
+        inverses = [inverse(march, index) for index in range(len(maps))]
+        weights = [body.prony.modulus_inf, *(1.0 / body.prony.moduli)]
+        direct = 0.5 * sum(w * np.sum(a * b) for w, a, b in zip(weights, maps, inverses, strict=True))
+        assert energy.balance.stored == pytest.approx(direct, rel=1e-9, abs=1e-30)
+        checked.append(direct)
+
+    _, rows = marched(data, [check])
+    assert max(checked) > 0.0
+    for row in rows:
+        assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-11, abs=1e-30)
+        assert row.dissipated == pytest.approx(sum(row.branch_dissipation), rel=1e-12)
+
+
+def applied(march: March, field: np.ndarray) -> np.ndarray:
+    out = np.empty_like(field)
+    return march.scene.solver.operator.apply(np.ascontiguousarray(field), out)
+
+
+def inverse(march: March, index: int) -> np.ndarray:
+    """A^-1 of the displacement (0) or of a branch map (1, 2, ...)."""
+    scene = march.scene
+    body, energy = scene.material, scene.energy
+    assert isinstance(energy, ZenerEnergy)
+    assert isinstance(body, ZenerBody)
+    if isinstance(energy.inverse, ElasticPressure):
+        memory = energy.inverse.body
+        return [memory.u, *memory.branches][index]
+    field = [body.u, *body.branches][index]
+    return scene.solver.preconditioner.apply(field, np.empty_like(field))
+
+
+def test_energy_costs_nothing_unless_asked_for() -> None:
+    """No map and no operator application more."""
+    data = bumps()
+    plain = begun({**data, "output": {}})
+    asked = begun(data)
+    assert plain.scene.energy is None
+    assert asked.scene.slab.tally["map bytes"] == plain.scene.slab.tally["map bytes"]
