@@ -25,8 +25,10 @@ LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
 SURFACE = ("tests/physics/test_surface.py", "tests/physics/test_surface_forces.py")
 CONTACT = tuple(f"tests/solve/test_contact{part}.py" for part in ("", "_symmetries", "_cost", "_failures"))
+VISCOELASTIC = ("tests/test_viscoelastic.py", "tests/test_viscoelastic_scales.py")
+SLIDING = tuple(f"tests/test_sliding_{part}.py" for part in ("waves", "runs", "examples", "cost"))
 PARTS = {  # files of the program, and the tests that answer for them
-    "physics/body.py": ("tests/physics/test_material.py", "tests/test_viscoelastic.py"),
+    "physics/body.py": ("tests/physics/test_material.py", *VISCOELASTIC),
     "physics/energy.py": ("tests/physics/test_energy.py",),
     "physics/wake.py": ("tests/physics/test_wake.py",),
     "physics/folding.py": ("tests/physics/test_folding.py", "tests/effects/test_folded_branches.py"),
@@ -44,9 +46,9 @@ PARTS = {  # files of the program, and the tests that answer for them
     "solve/local_load.py": ("tests/solve/test_local_load.py",),
     "solve/gcr.py": ("tests/solve/test_gcr.py",),
     "solve/active_set.py": ("tests/solve/test_active_set.py", "tests/test_retry.py"),
-    "march/step.py": ("tests/test_viscoelastic.py", "tests/test_sliding_runs.py", "tests/test_retry.py"),
+    "march/step.py": (*VISCOELASTIC, *SLIDING, "tests/test_retry.py"),
     "march/rest.py": ("tests/test_stationary.py",),
-    "job/timeline.py": ("tests/test_clock.py", "tests/test_viscoelastic.py"),
+    "job/timeline.py": ("tests/test_clock.py", *VISCOELASTIC),
 }
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Add: ast.Sub,
