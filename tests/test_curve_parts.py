@@ -13,6 +13,8 @@ import yaml
 from conftest import WORLD
 
 from parcontact import __main__
+from parcontact.job import load_cases
+from parcontact.record import sweep_table
 from parcontact.record.measures import read
 from parcontact.solve import kernels
 from parcontact.steady_sliding.sliding import SteadySliding
@@ -103,6 +105,31 @@ def test_stopped_curve_goes_on(
     assert points(tmp_path / "out" / "steady.csv") == sorted([*ALL, (0.05, 2e5)], key=lambda point: point[::-1])
     assert main(*CURVE, "--restart", "never") == (DONE, "")
     assert len(solved) == 13
+
+
+def test_curve_of_a_sweep_has_only_begun_while_points_lack(
+    main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, solved: list[tuple[float, float]]
+) -> None:
+    """Stopped after a point of three it has begun; with all three it is done; where a fourth is asked for it is not."""
+    asked = {"steady": {"velocities": [0.01, 0.1, 1.0], "pressures": [2e5]}}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**JOB, **asked, "sweep": [{"surface.amplitude": [5e-7, 4e-7]}]}))
+    solve = SteadySliding.solve
+
+    def interrupted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
+        os.kill(os.getpid(), signal.SIGTERM)
+        return solve(self, velocity, pressure)
+
+    def states(*overrides: str) -> list[str]:
+        return [sweep_table.state(case) for case in load_cases("job.yaml", overrides)]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SteadySliding, "solve", interrupted)
+        assert main("steady", "job.yaml") == (AGAIN, "")
+    assert (len(solved), states()) == (1, ["begun", "-"])
+    assert main("steady", "job.yaml") == (DONE, "")
+    assert (len(solved), states()) == (6, ["done", "done"])
+    assert states("steady.velocities=[0.01, 0.1, 0.5, 1.0]") == ["begun", "begun"]
+    assert states("steady.temperatures=[20.0]") == ["begun", "begun"]
 
 
 def test_curve_and_a_directory_named_stop(main: Main, tmp_path: Path) -> None:

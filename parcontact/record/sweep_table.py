@@ -3,15 +3,15 @@
 import csv
 import fcntl
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from io import StringIO
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
-from ..job import Case
-from . import files, measures, slide
+from ..job import Case, Steady
+from . import curve_points, files, measures, slide
 
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
@@ -76,10 +76,18 @@ def state(case: Case) -> str:
         return "-"
     columns = measures.read(table)
     if not case.job.history:
-        return "done"
+        return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]
     timeline = case.job.timeline().follow(dict(zip(steps, columns["time"], strict=True)))
     return "done" if steps and steps[-1] >= len(timeline) else "begun"
+
+
+def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
+    """Whether a friction curve has not all points that its job asks for."""
+    asked = (
+        curve_points.asked(section.velocities, section.pressures or (), section.temperatures or ()) if section else ()
+    )
+    return bool(curve_points.lacking(asked, curve_points.of_table(columns)))
 
 
 def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:

@@ -4,7 +4,6 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, NamedTuple
 
 from .. import sanity, scene
@@ -12,7 +11,7 @@ from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
-from ..record import hdf5, marker, stopfile
+from ..record import curve_points, hdf5, marker, stopfile
 from ..record.console import always
 from ..record.directory import ADVICE, Directory
 from ..record.provenance import Link, Provenance
@@ -47,8 +46,8 @@ class Request:
     @property
     def points(self) -> list[Wanted]:
         """All points, in the order in which they are solved."""
-        order = product(self.temperatures or (math.nan,), self.pressures, self.velocities)
-        return [Wanted(speed, pressure, temperature) for temperature, pressure, speed in order]
+        found = curve_points.asked(self.velocities, self.pressures, self.temperatures)
+        return [Wanted(*point) for point in found]
 
     def velocity(self, speed: float) -> tuple[float, float]:
         return speed * self.direction[0], speed * self.direction[1]

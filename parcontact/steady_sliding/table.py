@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..effects.interface import InterfaceColumns, interface_of, shares
-from ..record import files, measures
+from ..record import curve_points, files, measures
 from ..record.growing import GrowingTable
 from .sliding import Point, SteadySliding
 
@@ -19,7 +19,6 @@ LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the 
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 WAVES = ("velocity", "pressure", "wavelength", "share")
 HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
-CLOSE = 1e-6  # relative: speeds and pressures that are the same but for rounding
 
 
 class CurveTable:
@@ -36,8 +35,8 @@ class CurveTable:
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
         self.say(HEAD)
 
-    def _read(self) -> list[tuple[float, ...]]:
-        """Speed, pressure, temperature of the points that are there; a line that was not finished is removed."""
+    def _read(self) -> list[curve_points.Point]:
+        """The points that are there; a line that was not finished is removed."""
         if not self.path.exists():
             return []
         columns = measures.read(self.path)
@@ -48,12 +47,11 @@ class CurveTable:
         if not whole.endswith(b"\n"):
             with files.replaced(self.path) as new:
                 new.write(whole[: whole.rfind(b"\n") + 1])
-        degrees = columns["temperature"] if self.heated else [math.nan] * len(columns["velocity"])
-        return list(zip(columns["velocity"], columns["pressure"], degrees, strict=True))
+        return curve_points.of_table(columns)
 
-    def lacking(self, points: Sequence[tuple[float, ...]]) -> list[int]:
+    def lacking(self, points: Sequence[curve_points.Point]) -> list[int]:
         """The numbers of the points that are not there."""
-        found = [k for k, point in enumerate(points) if not any(_same(point, other) for other in self.known)]
+        found = curve_points.lacking(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
         return found
@@ -109,9 +107,3 @@ class CurveTable:
         self._file.close()
         if self._waves:
             self._waves.close()
-
-
-def _same(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Temperatures that were not asked for are the same."""
-    pairs = zip(one, other, strict=True)
-    return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
