@@ -61,18 +61,20 @@ def test_a_stop_file_ends_all_that_run(tmp_path: Path, monkeypatch: pytest.Monke
 
 @pytest.mark.mpi
 def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A signal to one rank, say: the others begin no further case."""
+    """A signal to one rank, say, or a stop file for its case: the others begin no further case. Another program, which
+    runs at the same time, is not asked."""
     cases, groups = cases_in_groups(shared_path, monkeypatch)
-    stop = sweep.stop_file(cases)
-    begun: list[int] = []
+    stop, other = (groups.agree(sweep.stop_file(cases)) for _ in range(2))
+    begun, asked = list[int](), list[bool]()
 
     def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
         begun.append(int(job.output.directory.name))
         deadline = time.monotonic() + 20.0
         while groups.number == 0 and groups.count > 1 and not stop.asks and time.monotonic() < deadline:
             time.sleep(0.01)
+        asked.append(other.asks)
         return 3 if groups.number == groups.count - 1 else 0
 
     assert sweep.run(cases, cases, groups, act, stop) == 3
     assert groups.from_all(begun) == [[number] for number in range(groups.count)]
-    assert stop.path.exists() == (groups.count > 1)
+    assert (any(asked), stop.path.exists(), stop.own.exists()) == (False, False, False)

@@ -3,7 +3,6 @@
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,8 +61,9 @@ def run(
     A case that fails does not stop the others: the code is 1 in the end. One that another program runs, or has run
     while this one made ready for it, is passed over, like those that have finished; if it is the only one, and not
     done, InUseError is raised. One that stops early with a checkpoint stops the sweep, with its code, and the cases
-    beside it: the same command goes on with them. So do the file `stop`, and the end of the wall time. The file stays:
-    other programs may not have seen it yet, and it stops no later one.
+    beside it, but no other program: the same command goes on with them. So do the file `stop`, which stops other
+    programs too, and the end of the wall time. The file stays: others may not have seen it yet, and it stops no later
+    one.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
     code = _go(cases, dealt(chosen, groups), groups, act, stop, manner, doubts)
@@ -71,6 +71,7 @@ def run(
         found = groups.from_all((code, doubts.kinds))
     codes = [one for one, _ in found]
     if groups.root:
+        stop.forget_own()
         for text in doubts.summary([kinds for _, kinds in found]):
             warn(text)
         if AGAIN not in codes and not manner.quiet:
@@ -128,9 +129,8 @@ def _go(
         if speaks and (groups.count > 1 or ended == DONE_ELSEWHERE):
             _say(f"case {case.number}: {ENDS[ended]}")
         if ended == AGAIN:
-            if slab.root and groups.count > 1 and not stop.asks:
-                with suppress(OSError):
-                    stop.path.touch()
+            if slab.root and groups.count > 1:
+                stop.ask_own()
             return AGAIN
         code = max(code, ended)
     return code
