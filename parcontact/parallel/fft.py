@@ -6,8 +6,9 @@ of the map are transformed along x, and only they are sent.
 
 The pass along x works through blocks of rows that stay in cache: what belongs to another rank is copied out of a block
 while it is hot, what stays goes straight to its place in the spectrum. Maps that FFTW cannot take as they are (padded
-along x, of another precision, not aligned) pass through a block too. Besides its blocks a transform holds one map, and
-on several ranks what it sends, which is less than another one.
+along x, of another precision, not aligned) pass through a block too. The pass along y works through blocks of columns
+where they are, if there are many: of a convolution there, times the symbol, and back, while they are in cache. Besides
+its blocks of rows a transform holds one map, and on several ranks what it sends, which is less than another one.
 """
 
 from functools import cached_property
@@ -21,7 +22,9 @@ from .mpi import MPI
 from .slab import Array, Slab, allocate, deal
 
 Spectrum = NDArray[np.complexfloating]
-BLOCK_BYTES = 1 << 19  # of one block of transformed rows at most: fits a usual second-level cache
+BLOCK_BYTES = 1 << 19  # of one block of transformed rows, or columns, at most: fits a usual second-level cache
+NARROWEST = 16  # columns in a block, which takes more than that where columns are very long
+LEAST_BYTES = 12 << 20  # of a spectrum that is worth blocks of columns: a usual last-level cache keeps a smaller one
 SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
 
 
@@ -63,6 +66,14 @@ def _block_height(rows: int, row_bytes: int, spectrum_bytes: int, several: bool)
     """
     most = min(max(spectrum_bytes // 8, BLOCK_BYTES // 8), BLOCK_BYTES) if several else BLOCK_BYTES
     return min(rows, max(8, most // row_bytes // 8 * 8))
+
+
+def _column_blocks(count: int, column_bytes: int) -> list[slice]:
+    """Blocks of columns, all of a multiple of NARROWEST, which keeps them aligned; the last one has what is left."""
+    width = max(NARROWEST, BLOCK_BYTES // column_bytes // NARROWEST * NARROWEST)
+    blocks = max(1, count // width) if count * column_bytes > LEAST_BYTES else 1
+    starts = [width * number for number in range(blocks)]
+    return [slice(start, stop) for start, stop in zip(starts, [*starts[1:], count], strict=True)] if count else []
 
 
 class FFT:
@@ -111,30 +122,36 @@ class FFT:
     def forward(self, field: Array) -> Spectrum:
         """Spectrum `sum h exp(-i q x)` of a map; collective. It is this object's buffer: valid until the next call."""
         self._along_x(field)
-        if self.spectrum.size:
-            self._y_forward.execute()
+        for columns in self._column_blocks:
+            self._along_y(self._y_forward, columns)
         return self.spectrum
 
     def backward(self, spectrum: Spectrum, out: Array) -> Array:
         """Map of a spectrum, so that `backward(forward(h), out)` equals h; collective."""
         if spectrum is not self.spectrum:
             self.spectrum[...] = spectrum
-        return self._to_map(out, 1.0 / (self.mx * self.my))
+        for columns in self._column_blocks:
+            self._along_y(self._y_backward, columns)
+        return self._back_along_x(out, 1.0 / (self.mx * self.my))
 
     def convolve(self, field: Array, symbol: NDArray[np.inexact], out: Array) -> Array:
         """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective.
 
         One that is even in q_y may have only the rows of q_y >= 0, the first `my // 2 + 1`.
         """
-        spectrum = self.forward(field)
-        _multiply(spectrum, symbol)
-        return self._to_map(out, 1.0)
+        self._along_x(field)
+        for columns in self._column_blocks:
+            _multiply(self._along_y(self._y_forward, columns), symbol[:, columns])
+            self._along_y(self._y_backward, columns)
+        return self._back_along_x(out, 1.0)
 
-    def _to_map(self, out: Array, scale: float) -> Array:
-        if self.spectrum.size:
-            self._y_backward.execute()
-        self._back_along_x(out, scale)
-        return out
+    def _along_y(self, transforms: dict[int, pyfftw.FFTW], columns: slice) -> Spectrum:
+        """Transform a block of columns in its place."""
+        part = self.spectrum[:, columns]
+        transform = transforms[part.shape[1]]
+        transform.update_arrays(part, part)
+        transform.execute()
+        return part
 
     # -- the pass along x ---------------------------------------------------------------------------------------------
 
@@ -157,7 +174,7 @@ class FFT:
             self._transpose.to_columns()
         self.spectrum[self.slab.ny :] = 0.0
 
-    def _back_along_x(self, out: Array, scale: float) -> None:
+    def _back_along_x(self, out: Array, scale: float) -> Array:
         self._count()
         if self._transpose:
             self._transpose.to_rows()
@@ -176,6 +193,7 @@ class FFT:
                 target[...] = result[:, : self.slab.nx]
         for height, transform in self._x_backward.items():
             transform.update_arrays(self._waves(slice(0, height)), self._row_block[:height])
+        return out
 
     def _waves(self, rows: slice) -> Spectrum:
         """Where the transform along x of these rows is: on one rank at once in its place."""
@@ -202,6 +220,7 @@ class FFT:
         self._blocks = [slice(start, min(start + height, ny_loc)) for start in range(0, ny_loc, max(height, 1))]
         self._row_block = allocate((height, self.mx), self.dtype, tally)
         self._wave_block = allocate((height if several else 0, waves), self.complex, tally)
+        self._column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
 
     def _make_transforms(self) -> None:
         heights = {rows.stop - rows.start for rows in self._blocks}
@@ -212,9 +231,9 @@ class FFT:
         self._x_backward = {
             height: self._transform(waves[height], self._row_block[:height], axis=1) for height in heights
         }
-        if self.spectrum.size:
-            self._y_forward = self._transform(self.spectrum, self.spectrum, axis=0)
-            self._y_backward = self._transform(self.spectrum, self.spectrum, axis=0, backward=True)
+        blocks = {part.shape[1]: part for part in (self.spectrum[:, columns] for columns in self._column_blocks[::-1])}
+        self._y_forward = {width: self._transform(part, part, axis=0) for width, part in blocks.items()}
+        self._y_backward = {width: self._transform(part, part, axis=0, backward=True) for width, part in blocks.items()}
 
     def _transform(
         self, source: NDArray[np.inexact], target: NDArray[np.inexact], axis: int, backward: bool = False

@@ -74,10 +74,11 @@ def test_any_size(comm: MPI.Intracomm, nx: int, ny: int, more_x: int, more_y: in
 
 
 @pytest.mark.parametrize("dtype", TOLERANCES)
-@pytest.mark.parametrize("nx", [64, 33])
+@pytest.mark.parametrize("nx", [64, 33, 230])
 def test_many_blocks(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, nx: int, dtype: DTypeLike) -> None:
-    """Each rank works through blocks of eight rows, the last one shorter."""
+    """Each rank works through blocks of eight rows, the last one shorter, and of sixteen columns, the last longer."""
     monkeypatch.setattr(transforms, "BLOCK_BYTES", 1)
+    monkeypatch.setattr(transforms, "LEAST_BYTES", 0)
     check(Slab(comm, nx, 75), (nx, 75), dtype)
 
 
@@ -109,14 +110,20 @@ def test_maps_are_let_go_of(communicators: list[MPI.Intracomm]) -> None:
         assert tally["map bytes"] == before
 
 
+@pytest.mark.parametrize("nx", [7, 230])
 @pytest.mark.parametrize("ny", [1, 2, 9, 10])
-def test_half_of_an_even_symbol(comm: MPI.Intracomm, ny: int) -> None:
-    """It stands for the whole, to the same digits."""
-    slab = Slab(comm, 7, ny)
-    fft, field = FFT(slab), random_map(7, ny)[slab.rows]
-    half = np.random.default_rng(5).normal(size=(ny // 2 + 1, 4))[:, fft.columns]
+def test_half_of_an_even_symbol(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, nx: int, ny: int) -> None:
+    """It stands for the whole, to the same digits, in blocks of columns; they are those of separate transforms."""
+    monkeypatch.setattr(transforms, "LEAST_BYTES", 0)
+    monkeypatch.setattr(transforms, "BLOCK_BYTES", 1)
+    slab = Slab(comm, nx, ny)
+    fft, field = FFT(slab), random_map(nx, ny)[slab.rows]
+    half = np.random.default_rng(5).normal(size=(ny // 2 + 1, nx // 2 + 1))[:, fft.columns]
     whole = half[np.abs(fft.modes[1][:, 0])]
-    assert fft.convolve(field, half, slab.empty()).tolist() == fft.convolve(field, whole, slab.empty()).tolist()
+    found = fft.convolve(field, half, slab.empty())
+    assert found.tolist() == fft.convolve(field, whole, slab.empty()).tolist()
+    scale = np.abs(whole).max(initial=0.0) * nx * ny
+    close(found, nx * ny * fft.backward(whole * fft.forward(field), slab.empty()), scale=3.0 * scale)
 
 
 @pytest.mark.parametrize("dtype", TOLERANCES)
