@@ -34,11 +34,10 @@ class Ledger:
         """Of the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving with
         `velocity` [m/s]; collective."""
         units, points = self.units, self.slab.points
-        *sums, largest = loops.measure(p, u, h)
         cyclic = self.surface.periodic
-        sides = loops.edges(p, rows.before_first(self.slab, p, cyclic), cyclic)
+        *sums, largest = loops.measure(p, u, h, rows.before_first(self.slab, p, cyclic), cyclic)
         edge = 0.0 if cyclic else _largest_at_edge(self.slab, p)
-        load, count, gaps, sides, largest, edge = self.slab.reduce([*sums, sides], [largest, edge])
+        load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0

@@ -50,41 +50,33 @@ def commit(displacement, buffer, u, heights, offset):
 
 
 @loop
-def measure(p, u, h):
-    """Over this rank's points: sum of p, points in contact, sum of `u - h`, largest p."""
-    load, count, gaps, largest = 0.0, 0.0, 0.0, 0.0
+def measure(p, u, h, above, cyclic):
+    """Over this rank's points: sum of p, points in contact, sum of `u - h`; how many cell sides separate a point with
+    pressure from one without, along x and y, each counted once; largest p.
+
+    `above` is the row before the first; the first point of a row has the last one before it if `cyclic`. The largest
+    pressure is kept for each column: that is as fast as a sum, which a single running maximum is not.
+    """
+    load, count, gaps, sides = 0.0, 0.0, 0.0, 0.0
+    largest = np.zeros(p.shape[1], p.dtype)
     for j in range(p.shape[0]):
-        row_load, row_count, row_gaps, row_largest = 0.0, 0.0, 0.0, 0.0
+        before = p[j - 1] if j > 0 else above
+        row_load, row_count, row_gaps, across, along = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
             row_load += p[j, i]
             row_count += 1.0 if p[j, i] > 0.0 else 0.0
             row_gaps += u[j, i] - h[j, i]
-            row_largest = max(row_largest, p[j, i])
-        load += row_load
-        count += row_count
-        gaps += row_gaps
-        largest = max(largest, row_largest)
-    return load, count, gaps, largest
-
-
-@loop
-def edges(p, above, cyclic):
-    """How many cell sides separate a point with pressure from one without, along x and y, each counted once.
-
-    `above` is the row before the first; the first point of a row has the last one before it if `cyclic`.
-    """
-    count = 0.0
-    for j in range(p.shape[0]):
-        before = p[j - 1] if j > 0 else above
-        across, along = 0.0, 0.0
-        for i in range(p.shape[1]):
             across += 1.0 if (p[j, i] > 0.0) != (before[i] > 0.0) else 0.0
+            largest[i] = max(largest[i], p[j, i])
         for i in range(1, p.shape[1]):
             along += 1.0 if (p[j, i] > 0.0) != (p[j, i - 1] > 0.0) else 0.0
         if cyclic:
             along += 1.0 if (p[j, 0] > 0.0) != (p[j, -1] > 0.0) else 0.0
-        count += across + along
-    return count
+        load += row_load
+        count += row_count
+        gaps += row_gaps
+        sides += across + along
+    return load, count, gaps, sides, largest.max()
 
 
 @loop

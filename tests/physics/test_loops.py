@@ -59,23 +59,18 @@ def test_commit_on_its_own_map() -> None:
 
 
 @pytest.mark.parametrize("shape", MAPS)
-def test_measure(shape: tuple[int, int]) -> None:
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_measure(shape: tuple[int, int], cyclic: bool) -> None:
+    """Sides between what is pressed and what is not are whole numbers."""
     p, u, h = maps(3, shape)
     p = np.maximum(p, 0.0)
-    found = loops.measure(p, u, h)
-    assert_allclose(found, [p.sum(), np.count_nonzero(p), (u - h).sum(), p.max(initial=0.0)], rtol=1e-13, atol=1e-13)
-
-
-@pytest.mark.parametrize("shape", MAPS)
-@pytest.mark.parametrize("cyclic", [False, True])
-def test_edges(shape: tuple[int, int], cyclic: bool) -> None:
-    """Sides between what is pressed and what is not: whole numbers."""
-    p, above = maps(2, shape)
-    above = above[:1, :] if shape[0] else np.zeros((1, shape[1]))
+    above = np.maximum(maps(1, (1, shape[1]))[0], 0.0)
     pressed = np.concatenate([above, p]) > 0.0
-    expected = np.count_nonzero(np.diff(pressed, axis=0)) + np.count_nonzero(np.diff(pressed[1:], axis=1))
-    expected += np.count_nonzero(pressed[1:, 0] != pressed[1:, -1]) if cyclic else 0
-    assert loops.edges(p, above[0], cyclic) == expected
+    sides = np.count_nonzero(np.diff(pressed, axis=0)) + np.count_nonzero(np.diff(pressed[1:], axis=1))
+    sides += np.count_nonzero(pressed[1:, 0] != pressed[1:, -1]) if cyclic else 0
+    *sums, found, largest = loops.measure(p, u, h, above[0], cyclic)
+    assert_allclose([*sums, largest], [p.sum(), np.count_nonzero(p), (u - h).sum(), p.max(initial=0.0)], 1e-13, 1e-13)
+    assert found == sides
 
 
 @pytest.mark.parametrize("shape", MAPS)
