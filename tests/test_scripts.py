@@ -39,7 +39,9 @@ SMALL = {
     "check_report": Small(
         [], r"no chromium is installed|0 of 0 views are wrong", (0, 1)
     ),  # pages: tests/test_report.py
-    "error_budget": Small(["64", "4"], r"(?s)rough, exp .*time friction: estimates are 0\.\d+ to \d\.?\d* times "),
+    "error_budget": Small(
+        ["--finer", "4", "--surfaces", "1"], r"(?s)rough, exp .*time friction: estimates are 0\.\d+ to \d\.?\d* times "
+    ),
     "folded_branches": Small(["64"], r"(?m)^ +0\.001 +5 "),
     "convergence": Small(["32", "64"], r"order +-?[\d.]+ +2\.\d\d +1\.[5-9]"),
     "faults": Small(

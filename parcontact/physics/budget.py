@@ -2,14 +2,8 @@
 
 Each part is an estimate of a relative error (1 is all of it), found by experiment: spheres, cylinders and rough
 surfaces from 0.4 % to full contact, bodies of one to twelve branches, starts and jumps of velocity, against runs with
-finer steps, meshes and tolerances. `scripts/error_budget.py 64 8` makes nine scenes with both integrators; in brackets
-54 others with other surfaces, speeds, steps and meshes (`64 8 7 3`, `64 8 8 0.1 0.5`, `128 8 9 2`), to which nothing
-was fitted, though the first 18 were looked at while forms of estimates were compared. Estimates are so many times the
-true errors:
-
-    of friction, by the solver 1.0 to 3.3 (0.3 to 4.2), by time steps 0.6 to 1.8 (0.4 to 3.6);
-    of area, by the solver 0.9 to 2 (0.5 to 2.3; more below 0.003 %), by time steps, as it changes its sign, 0.25 to 6
-    (0.2 to 6).
+finer steps, meshes and tolerances. `scripts/error_budget.py` tells how they compare with true errors, in the mean over
+several random surfaces: on one of them an error may happen to be next to nothing, of which no estimate knows.
 
 solver: from the `complementarity` C of the certificate (see `solve.contact.Certificate`). Friction is wrong in
     proportion to it, less where many spots of contact average it out, by the root of the root of their number. Area is

@@ -54,8 +54,8 @@ def test_area_has_no_error_of_time_in_full_contact(exponential: bool) -> None:
 def test_backward_euler_is_of_the_first_order() -> None:
     budget = estimate(Known(8.0, False, 0.0, False), SEEN, 10_000)
     assert budget.friction is not None
-    assert budget.friction.time == pytest.approx(0.9 * 0.02)
-    assert budget.area.time == pytest.approx(0.9 * 0.02 * (0.15 * 0.9**0.8 + 0.005 / 0.095))
+    assert budget.friction.time == pytest.approx(1.1 * 0.02)
+    assert budget.area.time == pytest.approx(1.1 * 0.02 * (0.18 * 0.9**2 + 0.005 / 0.095))
 
 
 def test_little_friction_counts_more() -> None:
