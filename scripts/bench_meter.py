@@ -19,12 +19,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from parcontact.parallel import fft, pyramid
+from parcontact.parallel import pyramid, transpose
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 
 TRANSFORM, EXCHANGE, OTHER = "transform", "exchange", "everything else"
-EXCHANGES = [(fft.Transpose, name) for name in ("post", "to_columns", "to_rows", "collect")]
+EXCHANGES = [(transpose.Leg, name) for name in ("post", "to_columns", "to_rows", "collect")]
 EXCHANGES += [(Slab, "reduce"), (pyramid, "fetch")]
 Reads = dict[str, int]  # how many times the bytes of each parameter pass: read, written, or both
 

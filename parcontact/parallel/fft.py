@@ -18,8 +18,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
 from .fftw import pyfftw
-from .mpi import MPI
 from .slab import Array, Slab, allocate, deal
+from .transpose import Leg, count_legs, legs_of, wire_points
 
 Spectrum = NDArray[np.complexfloating]
 BLOCK_BYTES = 1 << 19  # of one block of transformed rows, or columns, at most: fits a usual second-level cache
@@ -48,23 +48,24 @@ def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
 def footprint(
     points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int
 ) -> tuple[int, int, int]:
-    """Bytes that one rank of an `FFT` of these lengths holds for maps of `points = (nx, ny)`.
-
-    Of its spectrum, of what it sends in one transform, and of its blocks.
-    """
+    """Bytes of one rank in an `FFT` of these lengths for maps of `points = (nx, ny)`: of its spectrum, of its blocks
+    and what waits to be sent, and what it sends in one transform."""
     itemsize, waves = 2 * np.dtype(dtype).itemsize, lengths[0] // 2 + 1
     rows, columns = (part.stop - part.start for part in (deal(count, ranks)[rank] for count in (points[1], waves)))
-    spectrum = lengths[1] * columns * itemsize
-    height = _block_height(rows, waves * itemsize, spectrum, ranks > 1)
+    height = _block_height(rows, waves * itemsize, lengths[1], ranks)
     blocks = height * lengths[0] * itemsize // 2 + (height * waves * itemsize if ranks > 1 else 0)
-    return spectrum, rows * (waves - columns) * itemsize, blocks
+    legs = legs_of(rows, height, count_legs(lengths[1] * waves * itemsize, ranks))
+    waiting = wire_points(legs, waves - columns) * itemsize
+    return lengths[1] * columns * itemsize, blocks + waiting, rows * (waves - columns) * itemsize
 
 
-def _block_height(rows: int, row_bytes: int, spectrum_bytes: int, several: bool) -> int:
+def _block_height(rows: int, row_bytes: int, my: int, ranks: int) -> int:
     """Rows in a block. On several ranks the blocks are more memory than one rank needs: an eighth of a map, unless that
     is tiny. By eights each block is aligned, whatever the length of a row.
     """
-    most = min(max(spectrum_bytes // 8, BLOCK_BYTES // 8), BLOCK_BYTES) if several else BLOCK_BYTES
+    most = BLOCK_BYTES
+    if ranks > 1:
+        most = min(max(my * row_bytes // ranks // 8, BLOCK_BYTES // 8), BLOCK_BYTES)
     return min(rows, max(8, most // row_bytes // 8 * 8))
 
 
@@ -101,9 +102,8 @@ class FFT:
         self.columns = dealt[slab.comm.rank]
         self.shape = (self.my, self.columns.stop - self.columns.start)
         self.spectrum: Spectrum = allocate(self.shape, self.complex, slab.tally)
-        self._transpose = Transpose(slab, dealt, self.spectrum) if slab.comm.size > 1 else None
         self._name = transform_name((self.mx, self.my), dtype)
-        self._make_blocks()
+        self._make_blocks(dealt)
         self._make_transforms()
 
     @cached_property
@@ -157,47 +157,56 @@ class FFT:
 
     def _along_x(self, field: Array) -> None:
         self._count()
-        for rows in self._blocks:
-            source, waves = field[rows], self._waves(rows)
-            transform = self._x_forward[len(waves)]
-            if not self._direct(source, transform.input_alignment):
-                source = self._row_block[: len(waves)]
-                source[:, : self.slab.nx] = field[rows]
-                source[:, self.slab.nx :] = 0.0
-            transform.update_arrays(source, waves)
-            transform.execute()
-            if self._transpose:
-                self._transpose.post(rows, waves)
+        for leg, blocks in self._legs:
+            for rows in blocks:
+                waves = self._waves(rows)
+                self._transform_rows(field[rows], waves)
+                if leg:
+                    leg.post(rows, waves)
+            if leg:
+                leg.to_columns()
         for height, transform in self._x_forward.items():
             transform.update_arrays(self._row_block[:height], self._waves(slice(0, height)))  # lets go of the map
-        if self._transpose:
-            self._transpose.to_columns()
         self.spectrum[self.slab.ny :] = 0.0
+
+    def _transform_rows(self, source: Array, waves: Spectrum) -> None:
+        transform = self._x_forward[len(waves)]
+        if not self._direct(source, transform.input_alignment):
+            block = self._row_block[: len(waves)]
+            block[:, : self.slab.nx] = source
+            block[:, self.slab.nx :] = 0.0
+            source = block
+        transform.update_arrays(source, waves)
+        transform.execute()
 
     def _back_along_x(self, out: Array, scale: float) -> Array:
         self._count()
-        if self._transpose:
-            self._transpose.to_rows()
-        for rows in self._blocks:
-            target, waves = out[rows], self._waves(rows)
-            transform = self._x_backward[len(waves)]
-            if self._transpose:
-                self._transpose.collect(rows, waves)
-            if scale != 1.0:
-                np.multiply(waves, scale, out=waves)
-            direct = self._direct(target, transform.output_alignment)
-            result = target if direct else self._row_block[: len(waves)]
-            transform.update_arrays(waves, result)
-            transform.execute()
-            if not direct:
-                target[...] = result[:, : self.slab.nx]
+        for leg, blocks in self._legs:
+            if leg:
+                leg.to_rows()
+            for rows in blocks:
+                waves = self._waves(rows)
+                if leg:
+                    leg.collect(rows, waves)
+                if scale != 1.0:
+                    np.multiply(waves, scale, out=waves)
+                self._transform_waves(waves, out[rows])
         for height, transform in self._x_backward.items():
             transform.update_arrays(self._waves(slice(0, height)), self._row_block[:height])
         return out
 
+    def _transform_waves(self, waves: Spectrum, target: Array) -> None:
+        transform = self._x_backward[len(waves)]
+        direct = self._direct(target, transform.output_alignment)
+        result = target if direct else self._row_block[: len(waves)]
+        transform.update_arrays(waves, result)
+        transform.execute()
+        if not direct:
+            target[...] = result[:, : self.slab.nx]
+
     def _waves(self, rows: slice) -> Spectrum:
         """Where the transform along x of these rows is: on one rank at once in its place."""
-        return self._wave_block[: rows.stop - rows.start] if self._transpose else self.spectrum[rows]
+        return self._wave_block[: rows.stop - rows.start] if self._wave_block.size else self.spectrum[rows]
 
     def _direct(self, rows: Array, alignment: int) -> bool:
         """Whether a transform can take these rows of a map as they are."""
@@ -208,22 +217,34 @@ class FFT:
         tally = self.slab.tally
         tally["fft"] += 1
         tally[self._name] += 1
-        if self._transpose:
-            tally["bytes sent"] += self._transpose.sent
+        tally["bytes sent"] += sum(leg.sent for leg, _ in self._legs if leg)
 
     # -- blocks and transforms ----------------------------------------------------------------------------------------
 
-    def _make_blocks(self) -> None:
-        ny_loc, waves, tally = self.slab.shape[0], self.mx // 2 + 1, self.slab.tally
-        several = self._transpose is not None
-        height = _block_height(ny_loc, waves * self.complex.itemsize, self.spectrum.nbytes, several)
-        self._blocks = [slice(start, min(start + height, ny_loc)) for start in range(0, ny_loc, max(height, 1))]
-        self._row_block = allocate((height, self.mx), self.dtype, tally)
-        self._wave_block = allocate((height if several else 0, waves), self.complex, tally)
+    def _make_blocks(self, dealt: list[slice]) -> None:
+        """Blocks of rows, leg by leg of the exchange, and of columns."""
+        slab, ranks, row_bytes = self.slab, self.slab.comm.size, (self.mx // 2 + 1) * self.complex.itemsize
+        heights = [_block_height(part.stop - part.start, row_bytes, self.my, ranks) for part in slab.dealt]
+        count = count_legs(self.my * row_bytes, ranks)
+        legs = [
+            legs_of(part.stop - part.start, height, count) for part, height in zip(slab.dealt, heights, strict=True)
+        ]
+        own, height, waves = legs[slab.comm.rank], heights[slab.comm.rank], self.mx // 2 + 1
+        self._row_block = allocate((height, self.mx), self.dtype, slab.tally)
+        self._wave_block = allocate((height if ranks > 1 else 0, waves), self.complex, slab.tally)
+        wire = allocate((wire_points(own, waves - self.shape[1]),), self.complex, slab.tally)
+        self._legs: list[tuple[Leg | None, list[slice]]] = []
+        for number, leg in enumerate(own):
+            blocks = [slice(j, min(j + height, leg.stop)) for j in range(leg.start, leg.stop, max(height, 1))]
+            rows = [
+                slice(part.start + theirs[number].start, part.start + theirs[number].stop)
+                for part, theirs in zip(slab.dealt, legs, strict=True)
+            ]
+            self._legs.append((Leg(slab, dealt, rows, self.spectrum, wire) if ranks > 1 else None, blocks))
         self._column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
 
     def _make_transforms(self) -> None:
-        heights = {rows.stop - rows.start for rows in self._blocks}
+        heights = {rows.stop - rows.start for _, blocks in self._legs for rows in blocks}
         waves = {height: self._waves(slice(0, height)) for height in heights}
         self._x_forward = {
             height: self._transform(self._row_block[:height], waves[height], axis=1) for height in heights
@@ -241,50 +262,6 @@ class FFT:
         backward = backward or np.isrealobj(target)
         flags = ("FFTW_MEASURE" if self.measured else "FFTW_ESTIMATE", *("FFTW_DESTROY_INPUT",) * backward)
         return pyfftw.FFTW(source, target, (axis,), "FFTW_BACKWARD" if backward else "FFTW_FORWARD", flags)
-
-
-class Transpose:
-    """Between blocks of rows with all x-wavenumbers and the `spectrum` with all rows of this rank's x-wavenumbers.
-
-    Each rank has a parcel for every other one; what it keeps itself never passes through the wire.
-    """
-
-    def __init__(self, slab: Slab, dealt: list[slice], spectrum: Spectrum) -> None:
-        comm, own = slab.comm, slab.comm.rank
-        self._comm, self._dealt = comm, dealt
-        ny_loc, mine = slab.shape[0], spectrum.shape[1]
-        counts = [0 if rank == own else ny_loc * (part.stop - part.start) for rank, part in enumerate(dealt)]
-        starts = [sum(counts[:rank]) for rank in range(comm.size)]
-        wire = allocate((sum(counts),), spectrum.dtype, slab.tally)
-        self._parcels: list[Spectrum] = [
-            wire[start : start + count].reshape(ny_loc, count // max(ny_loc, 1))
-            for start, count in zip(starts, counts, strict=True)
-        ]
-        self._parcels[own] = spectrum[slab.rows]
-        column_counts = [0 if rank == own else mine * (part.stop - part.start) for rank, part in enumerate(slab.dealt)]
-        column_starts = [mine * part.start for part in slab.dealt]
-        kind = MPI.C_DOUBLE_COMPLEX if spectrum.dtype == np.complex128 else MPI.C_FLOAT_COMPLEX
-        self._in_rows = [wire, (counts, starts), kind]
-        self._in_columns = [spectrum, (column_counts, column_starts), kind]
-        self.sent = wire.nbytes
-
-    def post(self, rows: slice, waves: Spectrum) -> None:
-        """Copy a block of rows to its place in the spectrum and to the parcels."""
-        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
-            parcel[rows] = waves[:, columns]
-
-    def to_columns(self) -> None:
-        """Collective. Exchange the parcels."""
-        self._comm.Alltoallv(self._in_rows, self._in_columns)
-
-    def to_rows(self) -> None:
-        """Collective. The reverse of `to_columns`."""
-        self._comm.Alltoallv(self._in_columns, self._in_rows)
-
-    def collect(self, rows: slice, waves: Spectrum) -> None:
-        """The reverse of `post`."""
-        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
-            waves[:, columns] = parcel[rows]
 
 
 @loop

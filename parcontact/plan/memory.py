@@ -98,7 +98,8 @@ def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
     else:
         yield Holding("preconditioner", symbol)
     grids = grids_for(job.grid.dx, job.grid.dy)
-    yield Holding("solver", ContactSolver.footprint(*job.grid.points, precision.itemsize, ranks, rank, grids))
+    numbers = precision.type, job.numerics.tolerance
+    yield Holding("solver", ContactSolver.footprint(*job.grid.points, *numbers, ranks, rank, grids))
     if decisions.spectrum(job).on:
         yield Holding("surface spectrum", waves)
     for maps in _maps(job):
@@ -122,7 +123,8 @@ def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> It
     else:
         yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
     for coarse in coarser_points(*points):
-        yield sum(footprint(coarse, coarse, precision, ranks, rank)) + _map(coarse, precision, ranks, rank)
+        spectrum, blocks, _ = footprint(coarse, coarse, precision, ranks, rank)
+        yield spectrum + blocks + _map(coarse, precision, ranks, rank)
 
 
 def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
@@ -151,9 +153,9 @@ def _transform(
     with_symbol: bool = False,
 ) -> Holding:
     """A transform with its buffers, and the symbol of the operator that alone uses it."""
-    spectrum, sent, blocks = footprint(job.grid.points, lengths, dtype, ranks, rank)
+    spectrum, blocks, sent = footprint(job.grid.points, lengths, dtype, ranks, rank)
     symbol = Convolution.footprint(spectrum, lengths[1]) if with_symbol else 0
-    return Holding(what, spectrum + sent + blocks + symbol, transform_name(lengths, dtype), sent)
+    return Holding(what, spectrum + blocks + symbol, transform_name(lengths, dtype), sent)
 
 
 def _maps(job: Job) -> Iterator[Maps]:

@@ -66,7 +66,7 @@ class _Search:
         """Conjugate gradients on the set, from the last x, to no gap larger than `goal`, with `u = A x` in the end;
         returns their number."""
         solver, slab, x, working = self.solver, self.slab, self.x, self.working
-        w, t, r = solver.lend()
+        w, r, t = solver.lend()
         product = 0.0
         self._restrict(u)
         t.fill(0.0)

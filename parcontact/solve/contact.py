@@ -48,6 +48,7 @@ STEP = 0.95  # beside edges of contact, and 1 far from them
 UNLIKE = 1.25  # times a step: an exact one that is longer, or shorter by as much, is far from it
 PATIENCE = 5  # iterations without a better certificate until steps are exact
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
+LOOSE = 1e-5  # tolerance with which directions may be rounded to single precision
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 NOT_FINITE = "met numbers that are not finite"
@@ -87,8 +88,13 @@ class Contact:
         return not self.failure
 
 
+def _precision_of_directions(dtype: type[np.floating], tolerance: float) -> type[np.floating]:
+    return np.float32 if tolerance >= LOOSE else dtype
+
+
 class ContactSolver:
-    """Loop for contacts on one grid, and the maps that it works in: four, a byte per point, and those of `Surround`.
+    """Loop for contacts on one grid, and the maps that it works in: four, that of the direction in single precision
+    where the tolerance is loose, a byte per point, and those of `Surround`.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
     lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `dtype` of maps;
@@ -111,17 +117,22 @@ class ContactSolver:
         self.dtype = dtype
         self._rounding = UNSEEN_RISE * float(np.finfo(dtype).eps)
         self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
-        self._u, self._w, self._t, self._other = (slab.zeros(dtype) for _ in range(4))
+        self._u, self._w, self._other = (slab.zeros(dtype) for _ in range(3))
+        self._t = slab.zeros(_precision_of_directions(dtype, tolerance))
         self._working = slab.zeros(np.bool_)
         self._surround = Surround(slab, preconditioner, most=grids)
         self._rough_inverse = grids == 0 or min(slab.nx, slab.ny) == 1  # K E is no more than roughly the inverse
         self._local_load = LocalLoad(slab)
 
     @staticmethod
-    def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int, grids: int | None = None) -> int:
+    def footprint(
+        nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, grids: int | None = None
+    ) -> int:
         """Bytes that it holds on a rank."""
-        rows = deal(ny, ranks)[rank]
-        return (4 * itemsize + 1) * (rows.stop - rows.start) * nx + Surround.footprint(nx, ny, ranks, rank, grids)
+        rows, direction = deal(ny, ranks)[rank], np.dtype(_precision_of_directions(dtype, tolerance))
+        return (3 * np.dtype(dtype).itemsize + direction.itemsize + 1) * (
+            rows.stop - rows.start
+        ) * nx + Surround.footprint(nx, ny, ranks, rank, grids)
 
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution
@@ -172,8 +183,9 @@ class ContactSolver:
         return self.operator.apply(p, self._u)
 
     def lend(self) -> tuple[Array, Array, Array]:
-        """Three maps for work between solves: the next solve does not keep what is in them."""
-        return self._w, self._t, self._other
+        """Three maps for work between solves, the last one that of the direction: the next solve does not keep what is
+        in them."""
+        return self._w, self._other, self._t
 
     # -- the steps of a solve; `mean` is the mean pressure asked for, None with a given approach -----------------------
 
@@ -238,7 +250,7 @@ class ContactSolver:
         step = usual if usual is not None else self._exact(slope)
         for halvings in range(MAX_HALVINGS + 1):
             load, cut = self._local_load.advance(old_p, self._t, step, p)
-            if mean is not None and cut:
+            if mean is not None:
                 self._local_load.restore(p, load, mean * self.slab.points, cut > LEAST * load and halvings == 0)
             self._u, self._w = self.operator.apply(p, self._w), self._u
             new = weigh(self.slab, p, self._u, h, old.d)

@@ -1,0 +1,79 @@
+"""The exchange between the passes of a distributed transform: rows with all x-wavenumbers become all rows of some.
+
+It goes in legs, each of some rows of every rank: so what waits to be sent is never more than a part of a map.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mpi import MPI
+from .slab import Slab
+
+Waves = NDArray[np.complexfloating]
+LEGS = 4  # of an exchange, where the rows of a rank have as many times LEG_BYTES
+LEG_BYTES = 1 << 19
+
+
+def count_legs(spectrum_bytes: int, ranks: int) -> int:
+    """How many legs there are for spectra of so many bytes on all ranks together."""
+    return max(1, min(LEGS, spectrum_bytes // ranks // LEG_BYTES)) if ranks > 1 else 1
+
+
+def legs_of(rows: int, height: int, count: int) -> list[slice]:
+    """The rows of one rank in each leg, for blocks of so many rows that stay together."""
+    blocks = -(-rows // max(height, 1))
+    bounds = [min(rows, height * (blocks * leg // count)) for leg in range(count + 1)]
+    return [slice(start, stop) for start, stop in pairwise(bounds)]
+
+
+def wire_points(legs: list[slice], columns: int) -> int:
+    """Wavenumbers in the longest of these legs, of `columns` in each row that belong to other ranks."""
+    return max(leg.stop - leg.start for leg in legs) * columns
+
+
+class Leg:
+    """One leg, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
+
+    Parameters: `dealt`, the x-wavenumbers of each rank; `rows` of each rank, counted in the whole map; the `wire`, in
+    which there is a parcel for every other rank. What a rank keeps itself never passes through the wire.
+    """
+
+    def __init__(self, slab: Slab, dealt: list[slice], rows: list[slice], spectrum: Waves, wire: Waves) -> None:
+        self._comm, self._dealt = slab.comm, dealt
+        own, mine = slab.comm.rank, spectrum.shape[1]
+        self._first, height = rows[own].start - slab.rows.start, rows[own].stop - rows[own].start
+        counts = [0 if rank == own else height * (part.stop - part.start) for rank, part in enumerate(dealt)]
+        starts = [sum(counts[:rank]) for rank in range(slab.comm.size)]
+        self._parcels: list[Waves] = [
+            wire[start : start + count].reshape(height, count // max(height, 1))
+            for start, count in zip(starts, counts, strict=True)
+        ]
+        self._parcels[own] = spectrum[rows[own]]
+        column_counts = [0 if rank == own else mine * (part.stop - part.start) for rank, part in enumerate(rows)]
+        column_starts = [mine * part.start for part in rows]
+        kind = MPI.C_DOUBLE_COMPLEX if spectrum.dtype == np.complex128 else MPI.C_FLOAT_COMPLEX
+        self._in_rows = [wire, (counts, starts), kind]
+        self._in_columns = [spectrum, (column_counts, column_starts), kind]
+        self.sent = sum(counts) * spectrum.itemsize
+
+    def post(self, rows: slice, waves: Waves) -> None:
+        """Copy a block of this rank's rows to its place in the spectrum and to the parcels."""
+        place = slice(rows.start - self._first, rows.stop - self._first)
+        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
+            parcel[place] = waves[:, columns]
+
+    def to_columns(self) -> None:
+        """Collective. Exchange the parcels."""
+        self._comm.Alltoallv(self._in_rows, self._in_columns)
+
+    def to_rows(self) -> None:
+        """Collective. The reverse of `to_columns`."""
+        self._comm.Alltoallv(self._in_columns, self._in_rows)
+
+    def collect(self, rows: slice, waves: Waves) -> None:
+        """The reverse of `post`."""
+        place = slice(rows.start - self._first, rows.stop - self._first)
+        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
+            waves[:, columns] = parcel[place]
