@@ -25,6 +25,7 @@ from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 
 WARM = 12  # first steps of a slide, which are not like the others
+ENDLESS = 1_000_000  # steps: more than anybody asks for; the surface comes round again and again
 SMALL = 0.05  # maps an iteration: loops that pass over less are told together
 MAPS = 12  # that the bandwidth is measured over: about as many as a solve has
 TOLERANCE = 1e-6  # of cold solves
@@ -83,7 +84,7 @@ class Slide:
     """Sliding with twelve branches, by one cell a step."""
 
     def __init__(self, points: int, comm: MPI.Intracomm) -> None:
-        self.march = March(scene.build(sliding_job(points, points), Slab(comm, points, points)))
+        self.march = March(scene.build(sliding_job(points, ENDLESS), Slab(comm, points, points)))
         self._steps = steps_to_make(self.march, self.march.timeline())
 
     def step(self) -> None:

@@ -91,3 +91,11 @@ def test_a_program_that_is_too_slow(peers: ModuleType) -> None:
     assert peers._judge(first, 1e-7).seconds == peers.LIMIT - 120.0
     assert not peers._judge(first, 1e-7).reached
     assert peers._judge([*first[:2], {"began": 400.0}], 1e-7).seconds == 100.0
+
+
+def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
+    """Also past the length of the box, whose surface comes round again."""
+    slide = load_script("bench_scale").Slide(64, MPI.COMM_SELF)
+    for _ in range(66):
+        slide.step()
+    assert slide.march.row.distance == pytest.approx(65 * 1e-3 / 64, rel=1e-12)  # the first step is the jump of the load
