@@ -98,4 +98,4 @@ def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
     slide = load_script("bench_scale").Slide(64, MPI.COMM_SELF)
     for _ in range(66):
         slide.step()
-    assert slide.march.row.distance == pytest.approx(65 * 1e-3 / 64, rel=1e-12)  # the first step is the jump of the load
+    assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load
