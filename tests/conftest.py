@@ -126,11 +126,17 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Under mpirun no test may start another mpirun."""
+    """Under mpirun no test may start another mpirun, and some are for certain numbers of ranks."""
     if WORLD.size > 1:
-        starters = [item for item in items if "outside_mpi" in getattr(item, "fixturenames", ())]
-        config.hook.pytest_deselected(items=starters)
-        items[:] = [item for item in items if item not in starters]
+        passed_over = [item for item in items if "outside_mpi" in getattr(item, "fixturenames", ()) or elsewhere(item)]
+        config.hook.pytest_deselected(items=passed_over)
+        items[:] = [item for item in items if item not in passed_over]
+
+
+def elsewhere(item: pytest.Item) -> bool:
+    """Whether a test is for other numbers of ranks than this one."""
+    mark = item.get_closest_marker("mpi")
+    return mark is not None and bool(mark.args) and WORLD.size not in mark.args
 
 
 @pytest.hookimpl(trylast=True)

@@ -208,7 +208,7 @@ def run(
         return [{key: value for key, value in row.items() if key != "seconds"} for row in csv.DictReader(file)]
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(3)
 def test_a_run_in_pieces_has_the_same_steps(shared_path: Path, comm: MPI.Intracomm) -> None:
     """To the last bit, wherever it was interrupted: in a press, in a slide, in a ramp."""
     whole = run(shared_path, comm, "whole")
@@ -217,7 +217,7 @@ def test_a_run_in_pieces_has_the_same_steps(shared_path: Path, comm: MPI.Intraco
     assert pieces == whole
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(4)
 def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
     """The instants are the same to the last bit, friction to rounding of its largest: at rest it is noise."""
     found: list[list[dict[str, str]]] = []

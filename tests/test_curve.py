@@ -70,7 +70,7 @@ def frictions(shared_path: Path, comm: MPI.Intracomm) -> Callable[..., list[floa
     return run
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 def test_steady_wave_stays_with_error_of_second_order(frictions: Callable[..., list[float]]) -> None:
     """Full contact: the start is the closed form to 1e-9, and a march leaves it by the integrator's error, as dt^2."""
     exact = friction_of_wave(2.0e5, 0.04)
@@ -83,7 +83,7 @@ def test_steady_wave_stays_with_error_of_second_order(frictions: Callable[..., l
     assert 3.6 < errors[1] / errors[2] < 4.4
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 @pytest.mark.parametrize(("text", "bound"), [(ROUGH, 4e-3), (FREE, 1e-2)], ids=["rough", "free sphere"])
 def test_steady_contact_stays(frictions: Callable[..., list[float]], text: str, bound: float) -> None:
     """A march from the steady state of a partial contact stays there, nearer with shorter steps. The bounds are some

@@ -53,7 +53,7 @@ def columns(out: Path, *names: str) -> list[Series]:
     return [np.array(table[name]) for name in names]
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 def test_the_mesh_part_is_the_difference(comm: MPI.Intracomm, shared_path: Path) -> None:
     """Of another run with the same time steps, made here on its own, over 2^p - 1; the other parts are as they were.
 

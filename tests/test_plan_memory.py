@@ -15,7 +15,7 @@ from parcontact.plan.sample import sample
 from parcontact.plan.scaling import Scaling
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2, 3)
 @pytest.mark.parametrize("name", JOBS)
 def test_memory(comm: MPI.Intracomm, name: str) -> None:
     """What each rank holds after a run, and what a checkpoint has in maps, to the byte."""

@@ -19,7 +19,7 @@ from parcontact.plan.scaling import Scaling
 from parcontact.steady_sliding.sliding import SteadySliding
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2, 3)
 @pytest.mark.parametrize("name", ["elastic, static", "viscoelastic", "free, energies"])
 def test_a_short_job_is_tried_whole(comm: MPI.Intracomm, name: str) -> None:
     """Its counts, put together from shares, are those of a run to rounding."""
@@ -124,7 +124,7 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
 CURVE: Json = {"velocities": [1e-3, 1e-2, 0.1, 1.0], "pressures": [1e4, 3e4]}
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2, 3)
 def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None:
     """All of them, in another order: the states and transforms are those of the verb, as each starts from nothing."""
     planned = job(material=TWO, history=[], steady=CURVE)

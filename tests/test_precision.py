@@ -28,7 +28,7 @@ def mean(march: March) -> float:
     return math.fsum(math.fsum(part) for part in slab.from_all(rows)) / slab.points
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(3)
 @pytest.mark.parametrize(("precision", "limit"), [("double", 1e-14), ("mixed", 1e-14), ("single", 1e-7)])
 def test_mean_load(comm: MPI.Intracomm, precision: str, limit: float) -> None:
     """Sums taken row by row lose some ten roundings, whatever the grid and the ranks; at 4096 x 4096 it was 7e-16."""

@@ -62,7 +62,7 @@ def path(shared_path: Path, comm: MPI.Intracomm) -> Path:
     return path
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(4)
 @pytest.mark.parametrize("grid", GRIDS)
 def test_fields_do_not_depend_on_the_ranks(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
     alone = solved(path, MPI.COMM_SELF, *GRIDS[grid])
@@ -77,7 +77,7 @@ def test_fields_do_not_depend_on_the_ranks(path: Path, communicators: list[MPI.I
         assert together.row.measures.contact_area == alone.row.measures.contact_area
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(4)
 @pytest.mark.parametrize("grid", GRIDS)
 def test_measures_agree_within_the_default_tolerance(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
     """Lengths relative to the height of the surface, pressures to the highest."""
@@ -94,7 +94,7 @@ def test_measures_agree_within_the_default_tolerance(path: Path, communicators: 
         assert abs(found.mean_gap - expected.mean_gap) <= 1e-4 * height
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(4)
 @pytest.mark.parametrize("grid", ["even", "odd, free"])
 def test_friction_agrees(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
     """Of rubber that slides, solved to 1e-8 of the surface's height: to 1e-6 of itself, and it is not small."""

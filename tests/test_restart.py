@@ -26,13 +26,10 @@ def cut_anywhere(bench: Bench, data: dict[str, Any]) -> None:
             same(whole, part, total)
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2, 3)
 @pytest.mark.parametrize("name", SCENES)
 def test_cut_anywhere(bench: Bench, name: str) -> None:
-    """k steps, and the other N - k after a restart, equal all N at once; for every k, that of the initial state too.
-    On four ranks a third of the scenes will do."""
-    if bench.comm.size > 3 and name not in list(SCENES)[::3]:
-        pytest.skip("on one, two and three ranks only")
+    """k steps, and the other N - k after a restart, equal all N at once; for every k, that of the initial state too."""
     cut_anywhere(bench, bench.job(name))
 
 
@@ -79,7 +76,7 @@ def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:
             assert read_budget(file) == budget
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(4)
 @pytest.mark.parametrize(("first", "second"), [(2, 3), (3, 1), (1, 4)])
 @pytest.mark.parametrize("name", ["viscoelastic", "free"])
 def test_other_ranks(

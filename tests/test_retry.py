@@ -44,7 +44,7 @@ def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ContactSolver, "solve", refuse)
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2, 3)
 @pytest.mark.usefixtures("moody")
 @pytest.mark.parametrize("name", ["viscoelastic", "free"])
 def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:
@@ -176,7 +176,7 @@ def failed(bench: Bench, history: list[dict[str, Any]], numerics: dict[str, Any]
     return data, out, str(raised.value)
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
     """Of the last good step: what a run to there has; the run goes on from it when the job has been mended."""
     data, out, said = failed(bench, [LIGHT, HEAVY], SINGLE)

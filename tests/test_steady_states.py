@@ -84,7 +84,7 @@ def test_sphere_at_the_ends(shared_path: Path, comm: MPI.Intracomm) -> None:
     assert fast == pytest.approx(7.2 / 300.0, rel=3e-2)
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(4)
 def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
     """To ten times the tolerance of the certificate, 1e-5: each rank count stops elsewhere within it."""
     frictions = [sphere_at(shared_path, comm, 1.0, 64).measures.friction for comm in communicators]

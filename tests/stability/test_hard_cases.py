@@ -17,25 +17,17 @@ NAMES = [case.examine.__name__ for case in CASES]
 BY_NAME = dict(zip(NAMES, CASES, strict=True))
 
 
-@pytest.fixture
-def ranks(comm: MPI.Intracomm) -> MPI.Intracomm:
-    """One to three: more take long on two cores, and show nothing new."""
-    if comm.size > 3:
-        pytest.skip("on one, two and three ranks only")
-    return comm
-
-
-@pytest.mark.mpi
+@pytest.mark.mpi(3)
 @pytest.mark.parametrize("name", NAMES)
-def test_double_precision(ranks: MPI.Intracomm, name: str) -> None:
-    assert examine(BY_NAME[name], ranks).wrong == []
+def test_double_precision(comm: MPI.Intracomm, name: str) -> None:
+    assert examine(BY_NAME[name], comm).wrong == []
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 @pytest.mark.parametrize("precision", ["single", "mixed"])
 @pytest.mark.parametrize("name", NAMES)
-def test_other_precisions(ranks: MPI.Intracomm, precision: str, name: str) -> None:
-    assert examine(BY_NAME[name], ranks, precision).wrong == []
+def test_other_precisions(comm: MPI.Intracomm, precision: str, name: str) -> None:
+    assert examine(BY_NAME[name], comm, precision).wrong == []
 
 
 def test_a_case_that_goes_wrong_is_seen() -> None:
