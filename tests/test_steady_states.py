@@ -16,7 +16,7 @@ from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve import local_load, steady
+from parcontact.solve import projected, steady
 from parcontact.solve.steady import SteadyContact, SteadySolver
 from parcontact.steady_sliding import sliding as steady_sliding
 from parcontact.steady_sliding.sliding import Point, SteadySliding, branch_maps
@@ -209,7 +209,7 @@ def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monk
         "history: [{pressure: 1.0}]\n"
     )
     near_by = sliding(shared_path, text, comm).solve((0.01, 0.0), 1e5)
-    monkeypatch.setattr(local_load, "LEAST", np.inf)
+    monkeypatch.setattr(projected, "LEAST", np.inf)
     everywhere = sliding(shared_path, text, comm).solve((0.01, 0.0), 1e5)
     assert 1.25 * near_by.operator_calls < everywhere.operator_calls
     assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)
