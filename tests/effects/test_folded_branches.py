@@ -187,7 +187,7 @@ def place(comm: MPI.Intracomm, shared_path: Path) -> Place:
     return Place(comm, shared_path)
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(3)
 def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
     """Two pieces are the whole, and no map of a folded branch is in the checkpoint."""
     content = data(numerics={"branch_error": 1e-2})
@@ -199,7 +199,7 @@ def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
     assert [name for name in place.maps(13) if "branch" in name] == ["material/branch 1"]
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(3)
 def test_a_longer_run_wakes_frozen_branches(place: Place) -> None:
     """In twice the time the slow branch is G u no more. Its map is made, and friction is that of a run that always had
     it: within the error allowed, and not the same."""
