@@ -9,7 +9,8 @@ solver: from the `complementarity` C of the certificate (see `solve.contact.Cert
     proportion to it, less where many spots of contact average it out, by the root of the root of their number. Area is
     wrong by the points that penetrate and have no pressure, which the working set of the last iterate counts; and
     somewhat, as C^0.7, where there happen to be none.
-time: from how far the spots of contact pass in a step, and from the embedded pair (see `time_error`).
+time: from how far the spots of contact, or the waves of the surface, pass in a step, and from the embedded pair (see
+    `time_error`).
 folded: the bound of the branches without a map.
 mesh: of friction from the cells per shortest wave of a rough surface, or per radius of a contact spot; of the corrected
     area from the correction itself. Where there is a run on half the mesh, both from their difference to it.

@@ -21,17 +21,20 @@ from . import loops
 from .body import Trial, ZenerBody, coefficients
 
 SAMPLED_ROWS = 8  # at least, of a map with as many: the difference is then within some 5 % of that on all rows
+LEAST_VARIANCE = 1e-6  # of heights, over their mean square: less is rounding, in single precision
 MISSED = 0.5  # of the load, by which that of a sample is off where it does not stand for all rows
 
 
 @dataclass(frozen=True)
 class Look:
-    """The relative difference of the pair; the power of the length of the step with which it grows; and the rms slope
-    along x of the surface under the pressure, in the unit of heights over that of lengths."""
+    """The relative difference of the pair; the power of the length of the step with which it grows; the rms slope along
+    x of the surface under the pressure, in the unit of heights over that of lengths, and over the standard deviation of
+    heights there, the wave number of a wave that is as steep and as high, over the unit of lengths."""
 
     difference: float
     slope: float
     order: float = 2.0
+    wave: float = 0.0
 
 
 class Embedded:
@@ -44,19 +47,23 @@ class Embedded:
     def look(self, dt: float, trial: Trial, pressure: Array, displacement: Array, load: float, share: float) -> Look:
         """At a step just committed: the solver's pressure, whose sum over all ranks is `load`, on a `share` of the
         points, and displacement, `A p/alpha`; one message, or two; collective."""
-        seen, apart, size, slope = self._add(dt, trial, pressure, displacement, self.stride(share))
+        seen, *sums = self._add(dt, trial, pressure, displacement, self.stride(share))
         if abs(self.stride(share) * seen - load) > MISSED * load:
-            seen, apart, size, slope = self._add(dt, trial, pressure, displacement, 1)
+            seen, *sums = self._add(dt, trial, pressure, displacement, 1)
         if seen <= 0.0:
             return Look(0.0, 0.0)
+        apart, size, rise, height, square = sums
+        slope = math.sqrt(rise / seen) / (2.0 * self.dx)
+        variance = square / seen - (height / seen) ** 2
+        wave = slope / math.sqrt(variance) if variance > LEAST_VARIANCE * square / seen else 0.0
         order = self._difference(dt, trial.alpha)[2]
-        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, math.sqrt(slope / seen) / (2.0 * self.dx), order)
+        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, wave)
 
     def look_without_load(self, dt: float, trial: Trial) -> Look:
         """At a step just committed in which nothing presses: the difference over the displacement, both as rms;
         collective."""
         u = self.material.u
-        _, apart, size, _ = self._add(dt, trial, np.ones_like(u), u, self.stride(1.0))
+        _, apart, size, *_ = self._add(dt, trial, np.ones_like(u), u, self.stride(1.0))
         return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._difference(dt, trial.alpha)[2])
 
     def stride(self, share: float) -> int:

@@ -81,13 +81,13 @@ def measure(p, u, h, above, cyclic):
 
 @loop
 def embedded(branches, decay, increment, gain, p, u, heights, offset, first, stride):
-    """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, and of p
-    times the squared difference of the heights on both sides, those of `heights(i - offset)`, cyclic.
+    """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, of p times
+    the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h and of p h^2.
 
     Points without pressure are passed over: each run of those with pressure is looked at for itself.
     """
     count, ny, nx = branches.shape
-    load, apart, size, slope = 0.0, 0.0, 0.0, 0.0
+    load, apart, size, slope, height, square = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     back = (-1 - offset) % nx
     e = np.empty(nx, p.dtype)
     for j in range(first, ny, stride):
@@ -115,7 +115,10 @@ def embedded(branches, decay, increment, gain, p, u, heights, offset, first, str
                 right = left + 2 if left + 2 < nx else (left + 2) % nx
                 rise = heights[j, right] - heights[j, left]
                 slope += p[j, i] * rise * rise
-    return load, apart, size, slope
+                middle = heights[j, left + 1 if left + 1 < nx else 0]
+                height += p[j, i] * middle
+                square += p[j, i] * middle * middle
+    return load, apart, size, slope, height, square
 
 
 @loop

@@ -1,17 +1,23 @@
 """How wrong friction is by the length of a time step, part of the error budget (`budget`), from two looks at it.
 
-The displacement is taken to change evenly within a step. Where contact spots of radius a pass, that is wrong by a share
-of x = (way of the step)/a: friction of a body whose branches are slow, by x^2; where they are faster than the step,
-z = dt/tau > 1, their forces are those in the middle of the step, late by half of it, and friction is wrong by x. With
-the share of friction that each branch makes, w = G omega tau/(1 + (omega tau)^2) at omega = x/dt,
+The displacement is taken to change evenly within a step. Of a harmonic wave, which turns by an angle theta in a step,
+the force of a branch with z = dt/tau is then wrong by theta^2/12 of its loss where the branch is slow, by theta^2/6
+where it is fast, and late by L/2 of a step,
 
-    E = PASSING_FRICTION (1 - A^4) x (<z/(1 + z)> + x/2),      <z/(1 + z)> = sum w z/(1 + z)/sum w,
+    L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
 
-in full contact, A = 1, there are no edges. It knows nothing else of the material or of the speed. Jumps, loads that
-change, creep and full contact are seen by the embedded pair (`embedded`). Together they are 0.7 to 3.4 times the true
-error, over spheres, cylinders and rough surfaces from 0.2 % to full contact, 0.01 to 10 m/s, bodies of one branch and
-of five, spots of 1 to 30 cells and steps of a quarter of a cell to one; the pair alone, of the same 45 slides, 0.08 to
-6.
+In full contact friction is the loss, wrong by theta^2 (1 + <L>)/12, with <L> = sum w L/sum w over the shares of
+friction that branches make, w = G omega tau/(1 + (omega tau)^2). The angle is taken of a wave as steep and as high as
+the surface; as steeper ones weigh more in friction, the error is twice that (FULL_LOSS). Where contact spots of radius
+a pass by x = (way of the step)/a, there are edges, which move with what forces are late by:
+
+    E = PASSING_FRICTION (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
+
+It knows nothing else of the material or of the speed. Jumps, loads that change and creep are seen by the embedded pair
+(`embedded`). Together they are 0.5 to 2.7 times the true error of 36 slides in steps of a cell, a half and a quarter:
+spheres, cylinders and rough surfaces from 0.8 % to full contact, 0.005 to 10 m/s, bodies of one branch, of five and of
+twelve, steady or at three hundred times the speed of before; but for one error of 42 % (0.43). The constants are
+fitted to these; the scenes of `scripts/error_budget.py` are others.
 
 Over one step the pair differs in the second order of the step where all branches are slow, in the first where some are
 as fast as the step is short; the error that all steps of the exponential integrator leave in the end is of an order of
@@ -22,16 +28,21 @@ Backward Euler is of the first order, its error goes with the root of the differ
 more and now by less than none, has a share of the error of friction: less where little is open.
 """
 
+import numpy as np
+
 from .prony import Prony
 from .seen import Known, Seen, radius_of
 
-PASSING_FRICTION = 0.36  # times the share of the radius of a spot that a step is, times what of friction it blurs
+PASSING_FRICTION = 0.66  # times the share of the radius of a spot that a step is, and what forces are late by
+PASSING_LOSS = 0.19  # times that share: by what the loss is wrong
+FULL_LOSS = 1.0 / 6.0  # times the square of the angle by which waves turn in a step: short ones weigh more in friction
+SLOW = 1e-3  # of its relaxation time: a step that is shorter, in which L has no digits left
 EXPONENTIAL_FRICTION = 1.7  # times the difference of the pair
 LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least
 TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
 EQUAL_DIFFERENCE = 0.0072  # of the pair, at which a material of many branches is no worse than one of a single branch
 FULL_POWER = 4  # of the area: so much of the error is as in full contact, where no edges pass
-PAIR_SHARE = 0.5  # of the error that the pair shows, at least, where something slides
+PAIR_SHARE = 0.3  # of the error that the pair shows, at least, where something slides
 FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
 EULER_FRICTION = 1.1  # times its root
 EXPONENTIAL_AREA, EXPONENTIAL_OPEN_POWER = 0.15, 1.0 / 3.0  # of the error of friction, times this power of what is open
@@ -52,20 +63,30 @@ def time_error(known: Known, seen: Seen, points: int) -> float:
     if not seen.slid or known.prony is None:
         return pair
     full = seen.area**FULL_POWER
-    return max((1.0 - full) * _passing(known, known.prony, seen, points), (full + (1.0 - full) * PAIR_SHARE) * pair)
+    sliding = (1.0 - full) * _passing(known, known.prony, seen, points) + full * _turning(known.prony, seen)
+    return max(sliding, (full + (1.0 - full) * PAIR_SHARE) * pair)
 
 
 def _passing(known: Known, prony: Prony, seen: Seen, points: int) -> float:
     """Of friction, as edges of contact pass a point within a step: of a share x of the radius of spots."""
     radius = radius_of(known, seen, points)
     x = seen.slid / radius if radius > 0.0 else 0.0
-    times = prony.relaxation_times
-    turns = x * times / seen.seconds
-    lost = prony.moduli * turns / (1.0 + turns**2)
-    if not (total := float(lost.sum())):
-        return 0.0
-    relaxed = float((lost * seen.seconds / (seen.seconds + times)).sum()) / total
-    return PASSING_FRICTION * x * (relaxed + 0.5 * x)
+    return PASSING_FRICTION * x * (_late(prony, x, seen.seconds) + PASSING_LOSS * x)
+
+
+def _turning(prony: Prony, seen: Seen) -> float:
+    """Of friction in full contact, as waves of the surface turn by an angle within a step."""
+    return FULL_LOSS * seen.angle**2 * (1.0 + _late(prony, seen.angle, seen.seconds))
+
+
+def _late(prony: Prony, angle: float, seconds: float) -> float:
+    """By what share of half a step forces are late, <L>, in the mean over the branches that make friction."""
+    z = seconds / prony.relaxation_times
+    slow = np.maximum(z, SLOW)
+    late = np.where(z > SLOW, 1.0 / np.tanh(0.5 * slow) - 2.0 / slow, z / 6.0)
+    lost = prony.moduli * angle * z / (z**2 + angle**2)
+    total = float(lost.sum())
+    return float((lost * late).sum()) / total if total > 0.0 else 0.0
 
 
 def share_of_area(known: Known, seen: Seen) -> float:
