@@ -88,6 +88,7 @@ class Scene:
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
     lasts: bool
+    keeps_further: bool = False
     followers: dict[str, Effect] = field(default_factory=dict)
 
     @property
@@ -143,7 +144,8 @@ def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -
     material = _material(base, branches)
     solver = _solver(base, job.numerics.tolerance)
     energy = _energy(base, solver, material) if decisions.energies(job).on else None
-    scene = Scene(base, motion, branches, material, solver, base.ledger(), energy, decisions.lasting(job).on)
+    kept = decisions.lasting(job).on, decisions.further_starts(job).on
+    scene = Scene(base, motion, branches, material, solver, base.ledger(), energy, *kept)
     scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
     return scene
 

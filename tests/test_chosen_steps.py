@@ -22,6 +22,10 @@ CELL = 1e-3 / POINTS
 WAVES = {"shape": "wave", "amplitude": 2e-6, "waves": [2, 1]}
 PRESS = {"name": "press", "pressure": 1e4, "duration": 5e-3}
 SLIDE = {"name": "slide", "pressure": 1e4, "velocity": 0.1, "distance": 6.5 * CELL}
+STEADY = {
+    "initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4},
+    "history": [SLIDE],
+}
 LIFT = {"name": "lift", "pressure": {"from": 1e4, "to": 2e3}, "velocity": 0.1, "distance": 3 * CELL}
 
 
@@ -209,11 +213,19 @@ def run(
 
 
 @pytest.mark.mpi(3)
-def test_a_run_in_pieces_has_the_same_steps(shared_path: Path, comm: MPI.Intracomm) -> None:
-    """To the last bit, wherever it was interrupted: in a press, in a slide, in a ramp."""
-    whole = run(shared_path, comm, "whole")
-    for until in (3e-4, 5.6e-3, 7.3e-3, None):
-        pieces = run(shared_path, comm, "pieces", until)
+@pytest.mark.parametrize(
+    ("sections", "stops"),
+    [({}, (3e-4, 5.6e-3, 7.3e-3)), ({**STEADY, "numerics": {"accuracy": 2e-3}}, (3e-4, 5e-4, 1.3e-3))],
+    ids=["press, slide and ramp", "steady slide"],
+)
+def test_a_run_in_pieces_has_the_same_steps(
+    shared_path: Path, comm: MPI.Intracomm, sections: dict[str, Any], stops: tuple[float, ...]
+) -> None:
+    """To the last bit, wherever it was interrupted: in a press, in a slide, in a ramp; in parts of a cell, which start
+    from pressures of some steps ago."""
+    whole = run(shared_path, comm, "whole", **sections)
+    for until in (*stops, None):
+        pieces = run(shared_path, comm, "pieces", until, **sections)
     assert pieces == whole
 
 

@@ -137,6 +137,16 @@ def test_extrapolated_starts() -> None:
     assert [row(planned, "extrapolated starts").on for planned in (single, lasts)] == [False, True]
 
 
+def test_starts_from_whole_cells_ago() -> None:
+    """Off: the pressure before the last is the only earlier one. On: two more, where steps are chosen in a slide."""
+    chosen = {key: value for key, value in SLIDE.items() if key != "cells_per_step"}
+    off, on = (job(history=[stage], material=RUBBER) for stage in (SLIDE, chosen))
+    elastic = job(history=[chosen], material=ELASTIC)
+    assert [row(planned, "starts from whole cells ago").on for planned in (off, on, elastic)] == [False, True, False]
+    assert [len(begun(planned).state.further) for planned in (off, on, elastic)] == [0, 2, 0]
+    assert [len(begun(planned).starts.entries()) for planned in (off, on, elastic)] == [0, 1, 0]
+
+
 def test_rest_cut_short() -> None:
     """Off: every step of the history is made; on: an elastic body at rest needs its jump and one more."""
     dwell = {"pressure": 2e3, "duration": 1e-3}
@@ -187,6 +197,7 @@ TESTED = {
     *(
         "isolated contact",
         "extrapolated starts",
+        "starts from whole cells ago",
         "chosen time steps",
         "rest cut short",
         "steady start",

@@ -3,10 +3,13 @@
 import itertools
 
 import numpy as np
+import pytest
 from marching import SLS, begun, marched
 
 from parcontact.job import Job
 from parcontact.march.rest import steps_to_make
+from parcontact.march.starts import FORGET, NAME
+from parcontact.parallel.slab import Array
 
 CELL = 1e-3 / 32
 WAVES = {"shape": "wave", "amplitude": 2e-6, "waves": [2, 1]}
@@ -29,8 +32,55 @@ def test_half_cells_start_from_a_whole_cell_earlier() -> None:
     march = begun(Job.model_validate({**SCENE, "history": [halves]}))
     for step in itertools.islice(steps_to_make(march, march.timeline()), 5):
         if step.number > 3:
-            start = march._start(step, 2.0).copy()
+            start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
             assert march.state.earlier is not None
             moved = np.roll(march.state.earlier, (1, 1), (0, 1)) * (march.state.alpha_old / 2.0)
             np.testing.assert_array_equal(start, moved)
         march.advance(step)
+
+
+@pytest.mark.parametrize(("parts", "ago"), [(3, 3), (4, 4), (2, 2)])
+def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> None:
+    """Of steps that a stage has chosen, once there are so many: the pressure of then, moved, to the last bit; its
+    modulus is that of the step before."""
+    chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
+    march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
+    given = Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / parts}]}).timeline()
+    pressures = list[Array]()
+    for step in itertools.islice(given, 8):
+        start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
+        if step.number > ago + 2:
+            past = march.state.pasts[ago - 1]
+            np.testing.assert_array_equal(past.pressure, pressures[-ago])
+            np.testing.assert_array_equal(start, np.roll(pressures[-ago], 1, 1) * (past.alpha / 2.0))
+        march.advance(step)
+        pressures.append(march.state.pressure.copy())
+        march.starts._moved = 0.0  # it has learnt nothing
+
+
+def test_kinds_of_starts_are_compared() -> None:
+    """The last two pressures are the start once a pressure of whole cells ago has taken more iterations; after some
+    steps, the other one is tried again, and one that needs next to none is kept."""
+    chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
+    starts = begun(Job.model_validate({**SCENE, "history": [chosen]})).starts
+
+    def kinds(moved: int, extrapolated: int) -> str:
+        found = ""
+        for _ in range(40):
+            starts._has_choice, starts._is_moved = True, starts._moves
+            found += "em"[starts._moves]
+            starts.learn(moved if starts._is_moved else extrapolated)
+        return found
+
+    assert kinds(1, 3) == 40 * "m"
+    first = kinds(8, 2)
+    assert first.startswith("m" + 16 * "e" + "m" + 16 * "e" + "m")
+    starts._has_choice = False
+    for _ in range(FORGET):
+        starts.learn(9)
+    assert np.asarray(starts.entries()[NAME].value).tolist()[:2] == [0.0, 1.0]
+    preferred = []
+    for numbers in ([3.0, 2.0, 5.0], [3.0, 4.0, 5.0]):
+        starts.restore({NAME: np.array(numbers)})
+        preferred.append(starts.prefers_moved)
+    assert preferred == [False, True]

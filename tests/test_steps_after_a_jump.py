@@ -68,15 +68,17 @@ def test_steps_double_at_most() -> None:
 
 
 def test_lengths_of_steps() -> None:
-    """Whole cells in powers of two; then every part of one, and four to each factor of two below an eighth."""
+    """Whole cells in powers of two; then every part of one, and four to each factor of two below an eighth; two fifths
+    where it does not matter when the next whole cell comes."""
     parts = sorted({round(1.0 / cells_per_step(1.0 / most), 9) for most in np.arange(1.0, 40.0, 0.25)})
     assert parts == [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40]
     assert [cells_per_step(most) for most in (1.0, 1.9, 2.0, 3.9, 4.0)] == [1, 1, 2, 2, 4]
+    assert [cells_per_step(most, whole_soon=False) for most in (1.0, 0.5, 0.45, 0.4, 0.39)] == [1, 0.5, 0.4, 0.4, 1 / 3]
     assert all(cells_per_step(1.0 / most) <= (1.0 + 1e-5) / most for most in np.arange(1.0, 100.0, 0.3))
 
 
 def test_a_jump_of_velocity_needs_one_stage() -> None:
-    """`jobs/velocity_step.yaml` on a coarse grid: the highest friction at 5 % is within 1 % of that at 0.3 %; the first
+    """`jobs/velocity_step.yaml` on a coarse grid: the highest friction at 5 % is within 2 % of that at 0.3 %; the first
     steps after the jump are far shorter than a cell."""
     small = ("grid.points=64", "surface.0.short_wavelength=1.25e-4", "history.1.distance=3.0e-5", "output.fields=[]")
     peaks = []
@@ -85,4 +87,4 @@ def test_a_jump_of_velocity_needs_one_stage() -> None:
         peaks.append(column(rows[1:], "friction").max())
         jump = march.timeline().spans[1].before
         assert rows[jump + 1].distance - rows[jump].distance < 0.05 * 1e-3 / 64
-    assert peaks[0] == pytest.approx(peaks[1], rel=1e-2)
+    assert peaks[0] == pytest.approx(peaks[1], rel=2e-2)

@@ -57,6 +57,14 @@ def lasting(job: Job) -> Decision:
     return Decision("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
 
 
+def further_starts(job: Job) -> Decision:
+    """The two pressures before that: with thirds and quarters of a cell the next one starts from a whole cell ago."""
+    timeline = job.timeline()
+    on = timeline.chooses and any(span.moves and span.stage.chooses for span in timeline.spans)
+    why = "the surface slides in steps that are chosen" if on else "the surface slides in no steps that are chosen"
+    return Decision("starts from whole cells ago", on, why)
+
+
 def chosen_steps(job: Job) -> Decision:
     """Time steps that follow the error of the last one (`march.choosing`)."""
     why = job.about_steps
@@ -159,6 +167,7 @@ TABLE: tuple[Callable[[Job], Decision], ...] = (
         sliding,
         part_cells,
         lasting,
+        further_starts,
         chosen_steps,
         short_rest,
         steady_start,

@@ -6,13 +6,15 @@ next is
 
     dt <- dt clip(SAFETY (E0/E)^(1/p), MOST_SHRINK, MOST_GROWTH),
 
-and a step with E > REJECTED E0 is made anew from the same state, shorter; the one after it does not grow (E. Hairer,
-S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993), II.4). At rest steps are a shortest one
-times powers of the fourth root of two, so that rounding has no part in their length.
+and a step with E > REJECTED E0 is made anew from the same state, as much shorter as E is too large; the one after it
+does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993), II.4). At rest
+steps are a shortest one times powers of the fourth root of two, so that rounding has no part in their length.
 
 While the surface slides, steps end at multiples of their length, counted in cells from where the surface was at first
 (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump,
-parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a transform.
+parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a transform. Halves,
+thirds and quarters start from the pressure of a whole cell ago; where such starts are no better than others, there are
+steps of two fifths, too (`starts`).
 """
 
 import math
@@ -24,12 +26,14 @@ from ..job.timeline import Span, Step
 from ..physics.body import ZenerBody
 from ..physics.time_error import TIME_ORDER
 from ..scene import Scene
+from .starts import Starts
 
-TIME_SHARE = 0.85  # of numerics.accuracy, for the error of a step
-SAFETY = 0.95
-REJECTED = 1.2  # times the error allowed: the error of a slide varies from step to step, and its mean counts
+TIME_SHARE = 0.8  # of numerics.accuracy, for the error of a step
+SAFETY = 0.98
+REJECTED = 1.19  # times the error allowed: the error of a slide varies from step to step, and its mean counts
 MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0
 LEVELS = 2  # the power of two of lengths, of steps below a quarter of a cell, per factor of two
+BETWEEN = 2.5  # steps per cell, of those that start no better at whole cells
 REST_LEVELS = 4  # the same at rest
 LEAST_WAY = 0.35  # of a step that ends at a multiple of its length
 STRETCH = 1.1  # of the last step of a stage: no step shorter than a tenth of the one before is left over
@@ -37,11 +41,14 @@ RELAXING = 0.1  # of the shortest relaxation time: the first step at rest after 
 SAME_LEVEL = 1e-6  # of a level
 
 
-def cells_per_step(most: float) -> float:
-    """The longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of one."""
+def cells_per_step(most: float, whole_soon: bool = True) -> float:
+    """The longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of one; two
+    fifths, too, where it need not be at whole cells soon."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
     count = (1.0 - SAME_LEVEL) / most
+    if not whole_soon and 2.0 < count <= BETWEEN:
+        return 1.0 / BETWEEN
     unit = max(1, 2 ** (math.floor(math.log2(count)) - LEVELS))
     return 1.0 / (math.ceil(count / unit) * unit)
 
@@ -50,11 +57,13 @@ def cells_per_step(most: float) -> float:
 class StepChooser:
     """Proposes the steps of stages that choose their own, and judges them when they have been tried.
 
-    `allowed` is the error of a step; `order` p; `shortest` the shortest relaxation time that is resolved [s].
+    `allowed` is the error of a step; `order` p; `starts` knows whether pressures of whole cells ago are good ones;
+    `shortest` is the shortest relaxation time that is resolved [s].
     """
 
     scene: Scene
     chosen: ChosenSteps
+    starts: Starts
 
     def __post_init__(self) -> None:
         numerics, material = self.scene.job.numerics, self.scene.material
@@ -78,9 +87,11 @@ class StepChooser:
         """The shorter step to make instead of one with such an error, or None: then it counts as made."""
         ratio = error / self.allowed
         wanted = SAFETY * ratio ** (-1.0 / self.order) if ratio > 0.0 else MOST_GROWTH
-        if ratio > REJECTED and (shorter := self._shorter(span, step, min(max(wanted, MOST_SHRINK), 1.0))):
-            self._rejected = True
-            return shorter
+        if ratio > REJECTED:
+            share = max((REJECTED / ratio) ** (1.0 / self.order), MOST_SHRINK)
+            if shorter := self._shorter(span, step, share):
+                self._rejected = True
+                return shorter
         most = 1.0 if self._rejected else MOST_GROWTH
         self.chosen.next = self._level(span, step.dt * min(max(wanted, 1.0), most))
         self.chosen.ends.setdefault(span.index, []).append(self._end)
@@ -111,7 +122,7 @@ class StepChooser:
             return min(max(dt, limits.least), limits.most)
         if span.stage.speed:
             cell = one_cell(span.stage, self.scene.job.grid)
-            return min(cell * cells_per_step(dt / cell), limits.most)
+            return min(cell * cells_per_step(dt / cell, self.starts.prefers_moved), limits.most)
         power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
         return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
 

@@ -31,7 +31,7 @@ def steps_to_make(march: March, timeline: Timeline, until: float | None = None) 
     What is decided follows from the state of the march, and so is the same after a restart.
     """
     stop = len(timeline) if until is None else timeline.first_reaching(until)
-    chooser = StepChooser(march.scene, march.chosen) if march.chosen is not None else None
+    chooser = StepChooser(march.scene, march.chosen, march.starts) if march.chosen is not None else None
     while (number := march.row.step + 1) <= len(timeline):
         span = timeline.span(number)
         if chooser is not None and span.stage.chooses and span.place(number) > 0:

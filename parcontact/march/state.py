@@ -1,7 +1,7 @@
 """All that one step of a run hands to the next, and checkpoints of it: what goes into them, and how a run goes on."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,18 @@ from ..record.checkpoint import Contents, read
 from ..record.row import Row
 from ..scene import Scene
 
+FURTHER = 2  # pressures before the earlier one that are kept for starts, of three and of four steps ago
+MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these
+
+
+class Past(NamedTuple):
+    """The pressure after a step: a map of p with the pressure `alpha p`, and where the surface was [m]; with an alpha
+    of 0 none is known."""
+
+    pressure: Array
+    alpha: float = 0.0
+    position: tuple[float, float] = (0.0, 0.0)
+
 
 @dataclass(frozen=True)
 class State:
@@ -21,7 +33,8 @@ class State:
 
     `pressure` is a map of p with the pressure `alpha p`, `earlier` the one before it (no history of single solves keeps
     one), `alpha` and `alpha_old` the moduli of the two steps; `approach` d of the body, all in the run's units.
-    `position` [m] is by how much the surface has moved, `position_old` by how much it had with the earlier pressure.
+    `position` [m] is by how much the surface has moved, `position_old` by how much it had with the earlier pressure;
+    `further` are those before that, the newest first, where they are kept.
     """
 
     row: Row
@@ -32,11 +45,21 @@ class State:
     approach: float = 0.0
     position: tuple[float, float] = (0.0, 0.0)
     position_old: tuple[float, float] = (0.0, 0.0)
+    further: tuple[Past, ...] = ()
 
     @staticmethod
-    def count_maps(lasts: bool) -> MapCount:
-        """Of the states before and after a step, which share the earlier pressure; there is one if stages last."""
-        return MapCount(held=2 + lasts, saved=1 + lasts)
+    def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
+        """Of the states before and after a step, which share the earlier pressures; there is one if stages last."""
+        earlier = lasts + FURTHER * keeps_further
+        return MapCount(held=2 + earlier, saved=1 + earlier)
+
+    @property
+    def pasts(self) -> tuple[Past, ...]:
+        """All pressures, the newest first."""
+        last = Past(self.pressure, self.alpha, self.position)
+        if self.earlier is None:
+            return (last,)
+        return last, Past(self.earlier, self.alpha_old, self.position_old), *self.further
 
     def entries(self, units: Units) -> dict[str, Entry]:
         """What a checkpoint has of it; step and time it says itself."""
@@ -57,7 +80,29 @@ class State:
             "contact/earlier modulus": Entry(self.alpha_old, units.modulus, "Pa"),
             "contact/approach": Entry(self.approach, units.height, "m"),
             **earlier,
+            **self._further_entries(units),
         }
+
+    def _further_entries(self, units: Units) -> dict[str, Entry]:
+        """Those of the further pressures."""
+        if not self.further:
+            return {}
+        maps = {
+            _name(k): Entry(p.pressure, units.height / units.length, optional=True) for k, p in enumerate(self.further)
+        }
+        return {
+            **maps,
+            MODULI: Entry(np.array([past.alpha for past in self.further]), units.modulus, "Pa", optional=True),
+            POSITIONS: Entry(np.array([past.position for past in self.further]).ravel(), 1.0, "m", optional=True),
+        }
+
+    def _further_restored(self, saved: Saved) -> tuple[Past, ...]:
+        """The further pressures of a checkpoint, none of them known where it has none."""
+        if MODULI not in saved:
+            return tuple(Past(past.pressure) for past in self.further)
+        places = np.reshape(saved[POSITIONS], (-1, 2)).tolist()
+        known = zip(self.further, saved[MODULI].tolist(), places, strict=True)
+        return tuple(Past(past.pressure, alpha, (x, y)) for past, alpha, (x, y) in known)
 
     def restored(self, saved: Saved, row: Row) -> "State":
         """The state that a checkpoint has, whose maps have been read into those of this one."""
@@ -68,7 +113,13 @@ class State:
         x, y = saved["clock/position"].tolist()
         old_x, old_y = saved.get("clock/earlier position", saved["clock/position"]).tolist()
         row = replace(row, distance=distance)
-        return State(row, self.pressure, self.earlier, alpha, alpha_old, approach, (x, y), (old_x, old_y))
+        further = self._further_restored(saved)
+        return State(row, self.pressure, self.earlier, alpha, alpha_old, approach, (x, y), (old_x, old_y), further)
+
+
+def _name(index: int) -> str:
+    """In a checkpoint, of a further pressure."""
+    return f"contact/pressure {index + 3} steps ago"
 
 
 def entries(scene: Scene, state: State) -> dict[str, Entry]:

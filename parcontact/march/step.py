@@ -10,14 +10,11 @@ import numpy as np
 from ..effects.effect import Instant
 from ..job.chosen import SYMBOLS
 from ..job.timeline import Step, Timeline
-from ..parallel import rows
 from ..parallel.slab import Array
-from ..physics import loops
 from ..physics.body import Trial, ZenerBody
 from ..physics.energy import Pressed
 from ..physics.entries import Entry
 from ..physics.measures import Measures
-from ..physics.motion import are_whole, cells_between
 from ..record.checkpoint import Contents
 from ..record.row import Row
 from ..scene import Scene, solver_on
@@ -26,7 +23,8 @@ from ..solve.contact import Approach, Contact, MeanPressure
 from . import failure, state
 from .errors import Errors, Estimate
 from .failure import StepError
-from .state import State
+from .starts import Starts
+from .state import FURTHER, Past, State
 
 FULL_CONTACT_ROUNDING = 1e-14  # relative to lengths whose sum is compared with 0
 
@@ -42,9 +40,11 @@ class March:
         self.scene = scene
         slab, dtype = scene.slab, scene.solver.dtype
         earlier = slab.zeros(dtype) if scene.lasts else None
-        self.state = State(self._complete(Row()), slab.zeros(dtype), earlier)
+        further = tuple(Past(slab.zeros(dtype)) for _ in range(FURTHER * scene.keeps_further))
+        self.state = State(self._complete(Row()), slab.zeros(dtype), earlier, further=further)
         self._next_pressure = slab.zeros(dtype)
         self._errors = Errors(scene)
+        self.starts = Starts(scene)
         self._elastic_displacement: Array | None = None  # of the solver: until its next solve
         self.chosen = scene.job.chosen_steps() if scene.job.timeline().chooses else None
 
@@ -88,9 +88,10 @@ class March:
             remark=remark,
             errors=errors.budget,
         )
-        earlier = None if old.earlier is None else old.pressure
-        self.state = State(row, contact.p, earlier, trial.alpha, old.alpha, contact.d, step.position, old.position)
-        self._next_pressure = old.pressure if old.earlier is None else old.earlier
+        self.starts.learn(contact.iterations)
+        earlier, further, self._next_pressure = _shifted(old)
+        here, there = step.position, old.position
+        self.state = State(row, contact.p, earlier, trial.alpha, old.alpha, contact.d, here, there, further)
         if scene.followers:
             instant = Instant(step, contact.p, trial.alpha, self._displacement(), slid, measures)
             for follower in scene.followers.values():
@@ -100,12 +101,14 @@ class March:
 
     def entries(self) -> dict[str, Entry]:
         """Everything remembered after the last step, by names `part/name`; maps are the run's own, not copies."""
-        return {**state.entries(self.scene, self.state), **self._chosen_entries(), **self._errors.entries()}
+        own = {**self._chosen_entries(), **self._errors.entries(), **self.starts.entries()}
+        return {**state.entries(self.scene, self.state), **own}
 
     def restore(self, contents: Contents) -> None:
         """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
         restored = state.restore(self.scene, self.state, contents)
         self._errors.restore(contents.numbers)
+        self.starts.restore(contents.numbers)
         if self.chosen is not None:
             self.chosen = self.scene.job.chosen_steps(contents.numbers)
         self.begin_with(replace(restored, row=self._complete(restored.row)))
@@ -115,7 +118,8 @@ class March:
         self.state.pressure[...] = begun.pressure
         if self.state.earlier is not None:
             self.state.earlier[...] = begun.pressure if begun.earlier is None else begun.earlier
-        self.state = replace(begun, pressure=self.state.pressure, earlier=self.state.earlier)
+        further = begun.further or tuple(Past(past.pressure) for past in self.state.further)
+        self.state = replace(begun, pressure=self.state.pressure, earlier=self.state.earlier, further=further)
         self._elastic_displacement = None
 
     # -- the parts of a step ------------------------------------------------------------------------------------------
@@ -162,7 +166,8 @@ class March:
 
     def _solve(self, step: Step, trial: Trial) -> tuple[Contact, str]:
         """The contact of a step, and what was unusual about it; collective. Raises StepError."""
-        control, start = self._control(step, trial), self._start(step, trial.alpha)
+        control = self._control(step, trial)
+        start = self.starts.make(step, self.state, trial.alpha, self._next_pressure)
         self._elastic_displacement = None
         if self.state.alpha == 0.0:  # nothing has been solved before
             cold.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
@@ -172,37 +177,6 @@ class March:
         if step.passed:
             remark = "; ".join(filter(None, (remark, self._passed(step))))
         return contact, remark
-
-    def _start(self, step: Step, alpha: float) -> Array:
-        """The start of the next solve: the last pressure, moved with the surface by whole cells and extrapolated.
-
-        Where the surface is whole cells from where it was one step earlier, but not from where it was last, as with
-        halves of cells, the earlier pressure is moved: it needs no rounding.
-        """
-        old, start, slab = self.state, self._next_pressure, self.scene.slab
-        if old.earlier is None:
-            start[...] = old.pressure
-            return start
-        cells, since_earlier = self._cells(step, old.position), self._cells(step, old.position_old)
-        now, before = (1.0 + step.growth) * old.alpha / alpha, step.growth * old.alpha_old / alpha
-        newest, older = old.pressure, old.earlier
-        if before > 0.0 and are_whole(since_earlier) and not are_whole(cells):
-            newest, cells, now, before = old.earlier, since_earlier, old.alpha_old / alpha, 0.0
-        along_x, along_y = (
-            round(moved) % count  # a step may pass more boxes than a machine's whole numbers reach
-            for moved, count in zip(cells, self.scene.job.grid.points, strict=True)
-        )
-        if along_y and before > 0.0:
-            older = rows.roll(slab, old.earlier, along_y, start)
-        loops.travel(newest, older, now, before, along_x, start)
-        if along_y:
-            start[...] = rows.roll(slab, start, along_y, self.scene.solver.lend()[0])
-        return start
-
-    def _cells(self, step: Step, since: tuple[float, float]) -> tuple[float, float]:
-        """By how many cells the surface moves from a position [m] to the end of a step, along x and y."""
-        grid = self.scene.job.grid
-        return cells_between(since, step.position, (grid.dx, grid.dy))
 
     def _control(self, step: Step, trial: Trial) -> MeanPressure | Approach:
         scene, grid = self.scene, self.scene.job.grid
@@ -238,7 +212,7 @@ class March:
         scene = self.scene
         contact, tried = retry.again(scene.solver, effective, control, failed, partial(solver_on, scene.frame))
         if contact.failure:
-            moved = math.hypot(*self._cells(step, self.state.position))
+            moved = math.hypot(*self.starts.cells(step, self.state.position))
             raise failure.of_solve(scene, step, failed, contact, tried, effective, moved)
         what = f"{failure.where(scene, step)}: the contact solve {failed.failure}"
         return contact, f"{what}; solved when retried with {', with '.join(tried)}"
@@ -293,3 +267,11 @@ class March:
         if name == "height":
             return heights * units.height + scene.frame.surface.datum
         return (u - heights - self.state.approach) * units.height
+
+
+def _shifted(old: State) -> tuple[Array | None, tuple[Past, ...], Array]:
+    """The earlier and the further pressures after a step, and the map that is free for the next one."""
+    if old.earlier is None:
+        return None, (), old.pressure
+    *kept, oldest = old.pasts[1:]
+    return old.pressure, tuple(kept), oldest.pressure

@@ -162,7 +162,7 @@ def _maps(job: Job) -> Iterator[Maps]:
     """Of everything that holds whole maps, or has them in checkpoints."""
     precision = np.dtype(job.numerics.map_type)
     yield Maps("heights", MapCount(1), precision)
-    yield Maps("pressures", State.count_maps(decisions.lasting(job).on), precision)
+    yield Maps("pressures", State.count_maps(decisions.lasting(job).on, decisions.further_starts(job).on), precision)
     if relaxation.decide(job).on:
         yield Maps("branches", ZenerBody.count_maps(len(fold_branches_of(job).kept)), precision)
     else:
