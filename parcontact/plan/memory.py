@@ -112,7 +112,7 @@ def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> It
     even = not job.initial.velocity[1]
     finest = _transform("", job, points, precision, ranks, rank).bytes
     spectrum, *_ = footprint(points, points, precision, ranks, rank)
-    yield SteadySolver.footprint(*points, precision.itemsize, ranks, rank, sets)
+    yield SteadySolver.footprint(*points, precision.type, job.numerics.tolerance, ranks, rank, sets)
     yield 2 * _map(points, precision, ranks, rank)  # the heights and the start
     yield finest + waves
     yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)

@@ -40,6 +40,7 @@ from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
 from .local_load import LEAST, LocalLoad
 from .operator import Operator
+from .precision import precision_of_directions
 from .surround import Surround
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
@@ -48,7 +49,6 @@ STEP = 0.95  # beside edges of contact, and 1 far from them
 UNLIKE = 1.25  # times a step: an exact one that is longer, or shorter by as much, is far from it
 PATIENCE = 5  # iterations without a better certificate until steps are exact
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
-LOOSE = 1e-5  # tolerance with which directions may be rounded to single precision
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
 UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
 NOT_FINITE = "met numbers that are not finite"
@@ -88,10 +88,6 @@ class Contact:
         return not self.failure
 
 
-def _precision_of_directions(dtype: type[np.floating], tolerance: float) -> type[np.floating]:
-    return np.float32 if tolerance >= LOOSE else dtype
-
-
 class ContactSolver:
     """Loop for contacts on one grid, and the maps that it works in: four, that of the direction in single precision
     where the tolerance is loose, a byte per point, and those of `Surround`.
@@ -118,7 +114,7 @@ class ContactSolver:
         self._rounding = UNSEEN_RISE * float(np.finfo(dtype).eps)
         self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
         self._u, self._w, self._other = (slab.zeros(dtype) for _ in range(3))
-        self._t = slab.zeros(_precision_of_directions(dtype, tolerance))
+        self._t = slab.zeros(precision_of_directions(dtype, tolerance))
         self._working = slab.zeros(np.bool_)
         self._surround = Surround(slab, preconditioner, most=grids)
         self._rough_inverse = grids == 0 or min(slab.nx, slab.ny) == 1  # K E is no more than roughly the inverse
@@ -129,7 +125,7 @@ class ContactSolver:
         nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, grids: int | None = None
     ) -> int:
         """Bytes that it holds on a rank."""
-        rows, direction = deal(ny, ranks)[rank], np.dtype(_precision_of_directions(dtype, tolerance))
+        rows, direction = deal(ny, ranks)[rank], np.dtype(precision_of_directions(dtype, tolerance))
         return (3 * np.dtype(dtype).itemsize + direction.itemsize + 1) * (
             rows.stop - rows.start
         ) * nx + Surround.footprint(nx, ny, ranks, rank, grids)

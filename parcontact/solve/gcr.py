@@ -18,7 +18,8 @@ from .operator import Operator
 
 
 class Directions:
-    """Up to `count` directions t and their images A t: in the maps of `lent`, pairs of them, then in maps of their own.
+    """Up to `count` directions t and their images A t: in the maps of `lent`, pairs of them, then in maps of their own,
+    of the type `kept`.
 
     These, and that of the residual, are made when they are needed for the first time.
     """
@@ -30,10 +31,11 @@ class Directions:
         preconditioner: Operator,
         count: int,
         dtype: type,
+        kept: type,
         lent: Sequence[tuple[Array, Array]] = (),
     ) -> None:
         self.slab, self.operator, self.preconditioner, self.count = slab, operator, preconditioner, count
-        self.dtype, self._pairs = dtype, list(lent)
+        self.dtype, self.kept, self._pairs = dtype, kept, list(lent)
         self._r: Array | None = None
 
     def _residual(self) -> Array:
@@ -43,7 +45,7 @@ class Directions:
 
     def _pair(self, number: int) -> tuple[Array, Array]:
         if number == len(self._pairs):
-            self._pairs.append((self.slab.empty(self.dtype), self.slab.empty(self.dtype)))
+            self._pairs.append((self.slab.empty(self.kept), self.slab.empty(self.kept)))
         return self._pairs[number]
 
     def improve(self, x: Array, u: Array, h: Array, working: NDArray[np.bool_], limit: int, reduction: float) -> int:

@@ -28,6 +28,7 @@ from .certificate import Certificate
 from .gcr import Directions, gaps_on
 from .iterate import certify, weigh
 from .operator import Operator
+from .precision import precision_of_directions
 from .projected import DIRECTIONS, Projected, surround_on
 from .surround import Surround
 
@@ -63,7 +64,8 @@ class SteadyContact:
 
 class SteadySolver:
     """Loop on one grid, and the maps that it works in: seven, a byte per point, and those of `Surround`; where the
-    active set goes on, one more and two for each linear step on a set beyond the third.
+    active set goes on, one more and two for each linear step on a set beyond the third, in single precision where the
+    tolerance is loose.
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate; `max_steps` of the linear solves in all; `directions` kept in each; whether residuals are carried on in
@@ -85,18 +87,22 @@ class SteadySolver:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self._projected = Projected(slab, operator, preconditioner, dtype, narrow)
-        self._linear = Directions(slab, operator, preconditioner, directions, dtype, self._projected.lend())
+        kept = precision_of_directions(dtype, tolerance)
+        self._linear = Directions(slab, operator, preconditioner, directions, dtype, kept, self._projected.lend())
         self._u = slab.zeros(dtype)
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
 
     @staticmethod
-    def footprint(nx: int, ny: int, itemsize: int, ranks: int, rank: int, sets: bool = False) -> int:
+    def footprint(
+        nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, sets: bool = False
+    ) -> int:
         """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
-        rows = deal(ny, ranks)[rank]
-        maps = 1 + 2 * DIRECTIONS + sets * (1 + 2 * (MAX_DIRECTIONS - DIRECTIONS))
+        rows, kept = deal(ny, ranks)[rank], precision_of_directions(dtype, tolerance)
+        bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * np.dtype(dtype).itemsize + 1
+        bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
         surround = Surround.footprint(nx, ny, ranks, rank, surround_on(nx, ny)[0])
-        return (maps * itemsize + 1) * (rows.stop - rows.start) * nx + surround
+        return bytes_of_maps * (rows.stop - rows.start) * nx + surround
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution

@@ -23,13 +23,17 @@ class Identity:
 
 
 @pytest.mark.mpi
-def test_maps_are_made_when_they_are_needed(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-5])
+def test_maps_are_made_when_they_are_needed(
+    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, tolerance: float
+) -> None:
     """Projected steps need few; with none of those allowed, an active set that uses all of its directions follows."""
     slab = Slab(comm, NX, NY)
     operator = HalfSpace(SIZE).operator(FFT(slab))
     before = slab.tally["map bytes"]
-    solver = SteadySolver(slab, operator, Identity(), 1.0, 1e-8, 1000)
-    few, most = (SteadySolver.footprint(NX, NY, 8, comm.size, comm.rank, sets) for sets in (False, True))
+    solver = SteadySolver(slab, operator, Identity(), 1.0, tolerance, 1000)
+    numbers = NX, NY, np.float64, tolerance, comm.size, comm.rank
+    few, most = (SteadySolver.footprint(*numbers, sets) for sets in (False, True))
 
     def held() -> int:
         return slab.tally["map bytes"] - before
@@ -40,6 +44,7 @@ def test_maps_are_made_when_they_are_needed(comm: MPI.Intracomm, monkeypatch: py
     assert solver.solve(h, 1.0, start).sets == 0
     assert held() == few
     monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 0)
+    monkeypatch.setattr(steady, "WAYS", ((3, 1e-9),))
     start.fill(0.0)
     contact = solver.solve(h, 1.0, start)
     assert contact.steps >= steady.MAX_DIRECTIONS

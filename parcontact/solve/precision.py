@@ -1,0 +1,14 @@
+"""In what precision solvers keep search directions, which are as good when they are rounded.
+
+Whatever a direction is, the step along it is right, and so is the image of what comes out, which is made anew. Only
+where hardly more digits are asked for than single precision has, rounding costs further steps.
+"""
+
+import numpy as np
+
+LOOSE = 1e-5  # tolerance on a certificate with which they are in single precision
+
+
+def precision_of_directions(dtype: type[np.floating], tolerance: float) -> type[np.floating]:
+    """The type of their maps beside others of the type `dtype`."""
+    return np.float32 if tolerance >= LOOSE else dtype
