@@ -1,10 +1,12 @@
 """Which settings a run may change when it goes on, and which are refused."""
 
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from mpi4py import MPI
 from restarting import ELASTIC, FASTER, PRESS, ROUGH, SLIDE, TOUCH, Bench, cut, part_way, rows
 
 from parcontact.errors import InputError
@@ -33,10 +35,17 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 ]
 
 
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Bench, Path]:
+    """A run that was stopped after its sixth step, and where it is."""
+    bench = Bench(MPI.COMM_SELF, tmp_path_factory.mktemp("stopped"))
+    return bench, part_way(bench, bench.job("viscoelastic"))
+
+
 @pytest.mark.parametrize(("changes", "message"), REFUSED)
-def test_refused(bench: Bench, changes: dict[str, Any], message: str) -> None:
+def test_refused(stopped: tuple[Bench, Path], changes: dict[str, Any], message: str) -> None:
     """Another problem, or another past: both values are shown, and nothing is written."""
-    out = part_way(bench, bench.job("viscoelastic"))
+    bench, out = stopped
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with pytest.raises(InputError) as raised:
         bench.run(bench.job("viscoelastic", **changes), out)

@@ -200,18 +200,18 @@ def test_a_narrow_neighbourhood_is_the_last_resort(
 
 
 def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes two fifths
-    more calls here. Friction agrees to 1e-3, what it is wrong by as a rule where certificates are 5e-3."""
+    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes more
+    than twice the calls here, and more at lower speeds. Friction agrees to 1e-3, what it is wrong by as a rule where certificates are 5e-3."""
     text = (
-        "grid: {points: 512, size: 1.0e-3}\n"
-        "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 3.125e-5, rms_slope: 0.02}\n"
+        "grid: {points: 256, size: 1.0e-3}\n"
+        "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 6.25e-5, rms_slope: 0.02}\n"
         "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-3}]}\n"
         "history: [{pressure: 1.0}]\n"
     )
-    near_by = sliding(shared_path, text, comm).solve((0.01, 0.0), 1e5)
+    near_by = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
     monkeypatch.setattr(projected, "LEAST", np.inf)
-    everywhere = sliding(shared_path, text, comm).solve((0.01, 0.0), 1e5)
-    assert 1.25 * near_by.operator_calls < everywhere.operator_calls
+    everywhere = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
+    assert 2.0 * near_by.operator_calls < everywhere.operator_calls
     assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)
 
 

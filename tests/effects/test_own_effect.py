@@ -26,7 +26,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import runner
 
-pytestmark = pytest.mark.mpi
+pytestmark = pytest.mark.mpi(2)
 
 NX, NY, COEFFICIENT = 24, 10, 1e-12
 PRESS = {"pressure": 1e5, "duration": 1e-3, "time_step": 5e-4}
