@@ -200,8 +200,8 @@ def test_a_narrow_neighbourhood_is_the_last_resort(
 
 
 def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes more
-    than twice the calls here, and more at lower speeds. Friction agrees to 1e-3, what it is wrong by as a rule where certificates are 5e-3."""
+    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes more than twice
+    the calls here. Friction agrees to 1e-3, what it is wrong by as a rule where certificates are 5e-3."""
     text = (
         "grid: {points: 256, size: 1.0e-3}\n"
         "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 6.25e-5, rms_slope: 0.02}\n"
