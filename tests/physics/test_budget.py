@@ -90,11 +90,11 @@ def test_spots_are_counted() -> None:
     """Four circles of ten cells; one strip of forty; in full contact those of half the shortest wave."""
     points, cells, sides = 10_000, 400 * math.pi, 4 * 80
     four = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
-    strip = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 40 / 100, (40 - SIDE * 2) / 100)
+    strips = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 120 / 300, (120 - SIDE * 6) / 300)  # three on a line, 40 points each
     full = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0)
     bare = Known(None, False, 0.0, True)
     assert count_spots(bare, four, points) == pytest.approx(4.0)
-    assert count_spots(replace(bare, straight=True), strip, 100) == pytest.approx(1.0)
+    assert count_spots(replace(bare, straight=True), strips, 300) == pytest.approx(3.0)
     assert count_spots(KNOWN, full, points) == pytest.approx(points / (16 * math.pi))
     assert count_spots(bare, full, points) == 1.0
 
