@@ -87,10 +87,10 @@ def test_points_that_penetrate_are_missing_in_the_area() -> None:
 
 
 def test_spots_are_counted() -> None:
-    """Four circles of ten cells; one strip of forty; in full contact those of half the shortest wave."""
+    """Four circles of ten cells; three strips of forty; in full contact those of half the shortest wave."""
     points, cells, sides = 10_000, 400 * math.pi, 4 * 80
     four = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
-    strips = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 120 / 300, (120 - SIDE * 6) / 300)  # three on a line, 40 points each
+    strips = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 120 / 300, (120 - SIDE * 6) / 300)
     full = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0)
     bare = Known(None, False, 0.0, True)
     assert count_spots(bare, four, points) == pytest.approx(4.0)
