@@ -135,6 +135,19 @@ def test_waves_that_turn_within_a_step(z: float) -> None:
         assert abs(lost / exact - 1.0) == pytest.approx(found / 2.0, rel=0.15)
 
 
+def test_nearly_full_contact_has_edges_and_waves() -> None:
+    """Of a branch that is far slower than the step; the pair counts by three tenths of what has edges, and the rest."""
+    known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([1e3])))
+    seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 0.8, 0.75, 1.0, 1e-3, angle=0.2)
+    full, share = 0.8**4, 1.0 / spot_radius(seen, 10_000)
+    passing, turning = 0.66 * 0.19 * share**2, 0.2**2 / 6.0
+    found = time_error(known, seen, 10_000)
+    assert found == pytest.approx((1.0 - full) * passing + full * turning, rel=1e-4)
+    differs = replace(seen, difference=1.0)
+    still = time_error(known, replace(differs, slid=0.0), 10_000)
+    assert time_error(known, differs, 10_000) == pytest.approx((0.3 * (1.0 - full) + full) * still)
+
+
 def test_summary() -> None:
     """Without a slide means over time, of friction in proportion to it; in sentences."""
     summary = Summary()
