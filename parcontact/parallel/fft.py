@@ -11,6 +11,7 @@ where they are, if there are many: of a convolution there, times the symbol, and
 its blocks of rows a transform holds one map, and on several ranks what it sends, which is less than another one.
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -122,7 +123,7 @@ class FFT:
     def forward(self, field: Array) -> Spectrum:
         """Spectrum `sum h exp(-i q x)` of a map; collective. It is this object's buffer: valid until the next call."""
         self._along_x(field)
-        for columns in self._column_blocks:
+        for columns in self.column_blocks:
             self._along_y(self._y_forward, columns)
         return self.spectrum
 
@@ -130,18 +131,19 @@ class FFT:
         """Map of a spectrum, so that `backward(forward(h), out)` equals h; collective."""
         if spectrum is not self.spectrum:
             self.spectrum[...] = spectrum
-        for columns in self._column_blocks:
+        for columns in self.column_blocks:
             self._along_y(self._y_backward, columns)
         return self._back_along_x(out, 1.0 / (self.mx * self.my))
 
-    def convolve(self, field: Array, symbol: NDArray[np.inexact], out: Array) -> Array:
+    def convolve(self, field: Array, symbols: Sequence[NDArray[np.inexact]], out: Array) -> Array:
         """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective.
 
-        One that is even in q_y may have only the rows of q_y >= 0, the first `my // 2 + 1`.
+        There is a part of it for each of the `column_blocks`, in one piece each, or else its rows would be fetched from
+        all over memory. One that is even in q_y may have only the rows of q_y >= 0, the first `my // 2 + 1`.
         """
         self._along_x(field)
-        for columns in self._column_blocks:
-            _multiply(self._along_y(self._y_forward, columns), symbol[:, columns])
+        for columns, symbol in zip(self.column_blocks, symbols, strict=True):
+            _multiply(self._along_y(self._y_forward, columns), symbol)
             self._along_y(self._y_backward, columns)
         return self._back_along_x(out, 1.0)
 
@@ -241,7 +243,7 @@ class FFT:
                 for part, theirs in zip(slab.dealt, legs, strict=True)
             ]
             self._legs.append((Leg(slab, dealt, rows, self.spectrum, wire) if ranks > 1 else None, blocks))
-        self._column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
+        self.column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
 
     def _make_transforms(self) -> None:
         heights = {rows.stop - rows.start for _, blocks in self._legs for rows in blocks}
@@ -252,7 +254,7 @@ class FFT:
         self._x_backward = {
             height: self._transform(waves[height], self._row_block[:height], axis=1) for height in heights
         }
-        blocks = {part.shape[1]: part for part in (self.spectrum[:, columns] for columns in self._column_blocks[::-1])}
+        blocks = {part.shape[1]: part for part in (self.spectrum[:, columns] for columns in self.column_blocks[::-1])}
         self._y_forward = {width: self._transform(part, part, axis=0) for width, part in blocks.items()}
         self._y_backward = {width: self._transform(part, part, axis=0, backward=True) for width, part in blocks.items()}
 

@@ -16,8 +16,9 @@ PARTS = 16  # of a spectrum, for which something is calculated at once: what it 
 class Convolution:
     """A linear operator given by its symbol on the wavenumbers of a transform.
 
-    `part(rows)` is the symbol on these rows of the spectrum, `dtype` what it is kept in. Of one that is `even` in q_y
-    only the rows of q_y >= 0 are made and kept.
+    `part(rows)` is the symbol on these rows of the spectrum, `dtype` what it is kept in, times the scale of the
+    transforms, in `symbols` for each block of columns. Of one that is `even` in q_y only the rows of q_y >= 0 are made
+    and kept.
     """
 
     def __init__(
@@ -25,10 +26,14 @@ class Convolution:
     ) -> None:
         self.fft = fft
         count, scale = fft.my // 2 + 1 if even else fft.my, 1.0 / (fft.mx * fft.my)
-        self.symbol = np.empty((count, fft.shape[1]), dtype)
-        fft.slab.tally.hold(self.symbol)
+        widths = [columns.stop - columns.start for columns in fft.column_blocks]
+        self.symbols: list[NDArray[np.inexact]] = [np.empty((count, width), dtype) for width in widths]
+        for symbol in self.symbols:
+            fft.slab.tally.hold(symbol)
         for rows in deal(count, PARTS):
-            np.multiply(part(rows), scale, out=self.symbol[rows], casting="same_kind")
+            values = part(rows)
+            for columns, symbol in zip(fft.column_blocks, self.symbols, strict=True):
+                np.multiply(values[:, columns], scale, out=symbol[rows], casting="same_kind")
 
     @staticmethod
     def footprint(spectrum: int, my: int, even: bool = True, is_complex: bool = False) -> int:
@@ -38,7 +43,7 @@ class Convolution:
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""
         self.fft.slab.tally["operator"] += 1
-        return self.fft.convolve(field, self.symbol, out)
+        return self.fft.convolve(field, self.symbols, out)
 
 
 def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:

@@ -101,7 +101,7 @@ def test_love_of_a_wave_along_x(comm: MPI.Intracomm, aspect: float) -> None:
     """There only aliases along x count, `q sum_n sinc(q_n dx/2)/|q_n|`, however long the cells are along y."""
     slab, size = Slab(comm, 64, 3), (1.0, aspect * 3 / 64)
     fft = FFT(slab)
-    factor = HalfSpace(size, 0.5, "love").operator(fft).symbol * fft.modes[0] * 4 * np.pi * slab.points
+    factor = HalfSpace(size, 0.5, "love").operator(fft).symbols[0] * fft.modes[0] * 4 * np.pi * slab.points
     b = np.pi * fft.modes[0][0] / 64
     n = np.arange(-20000, 20001)[:, None]
     terms = np.sinc(b / np.pi + n) * b / np.abs(b + np.pi * n + (b == 0.0))
@@ -204,7 +204,7 @@ def test_single_precision(comm: MPI.Intracomm) -> None:
     reference = applied(HalfSpace(size).operator(FFT(slab)), whole)
     single = HalfSpace(size).operator(FFT(slab, dtype=np.float32))
     tolerance = 1e-6 * np.abs(reference).max()
-    assert single.symbol.dtype == np.float32
+    assert single.symbols[0].dtype == np.float32
     assert_allclose(applied(single, whole.astype(np.float32)), reference, atol=tolerance)
     assert_allclose(applied(single, whole), reference, atol=tolerance)
     mine = whole[slab.rows].copy()
