@@ -14,7 +14,7 @@ from parcontact import job as jobs
 from parcontact.errors import JobError, RunError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER
+from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER, ErrorBudget, Parts, compared_with_half_mesh
 from parcontact.record import measures
 from parcontact.run import half_mesh, runner
 from parcontact.run.half_mesh import HalfMesh, place_of
@@ -161,12 +161,55 @@ def test_loads_without_duration_are_compared_one_by_one(tmp_path: Path) -> None:
 
 
 def test_between_the_instants_of_the_other_run() -> None:
-    half = HalfMesh([0.0, 0.0, 2.0], [0.0, 0.1, 0.3], [0.0, 0.2, 0.6], True)
-    assert half._at(0.0, 0) == (0.0, 0.0)
-    assert half._at(0.0, 1) == (0.1, 0.2)
-    assert half._at(0.0, 5) == (0.1, 0.2)
-    assert half._at(1.0, 0) == pytest.approx((0.2, 0.4))
-    assert half._at(2.0 * (1 + 1e-12), 0) == (0.3, 0.6)
+    friction = [0.0, 0.1, 0.3]
+    half = HalfMesh([0.0, 0.0, 2.0], friction, [0.0, 0.2, 0.6], True)
+    assert [half._at(friction, 0.0, place) for place in (0, 1, 5)] == [0.0, 0.1, 0.1]
+    assert half._at(friction, 1.0, 0) == pytest.approx(0.2)
+    assert half._at(half.area, 1.0, 0) == pytest.approx(0.4)
+    assert half._at(friction, 2.0 * (1 + 1e-12), 0) == 0.3
+
+
+def test_other_time_steps_are_not_taken_for_the_mesh() -> None:
+    """Friction 4 % too small by the steps there, and 1 % here, both by the budget, beside 0.1 % by the solver and 1 %
+    by the mesh there for 2^-2.5 % here: of what is left, the difference is the mesh's. Without a budget there, all."""
+    here = Parts(1e-3, 0.01, 0.0, 0.01 * 2.0**-WAVES_ORDER)
+    budget = ErrorBudget(here, Parts(0.0, 0.0, 0.0, 0.0))
+    there = Parts(1e-3, 0.04, 0.0, 0.01)
+    exact, mesh = 0.1, 0.03
+    frictions = exact / 1.01, exact * (1.0 - mesh) / 1.04
+    for error, expected in ((there.total, mesh), (np.nan, 1.0 - frictions[1] / frictions[0])):
+        found = compared_with_half_mesh(budget, (frictions[0], 0.5), (frictions[1], 0.5), True, error).friction
+        assert found is not None
+        assert found.mesh == pytest.approx(expected / (2.0**WAVES_ORDER - 1.0))
+        assert (found.solver, found.time) == (here.solver, here.time)
+
+
+def test_chosen_steps_are_twice_as_long(tmp_path: Path) -> None:
+    """On half the mesh: about half as many, with the tolerance and the folded branches of the run, and about an eighth
+    of its work, operator calls times points. The mesh part is still half to five times the mean error, here the
+    difference to four times the mesh, both in steps that are far shorter."""
+    slide = {"pressure": 1e4, "velocity": 0.3, "distance": 1e-3}
+    job = data(64, history=[slide])
+    half = half_mesh.job_on_half_mesh(Job.model_validate(job))
+    assert half.numerics.accuracy == pytest.approx(3.2e-2)
+    assert (half.numerics.tolerance, half.numerics.branch_error) == (5e-3, 1e-3)
+    assert run(job, tmp_path / "run") == 0
+    (mine, theirs) = (columns(tmp_path / name, "operator_calls")[0] for name in ("run", "run/half_mesh"))
+    assert len(theirs) < 0.65 * len(mine)
+    assert theirs.sum() < 0.65 * mine.sum()
+    time, friction, error = columns(tmp_path / "run", "time", "friction", "error_friction")
+    assert run({**job, "output": {}}, tmp_path / "plain") == 0
+    (estimate,) = columns(tmp_path / "plain", "error_friction")
+    late = time > 0.5 * time[-1]
+    mesh = (friction * (error - estimate + 0.05 * (4.0 / 16.0) ** WAVES_ORDER))[late].mean()
+    fine, finer = (friction_at(time[late], points, slide) for points in (64, 256))
+    assert 0.5 < mesh / np.abs(fine - finer).mean() < 5.0
+
+
+def friction_at(times: Series, points: int, slide: Json) -> Series:
+    """Of a slide in steps of a 256th of the box."""
+    _, rows = marched(Job.model_validate(data(points, False, history=[{**slide, "cells_per_step": points / 256}])))
+    return np.interp(times, [row.time for row in rows], [row.measures.friction for row in rows])
 
 
 @pytest.mark.parametrize(

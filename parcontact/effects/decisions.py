@@ -146,7 +146,7 @@ def mesh_check(job: Job) -> Decision:
     """The same run on half the mesh first, from which what the mesh makes wrong is seen."""
     asked = job.output.mesh_check
     why = (
-        "output.mesh_check asks for it, a fifth to a third of the work more"
+        "output.mesh_check asks for it, an eighth to a third of the work more"
         if asked
         else "output.mesh_check is not set"
     )

@@ -14,6 +14,7 @@ MEGA = 1e6
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
 LARGE = 1e10  # bytes from which on there are told GB
 HALF_MESH = 0.3  # of the time of a run, that on half the mesh: a quarter of the points, some more calls
+HALF_MESH_CHOSEN = 0.2  # the same in steps that are chosen, half as many
 STEADY_STARTS = (("steady start, before", False), ("steady start, at worst", True))  # and whether by sets of points
 MARK = "*"  # of figures that were taken while other programs were at work
 
@@ -37,7 +38,8 @@ class Costs:
 
     def marching(self, ranks: int) -> float:
         """Seconds of all steps, or steady states; with those on half the mesh, which comes first."""
-        beside = HALF_MESH if self.job.history and decisions.mesh_check(self.job).on else 0.0
+        part = HALF_MESH_CHOSEN if self.job.timeline().chooses else HALF_MESH
+        beside = part if self.job.history and decisions.mesh_check(self.job).on else 0.0
         return self.scaling.steps * self.scaling.step(ranks) * (1.0 + beside)
 
     def writing(self, ranks: int) -> float:

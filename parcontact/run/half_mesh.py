@@ -1,11 +1,16 @@
 """The run on half the mesh beside a run (`output.mesh_check`): what the mesh makes wrong, seen instead of estimated.
 
-It has twice the cell along both directions, and the same waves, loads, numerics and time steps, whose error would else
-be taken for that of the mesh. With a quarter of the points, and steps of half a cell instead of one, which take some
-more calls, it is about a third of the work. It has a directory of its own below that of the run, in which it goes on
+It has twice the cell along both directions, and the same waves, loads and numerics. Time steps that are given are the
+same, as their error would else be taken for that of the mesh: with a quarter of the points, and steps of half a cell
+instead of one, which take some more calls, it is about a third of the work. Where stages choose their steps, it may be
+LOOSER times as wrong by them, in half as many steps, an eighth to a quarter of the work: time steps make friction too
+small, and what they do to both runs is estimated, and taken back before these are compared.
+
+It has a directory of its own below that of the run, in which it goes on
 after a stop like any run, and comes first: then every row of the run can be compared with it at its instant.
 """
 
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +28,8 @@ from ..record import measures
 from ..record.row import Row
 
 DIRECTORY = "half_mesh"  # below that of the run
-COLUMNS = ("time", "friction", "contact_area_corrected")
+COLUMNS = ("time", "friction", "contact_area_corrected", "error_friction")
+LOOSER, LOOSEST = 3.2, 0.05  # times the accuracy of the run, for steps twice as long; and at most, if that is less
 
 
 def job_on_half_mesh(job: Job) -> Job:
@@ -32,6 +38,8 @@ def job_on_half_mesh(job: Job) -> Job:
     data["grid"]["points"] = [max(n // 2, 1) for n in job.grid.points]
     data["output"] = {"directory": str(job.output.directory / DIRECTORY)}
     data["numerics"]["strict"] = False
+    if job.timeline().chooses:
+        data["numerics"]["accuracy"] = min(LOOSER * job.numerics.accuracy, max(LOOSEST, job.numerics.accuracy))
     for stage in data["history"]:
         if "cells_per_step" in stage:
             stage["cells_per_step"] /= 2
@@ -45,39 +53,43 @@ def job_on_half_mesh(job: Job) -> Job:
 class HalfMesh:
     """What was measured on half the mesh: friction and corrected contact area at increasing times [s].
 
-    `waves`: whether the surface has a shortest wave.
+    `waves`: whether the surface has a shortest wave; `errors`: by what share friction is wrong by the budget there, if
+    its time steps are others than those of the run.
     """
 
     times: Sequence[float]
     friction: Sequence[float]
     area: Sequence[float]
     waves: bool
+    errors: Sequence[float] = ()
 
     @classmethod
     def read(cls, job: Job, slab: Slab) -> "HalfMesh":
         """From the table that it has left; collective. Raises InputError where that cannot be read."""
         found = measures.read(job.output.directory / "measures.csv") if slab.root else {}
-        times, friction, area = slab.agree([found.get(name, []) for name in COLUMNS])
-        return cls(times, friction, area, any(isinstance(shape, Rough) for shape in job.surface))
+        times, friction, area, errors = slab.agree([found.get(name, []) for name in COLUMNS])
+        waves = any(isinstance(shape, Rough) for shape in job.surface)
+        return cls(times, friction, area, waves, errors if job.timeline().chooses else ())
 
     def judge(self, row: Row, place: int) -> ErrorBudget | None:
         """The error budget of a row of the run; it is the row number `place` of those at its time, from 0."""
         if row.errors is None:
             return None
         m = row.measures
+        friction, area = (self._at(series, row.time, place) for series in (self.friction, self.area))
+        error = self._at(self.errors, row.time, place) if self.errors else math.nan
         return compared_with_half_mesh(
-            row.errors, (m.friction, m.contact_area_corrected), self._at(row.time, place), self.waves
+            row.errors, (m.friction, m.contact_area_corrected), (friction, area), self.waves, error
         )
 
-    def _at(self, time: float, place: int) -> tuple[float, float]:
-        """Friction and area at an instant: of the row there that stands for the same, or between two."""
+    def _at(self, series: Sequence[float], time: float, place: int) -> float:
+        """A value at an instant: of the row there that stands for the same, or between two."""
         first = bisect_left(self.times, time * (1.0 - SAME_TIME))
         there = bisect_right(self.times, time * (1.0 + SAME_TIME)) - first
         if there > 0:
             index = first + min(place, there - 1)
-            return self.friction[index], self.area[index]
-        friction, area = (float(np.interp(time, self.times, series)) for series in (self.friction, self.area))
-        return friction, area
+            return series[index]
+        return float(np.interp(time, self.times, series))
 
 
 def place_of(timeline: Timeline, step: int) -> int:
