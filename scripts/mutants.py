@@ -40,7 +40,6 @@ PARTS = {  # files of the program, and the tests that answer for them
     "physics/lowest.py": ("tests/physics/test_lowest.py", "tests/test_rigid_surface.py"),
     "physics/seen.py": ("tests/physics/test_budget.py",),
     "physics/time_error.py": ("tests/physics/test_budget.py",),
-    "record/curve_points.py": ("tests/record/test_curve_points.py",),
     "parallel/fft.py": ("tests/parallel/test_fft.py",),
     "parallel/slab.py": ("tests/parallel/test_slab.py",),
     "solve/contact.py": (*CONTACT, "tests/stability/test_descent.py"),
