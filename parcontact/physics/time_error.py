@@ -45,7 +45,7 @@ FULL_POWER = 4  # of the area: so much of the error is as in full contact, where
 PAIR_SHARE = 0.3  # of the error that the pair shows, at least, where something slides
 FIXED_EDGES = 0.9  # of the error is from the edges of contacts: in full contact there are none
 EULER_FRICTION = 1.1  # times its root
-EXPONENTIAL_AREA, EXPONENTIAL_OPEN_POWER = 0.15, 1.0 / 3.0  # of the error of friction, times this power of what is open
+EXPONENTIAL_AREA, EXPONENTIAL_OPEN_POWER = 0.21, 1.0 / 3.0  # of the error of friction, times this power of what is open
 EULER_AREA, EULER_OPEN_POWER = 0.18, 2.0  # of it, times this power of it, and more by what the corrected area is less
 
 

@@ -33,7 +33,7 @@ def test_parts_add_up() -> None:
             0.05 * 2**-2.5,
         )
     )
-    solver, time = 0.1 * 1e-3**0.7, 0.15 * 0.9 ** (1 / 3) * budget.friction.time
+    solver, time = 0.1 * 1e-3**0.7, 0.21 * 0.9 ** (1 / 3) * budget.friction.time
     assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, 0.25 / 19))
     assert budget.area.total == pytest.approx(solver + time + 0.9e-4 + 0.25 / 19)
 
