@@ -6,6 +6,7 @@ the grid before, until there are so few cells that every rank has all of them, w
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
 
@@ -16,6 +17,7 @@ from .mpi import MPI
 from .regrid import fetch
 from .slab import Slab, deal
 
+OFFSETS = (-2, -1, 0, 1)  # of rows beside those of a rank, as `Step` tells them
 FEW = 8  # times fewer cells than a rank has points: then every rank has all cells
 
 
@@ -64,16 +66,16 @@ class Step:
         """Rows of points of the first own cell that are with another rank: 0 or 1."""
         return self.fine.rows.start % 2
 
-    @property
+    @cached_property
     def own(self) -> slice:
         """Where the cells that end in points of this rank are in its map of cells."""
-        part = halves(self.fine.dealt)[self.fine.comm.rank]
+        part = self._ending[self.fine.comm.rank]
         return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
 
     def complete(self, cells: NDArray[Any]) -> None:
         """Where every rank has all cells, tell each those of the others."""
         if self.coarse.comm.size < self.fine.comm.size:
-            made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, halves(self.fine.dealt))
+            made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, self._ending)
             cells[...] = fetch(made, cells[self.own], [slice(0, made.ny)] * made.comm.size)
 
     def points_beside(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
@@ -82,19 +84,39 @@ class Step:
         After the last row comes the first again; of an odd number of rows, one of zeros before it. Of a rank without
         points, nothing.
         """
-        cycle = self.fine.ny + self.fine.ny % 2
-        return np.concatenate([self._row(self.fine, points, self.fine.dealt, offset, cycle) for offset in offsets])
+        return np.concatenate([self._row(self.fine, points, self._points_wanted[offset]) for offset in offsets])
 
     def cells_beside(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """The same of rows beside the cells that end in points of this rank, of which none are missing."""
-        parts, cycle = halves(self.fine.dealt), self.coarse.ny
-        return np.concatenate([self._row(self.coarse, cells, parts, offset, cycle) for offset in offsets])
+        return np.concatenate([self._row(self.coarse, cells, self._cells_wanted[offset]) for offset in offsets])
 
-    def _row(self, slab: Slab, field: NDArray[Any], parts: list[slice], offset: int, cycle: int) -> NDArray[Any]:
-        rank, wanted = self.fine.comm.rank, list[slice]()
-        for part, points in zip(parts, self.fine.dealt, strict=True):
-            number = ((part.start if offset < 0 else part.stop) + offset) % cycle
-            there = points.start < points.stop and number < slab.ny
-            wanted.append(slice(number, number + 1) if there else slice(0, 0))
-        row = field[wanted[rank]] if slab.comm.size == 1 else fetch(slab, field, wanted)
+    @cached_property
+    def _ending(self) -> list[slice]:
+        """The rows of cells that end in points of each rank."""
+        return halves(self.fine.dealt)
+
+    @cached_property
+    def _points_wanted(self) -> dict[int, list[slice]]:
+        return self._wanted(self.fine, self.fine.dealt, self.fine.ny + self.fine.ny % 2)
+
+    @cached_property
+    def _cells_wanted(self) -> dict[int, list[slice]]:
+        return self._wanted(self.coarse, self._ending, self.coarse.ny)
+
+    def _wanted(self, slab: Slab, parts: list[slice], cycle: int) -> dict[int, list[slice]]:
+        """The row of a map that each rank wants beside its part, by offset; none where there are no points."""
+        found: dict[int, list[slice]] = {}
+        for offset in OFFSETS:
+            numbers = [((part.start if offset < 0 else part.stop) + offset) % cycle for part in parts]
+            there = [
+                points.start < points.stop and number < slab.ny
+                for points, number in zip(self.fine.dealt, numbers, strict=True)
+            ]
+            found[offset] = [
+                slice(n, n + 1) if is_there else slice(0, 0) for n, is_there in zip(numbers, there, strict=True)
+            ]
+        return found
+
+    def _row(self, slab: Slab, field: NDArray[Any], wanted: list[slice]) -> NDArray[Any]:
+        row = field[wanted[self.fine.comm.rank]] if slab.comm.size == 1 else fetch(slab, field, wanted)
         return np.zeros((1, slab.nx), field.dtype) if row.size == 0 and self.fine.shape[0] else row
