@@ -25,7 +25,7 @@ from parcontact.parallel.slab import Slab
 
 TRANSFORM, EXCHANGE, OTHER = "transform", "exchange", "everything else"
 EXCHANGES = [(transpose.Leg, name) for name in ("post", "to_columns", "to_rows", "collect")]
-EXCHANGES += [(Slab, "reduce"), (pyramid, "fetch")]
+EXCHANGES += [(Slab, "reduce"), (pyramid, "fetch"), (pyramid.RowsBeside, "fetch")]
 Reads = dict[str, int]  # how many times the bytes of each parameter pass: read, written, or both
 
 

@@ -5,7 +5,7 @@ the grid before, until there are so few cells that every rank has all of them, w
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
@@ -17,7 +17,6 @@ from .mpi import MPI
 from .regrid import fetch
 from .slab import Slab, deal
 
-OFFSETS = (-2, -1, 0, 1)  # of rows beside those of a rank, as `Step` tells them
 FEW = 8  # times fewer cells than a rank has points: then every rank has all cells
 
 
@@ -60,6 +59,7 @@ class Step:
 
     fine: Slab
     coarse: Slab
+    _kept: dict[tuple[str, tuple[int, ...]], "RowsBeside"] = field(default_factory=dict)
 
     @property
     def above(self) -> int:
@@ -84,39 +84,64 @@ class Step:
         After the last row comes the first again; of an odd number of rows, one of zeros before it. Of a rank without
         points, nothing.
         """
-        return np.concatenate([self._row(self.fine, points, self._points_wanted[offset]) for offset in offsets])
+        cycle = self.fine.ny + self.fine.ny % 2
+        return self._beside("points", self.fine, self.fine.dealt, cycle, offsets).fetch(points)
 
     def cells_beside(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """The same of rows beside the cells that end in points of this rank, of which none are missing."""
-        return np.concatenate([self._row(self.coarse, cells, self._cells_wanted[offset]) for offset in offsets])
+        return self._beside("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
 
     @cached_property
     def _ending(self) -> list[slice]:
         """The rows of cells that end in points of each rank."""
         return halves(self.fine.dealt)
 
-    @cached_property
-    def _points_wanted(self) -> dict[int, list[slice]]:
-        return self._wanted(self.fine, self.fine.dealt, self.fine.ny + self.fine.ny % 2)
-
-    @cached_property
-    def _cells_wanted(self) -> dict[int, list[slice]]:
-        return self._wanted(self.coarse, self._ending, self.coarse.ny)
-
-    def _wanted(self, slab: Slab, parts: list[slice], cycle: int) -> dict[int, list[slice]]:
-        """The row of a map that each rank wants beside its part, by offset; none where there are no points."""
-        found: dict[int, list[slice]] = {}
-        for offset in OFFSETS:
-            numbers = [((part.start if offset < 0 else part.stop) + offset) % cycle for part in parts]
-            there = [
-                points.start < points.stop and number < slab.ny
-                for points, number in zip(self.fine.dealt, numbers, strict=True)
+    def _beside(self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]) -> "RowsBeside":
+        """Beside the part of each rank that has points; kept for the next time."""
+        key = what, offsets
+        if key not in self._kept:
+            wanted = [
+                [((part.start if offset < 0 else part.stop) + offset) % cycle for offset in offsets]
+                if points.start < points.stop
+                else []
+                for part, points in zip(parts, self.fine.dealt, strict=True)
             ]
-            found[offset] = [
-                slice(n, n + 1) if is_there else slice(0, 0) for n, is_there in zip(numbers, there, strict=True)
-            ]
-        return found
+            self._kept[key] = RowsBeside(slab, wanted, self.fine.comm.rank)
+        return self._kept[key]
 
-    def _row(self, slab: Slab, field: NDArray[Any], wanted: list[slice]) -> NDArray[Any]:
-        row = field[wanted[self.fine.comm.rank]] if slab.comm.size == 1 else fetch(slab, field, wanted)
-        return np.zeros((1, slab.nx), field.dtype) if row.size == 0 and self.fine.shape[0] else row
+
+class RowsBeside:
+    """Rows of a map that ranks want of each other, in one message; one that the map does not have is of zeros.
+
+    `wanted` are the numbers of those rows, of each rank; a map that every rank has is that of a rank alone.
+    """
+
+    def __init__(self, slab: Slab, wanted: list[list[int]], rank: int) -> None:
+        self._slab, self._count = slab, len(wanted[rank])
+        ranks = range(slab.comm.size)
+        mine = wanted if slab.comm.size > 1 else [wanted[rank]]
+        leaving = [[number for number in numbers if _has(slab.rows, number)] for numbers in mine]
+        self._leaving = np.array([number - slab.rows.start for numbers in leaving for number in numbers], np.intp)
+        self._sent = [len(numbers) for numbers in leaving]
+        coming = [[k for k, number in enumerate(wanted[rank]) if _has(slab.dealt[other], number)] for other in ranks]
+        self._places = np.array([k for places in coming for k in places], np.intp)
+        self._got = [len(places) for places in coming]
+
+    def fetch(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Collective."""
+        slab, leaving = self._slab, values[self._leaving]
+        out = np.zeros((self._count, slab.nx), values.dtype)
+        if slab.comm.size == 1:
+            out[self._places] = leaving
+            return out
+        width = slab.nx * values.itemsize
+        arriving = np.empty((len(self._places), slab.nx), values.dtype)
+        sent, got = ([count * width for count in counts] for counts in (self._sent, self._got))
+        slab.comm.Alltoallv([leaving.view(np.uint8), sent, "B"], [arriving.view(np.uint8), got, "B"])
+        slab.tally["bytes sent"] += sum(sent) - sent[slab.comm.rank]
+        out[self._places] = arriving
+        return out
+
+
+def _has(rows: slice, number: int) -> bool:
+    return rows.start <= number < rows.stop
