@@ -90,6 +90,16 @@ def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) 
     assert steps == [1 + 300, 3 * 80]
 
 
+def test_chosen_steps_make_what_they_are_chosen_for() -> None:
+    """The same error at the same accuracy takes as many; a tenth of it 10^(1/1.7) times as many."""
+    chosen = {key: value for key, value in SLIDE.items() if key != "cells_per_step"}
+    planned = job(grid={"points": 240, "size": 1e-3}, history=[chosen])
+    seen = costs(planned, time=price.CHOSEN_SHARE * 0.01)
+    lasting = planned.timeline().spans[0].count
+    for accuracy, times in ((0.01, 1.0), (1e-3, 10 ** (1 / TIME_ORDER))):
+        assert price.offer(seen, accuracy).steps == pytest.approx(1 + lasting * times, abs=1.0)
+
+
 def test_steps_are_never_longer_than_a_cell() -> None:
     """However accurate they are; half the mesh needs half as many."""
     found = price.offer(costs(job(), time=1e-9), 0.05)

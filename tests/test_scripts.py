@@ -57,7 +57,7 @@ SMALL = {
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"0 violations, 0 failed solves"),
     "random_steady": Small(["--trials", "2", "--points", "64"], r"2 solved, .* 0 WRONG"),
     "steady_table": Small(["128"], r"(?m)^[0-2] are off", TIMED),  # at 512 points none is
-    "time_steps": Small(["32", "cylinder"], r"(?m)^error over accuracy: 0\.\d\d at most.* cost .*: 1\.[0-4]\d at most"),
+    "time_steps": Small(["48", "cylinder"], r"(?m)^error over accuracy: 0\.\d\d at most.* cost .*: 1\.[0-4]\d at most"),
 }
 
 

@@ -1,13 +1,13 @@
 """What accuracy costs: the mesh, the steps and the time of a job at other accuracies, from a trial of it at its own.
 
 Nothing more is tried. All parts of the error budget together keep the accuracy: the mesh may have MESH_SHARE of it,
-time steps TIME_SHARE, the solver the rest. The mesh has the cells per shortest wave that this takes
-(`job.advice.cells_per_wave`); where no wave is given the part that the mesh makes, which the trial saw, goes with the
-power of the cell that the budget knows (`physics.budget`). Heights from a file stay on their mesh. The part that time
-steps make, seen too, goes with the power 1.7 of the step for the exponential integrator, with the first for backward
-Euler; where a slide has cells per step they are one, a half, a third, ... as it needs. A step has as many operator
-calls as seen, times what a smaller tolerance and fractions of a cell add, and each takes as long as seen, in proportion
-to N log N.
+time steps TIME_SHARE, the solver the rest; steps that are chosen make CHOSEN_SHARE, whatever the mesh makes. The mesh
+has the cells per shortest wave that this takes (`job.advice.cells_per_wave`); where no wave is given the part that the
+mesh makes, which the trial saw, goes with the power of the cell that the budget knows (`physics.budget`). Heights from
+a file stay on their mesh. The part that time steps make, seen too, goes with the power 1.7 of the step for the
+exponential integrator, with the first for backward Euler; where a slide has cells per step they are one, a half, a
+third, ... as it needs. A step has as many operator calls as seen, times what a smaller tolerance and fractions of a
+cell add, and each takes as long as seen, in proportion to N log N.
 """
 
 import math
@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from ..job import GeometricStep, HeightFile, Job, Rough, Stage
 from ..job.advice import STEPS_PER_WAVE, cells_per_wave
+from ..job.chosen import ChosenEnds
 from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.table import plain
 from ..physics.budget import SPOTS_ORDER
@@ -29,6 +30,7 @@ from .scaling import Scaling
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
 MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
+CHOSEN_SHARE = 0.65  # of the accuracy, what time steps make that follow it, in the mean of a stage
 EDGE_ORDER = 1.0  # of the cell, in which the error of the contact area falls
 CALLS_PER_DECADE = 1.5  # for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
@@ -148,7 +150,8 @@ def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
     waves = (shortest_wave(sample.job) or 1.0) / (shortest_wave(own) or 1.0)
     stages = []
     for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), own.timeline().spans, strict=True):
-        error = time_error(cost, sample) / (TIME_SHARE * job.numerics.accuracy)
+        share = CHOSEN_SHARE if isinstance(span.ends, ChosenEnds) else TIME_SHARE
+        error = time_error(cost, sample) / (share * job.numerics.accuracy)
         more = max(error ** (1.0 / order) * tried * waves, 1.0 / LONGER)
         count, between = steps_of(span.stage, cost.steps - span.jumps, more, own, job)
         stages.append(_with_calls(replace(cost, steps=count + span.jumps), times * between))
