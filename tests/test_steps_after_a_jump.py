@@ -78,13 +78,13 @@ def test_lengths_of_steps() -> None:
 
 
 def test_a_jump_of_velocity_needs_one_stage() -> None:
-    """`jobs/velocity_step.yaml` on a coarse grid: the highest friction at 5 % is within 2 % of that at 0.3 %; the first
+    """`jobs/velocity_step.yaml` on a coarse grid: the highest friction at 2 % is within 1 % of that at 0.3 %; the first
     steps after the jump are far shorter than a cell."""
     small = ("grid.points=64", "surface.0.short_wavelength=1.25e-4", "history.1.distance=3.0e-5", "output.fields=[]")
     peaks = []
-    for accuracy in (0.05, 0.003):
+    for accuracy in (0.02, 0.003):
         march, rows = marched(example("velocity_step", *small, f"numerics.accuracy={accuracy}"))
         peaks.append(column(rows[1:], "friction").max())
         jump = march.timeline().spans[1].before
         assert rows[jump + 1].distance - rows[jump].distance < 0.05 * 1e-3 / 64
-    assert peaks[0] == pytest.approx(peaks[1], rel=2e-2)
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-2)
