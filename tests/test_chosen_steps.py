@@ -260,3 +260,20 @@ def test_a_body_without_load_has_an_error_too() -> None:
         assert rows[-1].measures.contact_area == 0.0
         counts.append(march.timeline().spans[1].count)
     assert counts[1] > 2 * counts[0]
+
+
+def test_errors_do_not_depend_on_the_direction() -> None:
+    """A wave that slides along its own direction, whichever that is; across it there is no friction."""
+    estimates = []
+    for waves, velocity in (([2, 0], [0.1, 0.0]), ([0, 2], [0.0, 0.1]), ([2, 0], [0.0, 0.1])):
+        wave = {"shape": "wave", "amplitude": 1e-6, "waves": waves}
+        slide = {"pressure": 1e6, "velocity": velocity, "distance": 5e-4, "cells_per_step": 1}
+        rest = {"pressure": 1e6, "duration": 1e-3, "time_step": 1e-3}
+        grid = {"points": 32, "size": 1e-3}
+        _, rows = marched({"grid": grid, "surface": wave, "material": SLS, "history": [rest, slide]})
+        errors = rows[-1].errors
+        assert errors is not None
+        estimates.append(errors.friction.time if errors.friction else 0.0)
+    assert estimates[0] == pytest.approx(estimates[1], rel=1e-9)
+    assert estimates[0] > 0.0
+    assert estimates[2] == 0.0

@@ -69,7 +69,6 @@ class Errors:
             material.prony if isinstance(material, ZenerBody) else None,
         )
         self._slope_unit = scene.units.height / scene.units.length
-        self._length_unit = scene.units.length
         self._pressure_unit = scene.units.pressure
         self._cell = grid.dx, grid.dy
         cell = grid.dx / scene.units.length
@@ -95,7 +94,7 @@ class Errors:
             math.hypot(step.velocity[0] / self._cell[0], step.velocity[1] / self._cell[1]) * step.dt,
             step.dt,
             max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
-            look.wave * math.hypot(*step.velocity) * step.dt / self._length_unit,
+            look.angle,
         )
         points = self.slab.points
         return Estimate(estimate(self.known, seen, points), time_error(self.known, seen, points))

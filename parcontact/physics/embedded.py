@@ -27,14 +27,15 @@ MISSED = 0.5  # of the load, by which that of a sample is off where it does not 
 
 @dataclass(frozen=True)
 class Look:
-    """The relative difference of the pair; the power of the length of the step with which it grows; the rms slope along
-    x of the surface under the pressure, in the unit of heights over that of lengths, and over the standard deviation of
-    heights there, the wave number of a wave that is as steep and as high, over the unit of lengths."""
+    """The relative difference of the pair; the rms slope along x of the surface under the pressure, in the unit of
+    heights over that of lengths; the power of the length of the step with which the difference grows; the rms of what
+    the displacement changes by in the step over the standard deviation of heights, both under the pressure: in full
+    contact the angle by which a wave turns that is as high and changes as much."""
 
     difference: float
     slope: float
     order: float = 2.0
-    wave: float = 0.0
+    angle: float = 0.0
 
 
 class Embedded:
@@ -52,12 +53,12 @@ class Embedded:
             seen, *sums = self._add(dt, trial, pressure, displacement, 1)
         if seen <= 0.0:
             return Look(0.0, 0.0)
-        apart, size, rise, height, square = sums
+        apart, size, rise, height, square, turned = sums
         slope = math.sqrt(rise / seen) / (2.0 * self.dx)
         variance = square / seen - (height / seen) ** 2
-        wave = slope / math.sqrt(variance) if variance > LEAST_VARIANCE * square / seen else 0.0
+        angle = math.sqrt(turned / seen / variance) if variance > LEAST_VARIANCE * square / seen else 0.0
         order = self._difference(dt, trial.alpha)[2]
-        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, wave)
+        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, angle)
 
     def look_without_load(self, dt: float, trial: Trial) -> Look:
         """At a step just committed in which nothing presses: the difference over the displacement, both as rms;

@@ -82,12 +82,13 @@ def measure(p, u, h, above, cyclic):
 @loop
 def embedded(branches, decay, increment, gain, p, u, heights, offset, first, stride):
     """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, of p times
-    the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h and of p h^2.
+    the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h and of p h^2;
+    of p increment^2.
 
     Points without pressure are passed over: each run of those with pressure is looked at for itself.
     """
     count, ny, nx = branches.shape
-    load, apart, size, slope, height, square = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    load, apart, size, slope, height, square, turned = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     back = (-1 - offset) % nx
     e = np.empty(nx, p.dtype)
     for j in range(first, ny, stride):
@@ -110,6 +111,7 @@ def embedded(branches, decay, increment, gain, p, u, heights, offset, first, str
                 load += here[i]
                 apart += here[i] * run[i] * run[i]
                 size += here[i] * flat[i] * flat[i]
+                turned += here[i] * moved[i] * moved[i]
             for i in range(start, end):
                 left = i + back if i + back < nx else i + back - nx
                 right = left + 2 if left + 2 < nx else (left + 2) % nx
@@ -118,7 +120,7 @@ def embedded(branches, decay, increment, gain, p, u, heights, offset, first, str
                 middle = heights[j, left + 1 if left + 1 < nx else 0]
                 height += p[j, i] * middle
                 square += p[j, i] * middle * middle
-    return load, apart, size, slope, height, square
+    return load, apart, size, slope, height, square, turned
 
 
 @loop

@@ -31,8 +31,8 @@ class Seen:
     """What a step has shown: the certificate's complementarity; by how much the embedded pair differs, with its order
     in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
     shares; by how many cells the surface slid in it, in how many seconds; the points that penetrate without pressure,
-    as a share of those in contact; by what angle a wave passed that is as steep and as high as the surface under the
-    pressure."""
+    as a share of those in contact; by what angle a wave turned that is as high as the surface under the pressure
+    and changes as much."""
 
     complementarity: float
     difference: float

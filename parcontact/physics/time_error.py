@@ -7,9 +7,10 @@ where it is fast, and late by L/2 of a step,
     L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
 
 In full contact friction is the loss, wrong by theta^2 (1 + <L>)/12, with <L> = sum w L/sum w over the shares of
-friction that branches make, w = G omega tau/(1 + (omega tau)^2). The angle is taken of a wave as steep and as high as
-the surface; as steeper ones weigh more in friction, the error is twice that (FULL_LOSS). Where contact spots of radius
-a pass by x = (way of the step)/a, there are edges, which move with what forces are late by:
+friction that branches make, w = G omega tau/(1 + (omega tau)^2). The angle is taken of a wave as high as the surface
+which changes as much in the step; as shorter ones weigh more in friction, the error of many is half as much again
+(FULL_LOSS). Where contact spots of radius a pass by x = (way of the step)/a, there are edges, which move with what
+forces are late by:
 
     E = PASSING_FRICTION (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
@@ -35,7 +36,7 @@ from .seen import Known, Seen, radius_of
 
 PASSING_FRICTION = 0.66  # times the share of the radius of a spot that a step is, and what forces are late by
 PASSING_LOSS = 0.19  # times that share: by what the loss is wrong
-FULL_LOSS = 1.0 / 6.0  # times the square of the angle by which waves turn in a step: short ones weigh more in friction
+FULL_LOSS = 1.0 / 8.0  # times the square of the angle by which waves turn in a step: short ones weigh more in friction
 SLOW = 1e-3  # of its relaxation time: a step that is shorter, in which L has no digits left
 EXPONENTIAL_FRICTION = 1.7  # times the difference of the pair
 LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least

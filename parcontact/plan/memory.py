@@ -28,6 +28,7 @@ from ..rigid_surface import highest_waves
 from ..solve.contact import ContactSolver
 from ..solve.steady import SteadySolver
 from ..solve.surround import grids_for
+from ..steady_sliding.sliding import tolerance_of
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> It
     even = not job.initial.velocity[1]
     finest = _transform("", job, points, precision, ranks, rank).bytes
     spectrum, *_ = footprint(points, points, precision, ranks, rank)
-    yield SteadySolver.footprint(*points, precision.type, job.numerics.tolerance, ranks, rank, sets)
+    yield SteadySolver.footprint(*points, precision.type, tolerance_of(job.numerics.tolerance), ranks, rank, sets)
     yield 2 * _map(points, precision, ranks, rank)  # the heights and the start
     yield finest + waves
     yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)

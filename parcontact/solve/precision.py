@@ -9,6 +9,6 @@ import numpy as np
 LOOSE = 1e-5  # tolerance on a certificate with which they are in single precision
 
 
-def precision_of_directions(dtype: type[np.floating], tolerance: float) -> type[np.floating]:
-    """The type of their maps beside others of the type `dtype`."""
-    return np.float32 if tolerance >= LOOSE else dtype
+def precision_of_directions(dtype: type[np.floating], tolerance: float, loose: float = LOOSE) -> type[np.floating]:
+    """The type of their maps beside others of the type `dtype`, in a solver for which such a tolerance is loose."""
+    return np.float32 if tolerance >= loose else dtype

@@ -36,6 +36,8 @@ MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 WAYS = ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
 MAX_DIRECTIONS = 10  # of the linear steps on a set
+LOOSE = 1.5e-3  # tolerance with which those beyond the projected steps' are in single precision: with a smaller one
+# rounded directions took up to half as many steps more where a body is a thousand times as stiff at once as in the end
 KAPPA = 0.1  # times the stiffness of a point
 MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which sets have stalled
 
@@ -87,7 +89,7 @@ class SteadySolver:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self._projected = Projected(slab, operator, preconditioner, dtype, narrow)
-        kept = precision_of_directions(dtype, tolerance)
+        kept = precision_of_directions(dtype, tolerance, LOOSE)
         self._linear = Directions(slab, operator, preconditioner, directions, dtype, kept, self._projected.lend())
         self._u = slab.zeros(dtype)
         self._length = height  # of the last certificate
@@ -98,7 +100,7 @@ class SteadySolver:
         nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, sets: bool = False
     ) -> int:
         """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
-        rows, kept = deal(ny, ranks)[rank], precision_of_directions(dtype, tolerance)
+        rows, kept = deal(ny, ranks)[rank], precision_of_directions(dtype, tolerance, LOOSE)
         bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * np.dtype(dtype).itemsize + 1
         bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
         surround = Surround.footprint(nx, ny, ranks, rank, surround_on(nx, ny)[0])

@@ -193,7 +193,7 @@ class SteadySliding:
     def _solver(self, level: Level, velocity: Vector, narrow: bool) -> SteadySolver:
         base, numerics = self.base, self.base.job.numerics
         finest = level is self.levels[0]
-        tolerance = max(SHARE * numerics.tolerance, min(LOOSE, numerics.tolerance))
+        tolerance = tolerance_of(numerics.tolerance)
         operator, preconditioner = self.operators(level, velocity, base.prony)
         return SteadySolver(
             level.slab,
@@ -213,6 +213,11 @@ class SteadySliding:
             half_space.sliding_operator(level.fft, speed, prony),
             half_space.sliding_inverse(level.fft, speed, prony),
         )
+
+
+def tolerance_of(asked: float) -> float:
+    """On the certificate of a steady state, where a job asks for one."""
+    return max(SHARE * asked, min(LOOSE, asked))
 
 
 def branch_maps(base: Frame, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:

@@ -121,18 +121,18 @@ def test_spots_that_pass_within_a_step() -> None:
 @pytest.mark.parametrize("z", [1e-9, 0.9e-3, 1.1e-3, 2.0, 1e3])
 def test_waves_that_turn_within_a_step(z: float) -> None:
     """In full contact, of one branch: L, a sixth of z where that has no digits left. The true error of a harmonic wave
-    is half of the estimate: short waves weigh more in friction than in what is seen of them."""
+    is two thirds of the estimate: short waves weigh more in friction than in what is seen of them."""
     dt, angle = 1e-3, 0.01
     known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([dt / z])))
     seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0, 1.0, dt, angle=angle)
     share = late(z) if z > 0.1 else z / 6.0
     found = time_error(known, seen, 100)
-    assert found == pytest.approx(angle**2 / 6.0 * (1.0 + share), rel=1e-6)
+    assert found == pytest.approx(angle**2 / 8.0 * (1.0 + share), rel=1e-6)
     decay, half = math.exp(-z), 2.0 * math.sin(angle / 2.0)
     lost = (1.0 - decay) ** 2 / z * math.sin(angle) / ((1.0 - decay) ** 2 + decay * half**2)
     exact = angle * z / (z**2 + angle**2)
     if z > 0.1:
-        assert abs(lost / exact - 1.0) == pytest.approx(found / 2.0, rel=0.15)
+        assert abs(lost / exact - 1.0) == pytest.approx(found / 1.5, rel=0.15)
 
 
 def test_nearly_full_contact_has_edges_and_waves() -> None:
@@ -140,7 +140,7 @@ def test_nearly_full_contact_has_edges_and_waves() -> None:
     known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([1e3])))
     seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 0.8, 0.75, 1.0, 1e-3, angle=0.2)
     full, share = 0.8**4, 1.0 / spot_radius(seen, 10_000)
-    passing, turning = 0.66 * 0.19 * share**2, 0.2**2 / 6.0
+    passing, turning = 0.66 * 0.19 * share**2, 0.2**2 / 8.0
     found = time_error(known, seen, 10_000)
     assert found == pytest.approx((1.0 - full) * passing + full * turning, rel=1e-4)
     differs = replace(seen, difference=1.0)
