@@ -37,6 +37,7 @@ def march(points: int, rounds: int) -> Iterator[Line]:
         run.advance(step)
         if step.number > run.timeline().spans[0].last:
             break
+    held = slab.sum(slab.tally["map bytes at most"])[0] / (8 * points**2)
     ways = {"ours alone": pair(slab, "float64"), "FFTW's passes alone": passes(slab.comm, points)}
     calls = slab.tally["operator"]
     ratios: dict[str, list[float]] = {name: [] for name in ways}
@@ -50,7 +51,6 @@ def march(points: int, rounds: int) -> Iterator[Line]:
     for name, values in ratios.items():
         low, middle, high = np.quantile(values, (0.25, 0.5, 0.75)).tolist()
         yield Line("march", f"a step over its transforms by {name}", middle, "", low, high)
-    held = slab.sum(slab.tally["map bytes at most"])[0] / (8 * points**2)
     yield Line("march", "held at most, the steady start included", held, "maps")
     yield Line("march", "the same without one for each branch", held - len(run.scene.material.branches), "maps")
 
