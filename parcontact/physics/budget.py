@@ -107,14 +107,15 @@ def compared_with_half_mesh(
     those with twice the cell. As errors go with the power p of the cell, the difference is 2^p - 1 of them.
 
     With p as above; of the corrected area, whose error falls slower, 1. A run with other time steps has another error
-    of time, by which it takes friction for too small: `coarse_error` is that of its friction by its budget, NaN if it
-    has the same steps, or none. What solver and folded branches make of it is as here, and the mesh 2^p times as much.
+    of time, by which it takes friction for too small: `coarse_error` is that of its friction in all, by its budget, NaN
+    if it has the same steps, or none. Of that, solver and folded branches make as much as here, the mesh 2^p times as
+    much, and the steps the rest.
     """
     times = 2.0 ** (WAVES_ORDER if waves else SPOTS_ORDER)
     found, own, other = budget.friction, here[0], coarse[0]
     if found is not None and math.isfinite(coarse_error):
-        later = coarse_error - found.total - (times - 1.0) * found.mesh
-        own, other = own * (1.0 + found.time), other * (1.0 + max(found.time + later, 0.0))
+        by_steps = max(coarse_error - found.solver - found.folded - times * found.mesh, 0.0)
+        own, other = own * (1.0 + found.time), other * (1.0 + by_steps)
     friction = (abs(own - other) / own if own > 0.0 else 0.0) / (times - 1.0)
     area = (abs(here[1] - coarse[1]) / here[1] if here[1] > 0.0 else 0.0) / (2.0**CORRECTED_ORDER - 1.0)
     return ErrorBudget(found and replace(found, mesh=friction), replace(budget.area, mesh=area))

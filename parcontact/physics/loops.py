@@ -82,8 +82,8 @@ def measure(p, u, h, above, cyclic):
 @loop
 def embedded(branches, decay, increment, gain, p, u, heights, offset, first, stride):
     """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, of p times
-    the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h and of p h^2;
-    of p increment^2.
+    the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h, of p h^2
+    and of p increment^2.
 
     Points without pressure are passed over: each run of those with pressure is looked at for itself.
     """

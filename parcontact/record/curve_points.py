@@ -6,9 +6,7 @@ from itertools import product
 
 CLOSE = 1e-6  # relative: speeds and pressures that are the same but for rounding
 
-Point = tuple[
-    float, float, float
-]  # speed [m/s], mean pressure [Pa], temperature [deg C] or NaN for that of the material
+Point = tuple[float, float, float]  # speed [m/s], mean pressure [Pa], temperature [deg C], NaN for the material's
 
 
 def asked(speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()) -> list[Point]:

@@ -6,8 +6,8 @@ instead of one, which take some more calls, it is about a third of the work. Whe
 LOOSER times as wrong by them, in half as many steps, an eighth to a quarter of the work: time steps make friction too
 small, and what they do to both runs is estimated, and taken back before these are compared.
 
-It has a directory of its own below that of the run, in which it goes on
-after a stop like any run, and comes first: then every row of the run can be compared with it at its instant.
+It has a directory of its own below that of the run, in which it goes on after a stop like any run, and comes first:
+then every row of the run can be compared with it at its instant.
 """
 
 import math
