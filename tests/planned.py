@@ -46,6 +46,7 @@ JOBS: dict[str, Json] = {
     "energies": {"material": TWO, "history": [CELLS], "output": {"energy": True}},
     "single": {"material": TWO, "history": [CELLS], "numerics": {"precision": "single"}},
     "long cells": {"grid": {"size": [1e-3, 1e-5]}, "history": [SLIDE]},
+    "waves of two cells": {"grid": {"points": 16}, "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [8, 0]}},
     "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed"}},
 }
 SWEEP = {"history": [SLIDE], "sweep": [{"history.0.duration": [1e-3, 2e-3, 4e-3]}]}

@@ -152,6 +152,27 @@ def test_only_stages_alike_are_shared() -> None:
     assert one.shared(timeline({**press, "pressure": 2e4}, {**SLIDE, "distance": 1e-3})) == 0
 
 
+LASTS = {"duration": 1.0, "time_step": 0.5}
+RISES = {"pressure": {"from": 1e4, "to": 3e4}, **LASTS}
+
+
+@pytest.mark.parametrize(
+    ("stages", "pressure", "jumps"),
+    [
+        ([{"pressure": 1e4, **LASTS}], None, [True]),
+        ([{"pressure": 0.0, **LASTS}], None, [False]),
+        ([{"pressure": 1e4, **LASTS}], 1e4, [False]),
+        ([{"approach": 0.0, **LASTS}], None, [True]),
+        ([{"pressure": 1e4, **LASTS}, RISES, {"pressure": 3e4, **LASTS}], None, [True, False, False]),
+        ([{"pressure": 3e4, **LASTS}, RISES, {"pressure": 1e4, **LASTS}], None, [True, True, True]),
+        ([{"pressure": 1.0, **LASTS}, {"approach": 1.0, **LASTS}, {"approach": 1.0}], None, [True, True, True]),
+    ],
+)
+def test_where_loads_jump(stages: list[dict[str, Any]], pressure: float | None, jumps: list[bool]) -> None:
+    """Where a stage has another load, or control, than the one before in its end, and in each that is one solve."""
+    assert [span.jumps for span in timeline(*stages, pressure=pressure).spans] == jumps
+
+
 def test_there_is_no_step_zero() -> None:
     found = timeline(SLIDE | {"distance": 1e-3})
     for number in (0, len(found) + 1):

@@ -50,6 +50,17 @@ def test_steady_friction(integrator: Integrator, velocity: float, exponential: f
     assert rows[-1].operator_calls <= 4
 
 
+def test_error_of_a_step_in_full_contact() -> None:
+    """By the angle by which the wave turns in it (`time_error`). A load so large that pressure changes by 0.4 % of the
+    mean along the wave: the angle, weighed by pressure, is right to some 1e-5."""
+    stage = {"velocity": 1.0, "distance": 60 * CELL, "cells_per_step": 1, "pressure": 1e2 * MEAN}
+    _, rows = marched(wave([stage], tolerance=1e-10))
+    errors, z, angle = rows[-1].errors, CELL / 1.0 / 1e-3, 2.0 * np.sin(K * CELL / 2.0)
+    assert errors is not None
+    assert errors.friction is not None
+    assert errors.friction.time == pytest.approx(angle**2 / 8.0 * (1.0 + 1.0 / np.tanh(z / 2.0) - 2.0 / z), rel=2e-5)
+
+
 def transient(before: float, after: float, steps: int, integrator: Integrator) -> float:
     """Largest error, over the largest exact value, in 5 ms after 20 ms at one velocity and then at another."""
     stages = [{"duration": 20e-3, "time_step": 20e-3 / (4 * steps if before else 1), "velocity": before}]

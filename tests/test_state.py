@@ -22,6 +22,7 @@ RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "r
 STANDS = [{"pressure": 5e3}, {"pressure": 1e4}]
 SLIDES = [{"pressure": 1e4, "velocity": 0.1, "distance": 1e-4, "cells_per_step": 1}]
 OBLIQUE = [{"pressure": 1e4, "velocity": [0.1, 0.07], "distance": 1e-4, "cells_per_step": 1}]
+CHOSEN = [{"pressure": 1e4, "velocity": 0.1, "distance": 1e-4}]  # keeps pressures of some steps ago
 STEADY = {"initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4}, "output": {}}
 
 
@@ -34,6 +35,7 @@ def job(material: dict[str, Any], history: list[dict[str, Any]], **more: Any) ->
 CASES = [
     *(job(material, history) for material in (ELASTIC, RUBBER) for history in (STANDS, SLIDES, OBLIQUE)),
     job(RUBBER, SLIDES, numerics={"kernel": "love"}),
+    job(RUBBER, CHOSEN),
     *(job(material, SLIDES, **STEADY) for material in (ELASTIC, RUBBER)),
 ]
 

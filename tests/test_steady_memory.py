@@ -9,6 +9,7 @@ from parcontact import scene
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory, report
+from parcontact.solve import steady
 from parcontact.steady_sliding import start
 from parcontact.steady_sliding.sliding import SteadySliding
 
@@ -22,7 +23,7 @@ SCENES: dict[str, tuple[Json, Json, tuple[float, float]]] = {
 }
 
 
-def job(grid: Json, surface: Json, velocity: tuple[float, float], branches: int = 2) -> Job:
+def job(grid: Json, surface: Json, velocity: tuple[float, float], branches: int = 2, tolerance: float = 5e-3) -> Job:
     times = [{"modulus": 1e6, "relaxation_time": 10.0 ** -(k / 4 + 1)} for k in range(branches)]
     return Job.model_validate(
         {
@@ -31,7 +32,7 @@ def job(grid: Json, surface: Json, velocity: tuple[float, float], branches: int 
             "material": {"model": "zener", "modulus_inf": 1e6, "branches": times},
             "initial": {"state": "steady", "velocity": velocity, "pressure": 1e5},
             "history": [{"pressure": 1e5, "velocity": velocity, "duration": 1e-4, "time_step": 1e-5}],
-            "numerics": {"branch_error": 0.0},
+            "numerics": {"branch_error": 0.0, "tolerance": tolerance},
         }
     )
 
@@ -51,6 +52,25 @@ def test_what_is_held_while_it_is_solved(comm: MPI.Intracomm, name: str) -> None
 
 
 @pytest.mark.mpi
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(("tolerance", "itemsize"), [(5e-3, 4), (2e-3, 8)])
+def test_what_is_held_where_sets_change(
+    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, name: str, tolerance: float, itemsize: int
+) -> None:
+    """To the byte, without projected steps, and with linear steps that use all their directions: a map more, and two
+    for each of seven directions, in single precision where six tenths of the tolerance are 1.5e-3 or more."""
+    monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 0)
+    monkeypatch.setattr(steady, "WAYS", ((3, 0.0), (1, 0.0)))
+    grid, surface, velocity = SCENES[name]
+    planned = job(grid, surface, velocity, tolerance=tolerance)
+    slab = Slab(comm, *planned.grid.points)
+    assert SteadySliding(scene.frame(planned, slab)).solve(velocity, 1e5 if name == "free" else 3e3).sets > 0
+    few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
+    assert slab.tally["map bytes at most"] == most
+    assert most - few == (8 + 2 * 7 * itemsize) * slab.shape[0] * slab.nx
+
+
+@pytest.mark.mpi
 def test_no_more_than_steps_hold(comm: MPI.Intracomm) -> None:
     """With twelve branches: the solver's maps are gone when those of the march are made."""
     planned = job(*SCENES["along x"], branches=12)
@@ -58,6 +78,16 @@ def test_no_more_than_steps_hold(comm: MPI.Intracomm) -> None:
     march = start.first(planned, slab)
     assert march.row.measures.friction > 0.0
     assert slab.tally["map bytes at most"] == slab.tally["map bytes"] == memory.total(planned, comm.size, comm.rank)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_rank_has_more_than_is_planned(name: str) -> None:
+    """On three ranks or seven, of which the first have fewer rows than the last."""
+    planned = job(*SCENES[name])
+    for ranks in (3, 7):
+        each = [memory.steady_start(planned, ranks, rank) for rank in range(ranks)]
+        waves = 16 * 3 * 3  # bytes of those up to (2, 1), which another rank may have
+        assert each[0] < max(each) <= memory.steady_start(planned, ranks) <= max(each) + waves
 
 
 def test_plan_tells_both() -> None:

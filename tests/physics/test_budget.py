@@ -118,6 +118,31 @@ def test_spots_that_pass_within_a_step() -> None:
     assert time_error(known, jump, points) == pytest.approx((0.3 * edges + seen.area**4) * still)
 
 
+def test_branches_count_by_the_friction_they_make() -> None:
+    """Of the module of `time_error`: w = G omega tau/(1 + (omega tau)^2), for spots that pass and for waves."""
+    dt, moduli, times = 1e-3, np.array([1e6, 3e6]), np.array([1e-3, 1e-4])
+    known = replace(KNOWN, prony=Prony(1e5, moduli, times))
+    spot = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 0.1, 0.08, 1.0, dt)
+    x = 1.0 / spot_radius(spot, 10_000)
+
+    def mean(angle: float) -> float:
+        weights = moduli * (angle / dt * times) / (1.0 + (angle / dt * times) ** 2)
+        return float(np.average([late(dt / tau) for tau in times], weights=weights))
+
+    passing = 0.66 * (1.0 - 0.1**4) * x * (mean(x) + 0.19 * x)
+    assert time_error(known, spot, 10_000) == pytest.approx(passing, rel=1e-12)
+    full = replace(spot, area=1.0, corrected=1.0, angle=0.5)
+    assert time_error(known, full, 10_000) == pytest.approx(0.5**2 / 8.0 * (1.0 + mean(0.5)), rel=1e-12)
+
+
+@pytest.mark.parametrize(("order", "power"), [(1.0, 1.7), (1.2, 1.7 / 1.2), (2.0, 1.25)])
+def test_order_of_the_pair(order: float, power: float) -> None:
+    """The error goes with the power 1.7 of the step, the difference with its order: with that of the difference by
+    which these agree, 1.25 at least."""
+    one, other = (time_error(KNOWN, replace(SEEN, difference=e, order=order), 10_000) for e in (1e-4, 2e-4))
+    assert other / one == pytest.approx(2.0**power, rel=1e-12)
+
+
 @pytest.mark.parametrize("z", [1e-9, 0.9e-3, 1.1e-3, 2.0, 1e3])
 def test_waves_that_turn_within_a_step(z: float) -> None:
     """In full contact, of one branch: L, a sixth of z where that has no digits left. The true error of a harmonic wave

@@ -28,7 +28,7 @@ def march(comm: MPI.Intracomm, name: str, nx: int, ny: int, dt: float) -> tuple[
     pressure = np.maximum(p, 0.0)
     look = pair.look(dt, trial, pressure, displacement, slab.sum(float(pressure.sum()))[0], 1.0)
     found = [body.u.copy(), pressure, displacement * trial.alpha, np.roll(heights, 2, axis=1)]
-    return pair, [*found, np.array([look.difference, look.slope])], trial.alpha
+    return pair, [*found, np.array([look.difference, look.slope, look.angle])], trial.alpha
 
 
 @pytest.mark.mpi
@@ -55,13 +55,17 @@ def test_difference_of_the_integrators(comm: MPI.Intracomm, name: str, dt: float
                     branch = (branch + modulus * change) / (1.0 + z)
             total = total + branch
         ends.append(total)
-    wrong, size, load, slopes = slab.sum(
+    wrong, size, load, slopes, height, square, turned = slab.sum(
         float(np.sum(p * (ends[0] - ends[1]) ** 2)),
         float(np.sum(p * ap**2)),
         float(p.sum()),
         float(np.sum(p * ((np.roll(h, -1, axis=1) - np.roll(h, 1, axis=1)) / (2 * DX)) ** 2)),
+        float(np.sum(p * h)),
+        float(np.sum(p * h**2)),
+        float(np.sum(p * (second - first) ** 2)),
     )
-    assert_allclose(look, [np.sqrt(wrong / size), np.sqrt(slopes / load)], rtol=1e-9)
+    angle = np.sqrt(turned / load) / np.sqrt(square / load - (height / load) ** 2)
+    assert_allclose(look, [np.sqrt(wrong / size), np.sqrt(slopes / load), angle], rtol=1e-9)
 
 
 @pytest.mark.mpi

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from parcontact.errors import InputError, RunError
 from parcontact.parallel.slab import Slab
 from parcontact.physics.entries import Entry
-from parcontact.record import checkpoint, info
+from parcontact.record import checkpoint, hdf5, info
 from parcontact.record.checkpoint import Contents, Facts
 from parcontact.record.provenance import Link, Provenance
 
@@ -103,6 +103,32 @@ def test_failed_write_leaves_the_old_one(comm: MPI.Intracomm, tmp_path: Path) ->
     assert [file.name for file in tmp_path.iterdir()] == ["file.h5"]
     with pytest.raises(RunError, match=r"cannot make .*No such file or directory"):
         write(tmp_path / "absent" / "file.h5", comm)
+
+
+def test_it_is_on_the_disk_before_it_has_its_name(
+    comm: MPI.Intracomm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whole and sealed, under another name."""
+    path, sync, found = tmp_path / "file.h5", hdf5.sync, list[tuple[int, bool]]()
+
+    def look_and_sync(part: Path, slab: Slab) -> None:
+        found.append((checkpoint.inspect(part).step, path.exists()))
+        sync(part, slab)
+
+    monkeypatch.setattr(hdf5, "sync", look_and_sync)
+    write(path, comm)
+    assert found == [(7, False)]
+
+
+def test_maps_that_cannot_be_read(comm: MPI.Intracomm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As from a broken disk: said in a sentence, as of a damaged file."""
+
+    def fail(*_: object) -> None:
+        raise RunError("cannot read file.h5")
+
+    write(tmp_path / "file.h5", comm)
+    monkeypatch.setattr(hdf5, "read", fail)
+    assert look(tmp_path / "file.h5", comm) == "cannot read file.h5"
 
 
 def test_every_bit_counts(comm: MPI.Intracomm, tmp_path: Path) -> None:

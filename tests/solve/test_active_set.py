@@ -62,6 +62,22 @@ def test_from_full_contact_to_none() -> None:
     found = active_set.solve(body, h, Approach(-1.01 * h.max()), np.ones_like(h))
     assert found.converged
     assert np.all(found.p == 0.0)
+    assert found.iterations == 0  # what would not penetrate the undeformed body is no set to begin with
+
+
+def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
+    """From a start with half of the load on the set, and as much outside: the load to rounding, the gap to what was
+    asked for, nothing outside; in some ten conjugate directions, of which each would change the load by itself."""
+    h, load = rough(64), MeanPressure(0.5)
+    body = solver(h)
+    x = np.full_like(h, 0.5)
+    search = active_set._Search(body, h, load, x)
+    search.working = h > 0.5 * h.max()
+    u = np.empty_like(h)
+    assert 5 < search.solve_on_set(u, 1e-9) < 50
+    assert_allclose(x.sum(), 0.5 * h.size, rtol=1e-13)
+    assert_allclose((u - h)[search.working], search.d, rtol=0, atol=1.001e-9)
+    assert np.all(x[~search.working] == 0.0)
 
 
 def test_it_says_when_it_has_found_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
