@@ -4,11 +4,12 @@ The error E of a step of length dt is estimated from that step alone (`physics.t
 share of `numerics.accuracy`. As E goes with dt^p (p = 1.7 for the exponential integrator, 1 for backward Euler), the
 next is
 
-    dt <- dt clip(SAFETY (E0/E)^(1/p), MOST_SHRINK, MOST_GROWTH),
+    dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
 
-and a step with E > REJECTED E0 is made anew from the same state, as much shorter as E is too large; the one after it
-does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993), II.4). At rest
-steps are a shortest one times powers of the fourth root of two, so that rounding has no part in their length.
+and a step with E > REJECTED E0 is made anew from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
+long; the one after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
+(1993), II.4). At rest steps are a shortest one times powers of the fourth root of two, so that rounding has no part in
+their length.
 
 While the surface slides, steps end at multiples of their length, counted in cells from where the surface was at first
 (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump,
