@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from marching import SLS, begun
 
+from parcontact.job import Grid
+from parcontact.job.chosen import most_cells
+from parcontact.job.surface import Flat, HeightFile, Rough, Sphere, Wave
 from parcontact.job.timeline import Step
 from parcontact.march.choosing import MOST_GROWTH, REJECTED, SAFETY, StepChooser
 from parcontact.march.step import March
@@ -132,3 +135,32 @@ def test_no_short_step_is_left_over_at_rest(duration: float) -> None:
     assert np.all(steps[:-2] == pytest.approx(steps[0], rel=1e-9))
     assert np.all(steps <= 1.1 * steps[0] * (1.0 + 1e-9))
     assert np.all(steps >= 0.55 * steps[0] * (1.0 - 1e-9))
+
+
+SPHERE, FLAT, FILE = Sphere.model_construct(), Flat.model_construct(), HeightFile.model_construct()
+
+
+def wave(*waves: int) -> Wave:
+    return Wave.model_construct(waves=waves)
+
+
+@pytest.mark.parametrize(
+    ("surface", "cells"),
+    [
+        ([SPHERE, FLAT], 4),
+        ([wave(1, 0)], 4),
+        ([wave(2, 0)], 4),
+        ([wave(0, 2)], 2),
+        ([wave(3, 1)], 2),
+        ([wave(8, 0)], 1),
+        ([wave(1, 0), SPHERE, wave(0, -4)], 1),
+        ([wave(31, 0)], 1),
+        ([Rough.model_construct(short_wavelength=32e-3 / 64)], 2),
+        ([Rough.model_construct(short_wavelength=31e-3 / 64)], 1),
+        ([SPHERE, FILE], 1),
+    ],
+)
+def test_longest_step_of_a_slide(surface: list[Any], cells: int) -> None:
+    """A power of two of cells, on 64 x 32 of them: four, or an eighth of the shortest wave along either direction, of
+    which those of a rough surface count with the longer side of a cell; one for any heights."""
+    assert most_cells(Grid(points=(64, 32), size=(1e-3, 1e-3)), surface) == cells

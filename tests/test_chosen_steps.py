@@ -48,7 +48,8 @@ def test_it_is_what_a_stage_does_that_says_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "most", "seconds"), [(1.0, 8.0, 30.0), (1.0, 8.0, 5.0), (3.0, 3.0, 7.5), (0.1, 64, 64)]
+    ("first", "most", "seconds"),
+    [(1.0, 8.0, 30.0), (1.0, 8.0, 5.0), (3.0, 3.0, 7.5), (0.1, 64, 64), (1.0, 8.0, 300.0), (1.0, 7.0, 300.0)],
 )
 def test_ladder(first: float, most: float, seconds: float) -> None:
     """Steps double up to the longest and end where they should; none is longer than twice the one before."""

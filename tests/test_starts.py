@@ -58,6 +58,22 @@ def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> No
         march.starts._moved = 0.0  # it has learnt nothing
 
 
+def test_the_last_two_pressures_are_the_start_where_that_took_fewer_iterations() -> None:
+    """Thirds of a cell of a slide that keeps pressures of further ago: extrapolated, not moved as less than half of a
+    cell is none; to rounding."""
+    chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
+    march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
+    given = Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / 3}]}).timeline()
+    for step in itertools.islice(given, 7):
+        march.starts.restore({NAME: np.array([3.0, 2.0, 5.0])})
+        start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
+        if step.number > 5:
+            last, earlier = march.state.pasts[:2]
+            line = (1.0 + step.growth) * last.alpha * last.pressure - step.growth * earlier.alpha * earlier.pressure
+            np.testing.assert_allclose(start, np.maximum(line / 2.0, 0.0), rtol=0, atol=1e-14 * start.max())
+        march.advance(step)
+
+
 def test_kinds_of_starts_are_compared() -> None:
     """The last two pressures are the start once a pressure of whole cells ago has taken more iterations; after some
     steps, the other one is tried again, and one that needs next to none is kept."""

@@ -151,8 +151,8 @@ class StepChooser:
         stop = next(stop for stop in ends.stops if not reached(now, stop))
         if span.stage.speed:
             dt = self._to_a_multiple(span, now, dt)
-        elif stop - now < 2.0 * dt:
-            dt = max(dt, stop - now) if stop - now <= STRETCH * dt else 0.5 * (stop - now)
+        elif STRETCH * dt < stop - now < 2.0 * dt:
+            dt = 0.5 * (stop - now)
         if stop - now <= (STRETCH if not span.stage.speed else 1.0 + SAME_LEVEL) * dt:
             dt, self._end = stop - now, stop
         else:
