@@ -8,7 +8,8 @@ The pass along x works through blocks of rows that stay in cache: what belongs t
 while it is hot, what stays goes straight to its place in the spectrum. Maps that FFTW cannot take as they are (padded
 along x, of another precision, not aligned) pass through a block too. The pass along y works through blocks of columns
 where they are, if there are many: of a convolution there, times the symbol, and back, while they are in cache. Besides
-its blocks of rows a transform holds one map, and on several ranks what it sends, which is less than another one.
+its blocks of rows a transform holds one map, and on several ranks what it sends, which is less than another one. In
+single precision rows of x-wavenumbers begin at cache lines, without which FFTW takes up to half as long again.
 """
 
 from collections.abc import Sequence
@@ -19,13 +20,14 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
 from .fftw import pyfftw
-from .slab import Array, Slab, allocate, deal
+from .slab import Array, Slab, allocate, deal, reused
 from .transpose import Leg, count_legs, legs_of, wire_points
 
 Spectrum = NDArray[np.complexfloating]
 BLOCK_BYTES = 1 << 19  # of one block of transformed rows, or columns, at most: fits a usual second-level cache
+LINE = 8  # wavenumbers in single precision in a cache line
 NARROWEST = 16  # columns in a block, which takes more than that where columns are very long
-LEAST_BYTES = 12 << 20  # of a spectrum that is worth blocks of columns: a usual last-level cache keeps a smaller one
+LEAST_BYTES = 4 << 20  # of a spectrum that is worth blocks of columns: a usual last-level cache keeps a smaller one
 SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
 
 
@@ -47,17 +49,23 @@ def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
 
 
 def footprint(
-    points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int
+    points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int, lent: bool = False
 ) -> tuple[int, int, int]:
-    """Bytes of one rank in an `FFT` of these lengths for maps of `points = (nx, ny)`: of its spectrum, of its blocks
-    and what waits to be sent, and what it sends in one transform."""
+    """Bytes of one rank in an `FFT` of these lengths for maps of `points = (nx, ny)`: of its spectrum, which may be
+    lent, of all else that it holds, and what it sends in one transform."""
     itemsize, waves = 2 * np.dtype(dtype).itemsize, lengths[0] // 2 + 1
     rows, columns = (part.stop - part.start for part in (deal(count, ranks)[rank] for count in (points[1], waves)))
     height = _block_height(rows, waves * itemsize, lengths[1], ranks)
-    blocks = height * lengths[0] * itemsize // 2 + (height * waves * itemsize if ranks > 1 else 0)
+    blocks = height * lengths[0] * itemsize // 2 + (height * _pitch(waves, itemsize) * itemsize if ranks > 1 else 0)
     legs = legs_of(rows, height, count_legs(lengths[1] * waves * itemsize, ranks))
     waiting = wire_points(legs, waves - columns) * itemsize
-    return lengths[1] * columns * itemsize, blocks + waiting, rows * (waves - columns) * itemsize
+    between = 0 if ranks > 1 or lent else lengths[1] * (_pitch(waves, itemsize) - waves) * itemsize
+    return lengths[1] * columns * itemsize, blocks + waiting + between, rows * (waves - columns) * itemsize
+
+
+def _pitch(waves: int, itemsize: int) -> int:
+    """Wavenumbers from one row to the next: in single precision whole cache lines, unless rows are short."""
+    return waves if itemsize > 8 or waves < LINE else -(-waves // LINE) * LINE
 
 
 def _block_height(rows: int, row_bytes: int, my: int, ranks: int) -> int:
@@ -83,7 +91,9 @@ class FFT:
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)` (default: equal to
     it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either; `measured`: FFTW tries
-    which way is the fastest, else it guesses, the same every time. Making and calling one are collective.
+    which way is the fastest, else it guesses, the same every time; `lender`, another one of these lengths in double
+    precision, for one in single precision whose spectrum is to be where that of the lender is. Making and calling one
+    are collective.
     """
 
     def __init__(
@@ -92,6 +102,7 @@ class FFT:
         lengths: tuple[int, int] | None = None,
         dtype: DTypeLike = np.float64,
         measured: bool = True,
+        lender: "FFT | None" = None,
     ) -> None:
         self.slab, self.measured = slab, measured
         self.mx, self.my = lengths or (slab.nx, slab.ny)
@@ -102,7 +113,7 @@ class FFT:
         dealt = deal(self.mx // 2 + 1, slab.comm.size)
         self.columns = dealt[slab.comm.rank]
         self.shape = (self.my, self.columns.stop - self.columns.start)
-        self.spectrum: Spectrum = allocate(self.shape, self.complex, slab.tally)
+        self.spectrum = self._make_spectrum(lender)
         self._name = transform_name((self.mx, self.my), dtype)
         self._make_blocks(dealt)
         self._make_transforms()
@@ -223,6 +234,13 @@ class FFT:
 
     # -- blocks and transforms ----------------------------------------------------------------------------------------
 
+    def _make_spectrum(self, lender: "FFT | None") -> Spectrum:
+        rows, columns = self.shape
+        shape = (rows, _pitch(columns, self.complex.itemsize) if self.slab.comm.size == 1 else columns)
+        if lender is None:
+            return allocate(shape, self.complex, self.slab.tally)[:, :columns]
+        return reused(lender.spectrum, shape, self.complex)[:, :columns]
+
     def _make_blocks(self, dealt: list[slice]) -> None:
         """Blocks of rows, leg by leg of the exchange, and of columns."""
         slab, ranks, row_bytes = self.slab, self.slab.comm.size, (self.mx // 2 + 1) * self.complex.itemsize
@@ -233,7 +251,8 @@ class FFT:
         ]
         own, height, waves = legs[slab.comm.rank], heights[slab.comm.rank], self.mx // 2 + 1
         self._row_block = allocate((height, self.mx), self.dtype, slab.tally)
-        self._wave_block = allocate((height if ranks > 1 else 0, waves), self.complex, slab.tally)
+        block = (height if ranks > 1 else 0, _pitch(waves, self.complex.itemsize))
+        self._wave_block = allocate(block, self.complex, slab.tally)[:, :waves]
         wire = allocate((wire_points(own, waves - self.shape[1]),), self.complex, slab.tally)
         self._legs: list[tuple[Leg | None, list[slice]]] = []
         for number, leg in enumerate(own):

@@ -108,3 +108,8 @@ def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[
     array = pyfftw.empty_aligned(shape, dtype=dtype, n=64)
     tally.hold(array)
     return array
+
+
+def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """The memory of an array in one piece as another one, which takes no more, for while nobody needs the first."""
+    return np.ndarray(shape, dtype, buffer=array)

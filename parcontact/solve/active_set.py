@@ -81,8 +81,9 @@ class _Search:
             slope, curvature = slab.sum(kernels.dot(r, t), kernels.dot(t, change))
             if not (slope > 0.0 and curvature > 0.0):
                 break
-            x -= slope / curvature * t
-            u -= slope / curvature * change
+            step = np.float64(slope / curvature)  # whose products with t are not rounded to its precision
+            x -= step * t
+            u -= step * change
             iterations += 1
         return iterations
 

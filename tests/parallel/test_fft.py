@@ -18,7 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from parcontact.parallel import fft as transforms
 from parcontact.parallel import transpose
-from parcontact.parallel.fft import FFT, export_wisdom, footprint, import_wisdom
+from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
 from parcontact.parallel.slab import Slab
 
 pytestmark = pytest.mark.mpi
@@ -274,21 +274,3 @@ def test_foreign_wisdom(comm: MPI.Intracomm) -> None:
     assert not import_wisdom(b"(fftw-9.9 fftw_wisdom)\x1e\x1e")
     assert import_wisdom(export_wisdom())
     check(Slab(comm, 16, 16), (16, 16), np.float64)
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize(
-    ("points", "lengths"), [((20, 14), (20, 14)), ((300, 200), (600, 400)), ((2000, 5), (2000, 5))]
-)
-def test_footprint(
-    communicators: list[MPI.Intracomm], points: tuple[int, int], lengths: tuple[int, int], dtype: type
-) -> None:
-    """What a transform holds is known before it is made; ranks without rows too."""
-    for comm in communicators:
-        slab = Slab(comm, *points)
-        fft = FFT(slab, lengths, dtype)
-        spectrum, blocks, sent = footprint(points, lengths, dtype, comm.size, comm.rank)
-        assert spectrum == fft.spectrum.nbytes
-        assert spectrum + blocks == slab.tally["map bytes"]
-        fft.forward(slab.zeros())
-        assert slab.tally["bytes sent"] == sent

@@ -1,0 +1,56 @@
+"""What transforms hold, where rows of x-wavenumbers begin, and a spectrum that one lends another."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact.parallel.fft import FFT, footprint
+from parcontact.parallel.slab import Slab
+
+pytestmark = pytest.mark.mpi(2, 3)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(
+    ("points", "lengths"), [((20, 14), (20, 14)), ((300, 200), (600, 400)), ((2000, 5), (2000, 5)), ((9, 30), (9, 30))]
+)
+def test_footprint(
+    communicators: list[MPI.Intracomm], points: tuple[int, int], lengths: tuple[int, int], dtype: type
+) -> None:
+    """What a transform holds is known before it is made; ranks without rows too."""
+    for comm in communicators:
+        slab = Slab(comm, *points)
+        fft = FFT(slab, lengths, dtype)
+        spectrum, blocks, sent = footprint(points, lengths, dtype, comm.size, comm.rank)
+        assert spectrum == fft.spectrum.nbytes
+        assert spectrum + blocks == slab.tally["map bytes"]
+        fft.forward(slab.zeros())
+        assert slab.tally["bytes sent"] == sent
+
+
+@pytest.mark.parametrize("nx", [8, 14, 16, 300])
+def test_rows_of_waves_in_single_precision(nx: int) -> None:
+    """On one rank they begin at cache lines of 64 bytes, unless they are shorter than one."""
+    spectrum = FFT(Slab(MPI.COMM_SELF, nx, 6), dtype=np.float32).spectrum
+    assert spectrum.shape == (6, nx // 2 + 1)
+    assert all(row.ctypes.data % 64 == 0 for row in spectrum) == (nx // 2 + 1 >= 8)
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(20, 14), (6, 40), (1, 7), (300, 2)])
+def test_lent_spectrum(communicators: list[MPI.Intracomm], nx: int, ny: int) -> None:
+    """Each makes its transforms in turns, to the precision that maps have here; the second one holds no spectrum."""
+    for comm in communicators:
+        slab = Slab(comm, nx, ny)
+        double, alone = FFT(slab), FFT(slab, dtype=np.float32)
+        before = slab.tally["map bytes"]
+        single = FFT(slab, dtype=np.float32, lender=double)
+        _, held, _ = footprint((nx, ny), (nx, ny), np.float32, comm.size, comm.rank, lent=True)
+        assert slab.tally["map bytes"] - before == held
+        assert np.shares_memory(single.spectrum, double.spectrum) or not single.spectrum.size
+        field, out = np.random.default_rng(4).normal(size=(ny, nx))[slab.rows], slab.zeros(np.float32)
+        for transform in (single, alone, double, single):
+            spectrum = transform.forward(field.astype(transform.dtype)).copy()
+            transform.backward(spectrum, out)
+            assert np.abs(out - field).max(initial=0.0) <= 1e-6 * np.abs(field).max(initial=1.0)
+        expected = alone.forward(field.astype(np.float32)).copy()
+        assert np.abs(single.forward(field.astype(np.float32)) - expected).max(initial=0.0) <= 1e-6 * nx * ny
