@@ -39,6 +39,19 @@ def test_begin(offset: int, count: int) -> None:
     assert_allclose(work, effective, rtol=1e-14, atol=1e-14)
 
 
+def test_small_losses_in_single_precision() -> None:
+    """A branch that loses 1e-7 of itself in a step, less than the last digit of its decay, loses just that beside what
+    it gains; the step rounds it to 6e-8 of its size at most."""
+    loss, count = 1e-7, 1000
+    branches, work = np.full((1, 1, 8), 2.0, np.float32), np.full((1, 8), 1.0, np.float32)
+    u = heights = np.zeros((1, 8), np.float32)
+    gain = 2.0 * loss + 2.0**-20  # that of a whole number of digits more
+    for _ in range(count):
+        loops.begin(branches, np.array([1.0 - loss]), np.array([gain]), work, np.zeros(1), 0.0, u, heights, 0)
+        work[...] = 1.0
+    assert_allclose(branches, 2.0 + count * 2.0**-20, rtol=1e-7)
+
+
 @pytest.mark.parametrize("offset", OFFSETS)
 def test_commit(offset: int) -> None:
     displacement, work, u, heights = maps(4)
