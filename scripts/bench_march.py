@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.march.rest import steps_to_make
+from parcontact.parallel.fft import transform_name
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab, deal
 from parcontact.steady_sliding import start
@@ -26,7 +27,8 @@ LONGEST = 1.25e-4  # [m], half of the longest wave: for small grids
 def march(points: int, rounds: int) -> Iterator[Line]:
     """From the steady start through the climb, then rounds of a step of one cell and bare transforms; collective.
 
-    Bare transforms are ours, with the exchange between ranks, and FFTW's passes alone, which exchange nothing.
+    Bare transforms are ours, with the exchange between ranks, and FFTW's passes alone, which exchange nothing, both in
+    double precision for all transforms of a step, whatever theirs is; and ours, each in its own precision.
     """
     changes = {"grid.points": points, "surface.0.short_wavelength": min(CELLS * 1e-3 / points, LONGEST)}
     job = jobs.load(JOB, changes)
@@ -38,15 +40,20 @@ def march(points: int, rounds: int) -> Iterator[Line]:
         if step.number > run.timeline().spans[0].last:
             break
     held = slab.sum(slab.tally["map bytes at most"])[0] / (8 * points**2)
-    ways = {"ours alone": pair(slab, "float64"), "FFTW's passes alone": passes(slab.comm, points)}
+    bare = passes(slab.comm, points)
+    double, single = pair(slab, "float64"), pair(slab, "float32")
+    names = [transform_name((points, points), dtype) for dtype in ("float64", "float32")]
     calls = slab.tally["operator"]
-    ratios: dict[str, list[float]] = {name: [] for name in ways}
+    ratios: dict[str, list[float]] = {name: [] for name in ("ours alone", "FFTW's passes alone", "ours, as precise")}
     for step in islice(steps, rounds):
-        before = slab.tally["fft"]
+        before = slab.tally.copy()
         seconds = _seconds(partial(run.advance, step))
-        transforms = slab.tally["fft"] - before
-        for name, way in ways.items():
-            ratios[name].append(seconds / (0.5 * transforms * _seconds(way)))
+        made = slab.tally.since(before)
+        ours, theirs, own = _seconds(double), _seconds(bare), _seconds(single)
+        in_double, in_single = (0.5 * made.get(name, 0) for name in names)
+        pairs = in_double + in_single
+        for name, took in zip(ratios, (pairs * ours, pairs * theirs, in_double * ours + in_single * own), strict=True):
+            ratios[name].append(seconds / took)
     yield Line("march", "operator calls per step", (slab.tally["operator"] - calls) / rounds, "")
     for name, values in ratios.items():
         low, middle, high = np.quantile(values, (0.25, 0.5, 0.75)).tolist()
