@@ -181,7 +181,7 @@ def _motion(base: Frame) -> Motion:
     """How the surface moves."""
     if not decisions.part_cells(base.job).on:
         return WholeCells(base.surface, base.dtype)
-    if decisions.whole_cells_at_times(base.job):
+    if decisions.along_x(base.job):
         return PartCells(base.surface, base.dtype)
     return AnyFraction(base.surface, base.dtype)
 
@@ -201,9 +201,10 @@ def _solver(base: Frame, tolerance: float) -> ContactSolver:
 
 
 def _preconditioner(base: Frame) -> Convolution:
-    single = decisions.mixed_precision(base.job).on
-    fft = FFT(base.slab, dtype=np.float32, measured=base.fft.measured) if single else base.fft
-    return base.half_space.inverse(fft)
+    if not decisions.mixed_precision(base.job).on:
+        return base.half_space.inverse(base.fft)
+    single = FFT(base.slab, dtype=np.float32, measured=base.fft.measured, lender=base.fft)
+    return base.half_space.inverse(single)
 
 
 def _energy(base: Frame, solver: ContactSolver, material: ElasticBody | ZenerBody) -> ElasticEnergy | ZenerEnergy:

@@ -232,7 +232,8 @@ def test_a_run_in_pieces_has_the_same_steps(
 
 @pytest.mark.mpi(4)
 def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
-    """The instants are the same to the last bit, friction to rounding of its largest: at rest it is noise."""
+    """The instants are the same to the last bit, friction to some roundings of search directions, 6e-8, of its largest:
+    at rest it is noise."""
     found: list[list[dict[str, str]]] = []
     for comm in communicators:
         found.append(run(shared_path, comm, f"on {comm.size}"))
@@ -240,7 +241,7 @@ def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communica
     for other in found[1:] if communicators[0].rank == 0 and found[0] else ():
         assert [row["time"] for row in other] == [row["time"] for row in found[0]]
         mine, theirs = ([float(row["friction"]) for row in rows] for rows in (found[0], other))
-        np.testing.assert_allclose(theirs, mine, rtol=0, atol=1e-9 * max(mine))
+        np.testing.assert_allclose(theirs, mine, rtol=0, atol=1e-7 * max(mine))
 
 
 def test_going_on_beyond_the_end(tmp_path: Path) -> None:

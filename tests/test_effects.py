@@ -120,6 +120,23 @@ def test_mixed_precision() -> None:
     assert whole(job(**on))[f"fft {NX}x{NY} float32"] == 2 * ITERATIONS
 
 
+@pytest.mark.parametrize(
+    ("changes", "on"),
+    [
+        ({"tolerance": 1e-5}, True),
+        ({"tolerance": 0.99e-5}, False),
+        ({"tolerance": 1e-5, "precision": "single"}, False),
+        ({"tolerance": 1e-5, "energy": True}, False),
+        ({"tolerance": 1e-5, "energy": True, "kernel": "love"}, True),
+    ],
+)
+def test_preconditioner_of_loose_solves(changes: Json, on: bool) -> None:
+    """In single precision beside double, unless energies take it for the inverse of the operator."""
+    numerics = {key: value for key, value in changes.items() if key != "energy"}
+    planned = job(history=[PRESS], material=RUBBER, numerics=numerics, output={"energy": "energy" in changes})
+    assert row(planned, "mixed precision").on == on
+
+
 def test_isolated_contact() -> None:
     """Off: no padded transform; on: one for every operator call but the preconditioner's."""
     off, on = job(surface=SPHERE), job(surface=SPHERE, grid={"boundary": "free"})

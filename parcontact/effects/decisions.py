@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from ..job import Job, Spectral
 from ..job.cells import first_between_cells
+from ..solve.precision import LOOSE
 from . import folded_branches, relaxation
 from .effect import Decision
 
@@ -25,7 +26,7 @@ def sliding(job: Job) -> Decision:
 
 
 def part_cells(job: Job) -> Decision:
-    """Heights made anew when the surface has moved, instead of an index offset along x on a periodic box."""
+    """Heights made anew when the surface has moved, but for whole cells along x on a periodic box."""
     return Decision("sub-cell or oblique sliding", *_part_cells(job))
 
 
@@ -34,7 +35,7 @@ def _part_cells(job: Job) -> tuple[bool, str]:
         return False, "the surface stands"
     if job.grid.boundary == "free":
         return True, "a free box is not cyclic: the heights are made anew"
-    if whole_cells_at_times(job):
+    if along_x(job) and further_starts(job).on:
         return True, "stages that choose their own steps begin with parts of a cell where they must"
     step = first_between_cells(job.timeline(), job.grid)
     if step is None:
@@ -42,13 +43,10 @@ def _part_cells(job: Job) -> tuple[bool, str]:
     return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
 
 
-def whole_cells_at_times(job: Job) -> bool:
-    """Whether the surface slides along x on a periodic box, in steps that are chosen while it does: by whole cells
-    where these are accurate enough."""
-    timeline = job.timeline()
-    spans = [span for span in timeline.spans if span.moves]
-    along_x = job.grid.boundary == "periodic" and not any(span.stage.velocity[1] for span in spans)
-    return along_x and timeline.chooses and any(span.stage.chooses for span in spans)
+def along_x(job: Job) -> bool:
+    """Whether the surface slides along x on a periodic box, where whole cells are an index offset."""
+    spans = [span for span in job.timeline().spans if span.moves]
+    return bool(spans) and job.grid.boundary == "periodic" and not any(span.stage.velocity[1] for span in spans)
 
 
 def lasting(job: Job) -> Decision:
@@ -105,12 +103,20 @@ def energies(job: Job) -> Decision:
 def energy_memory(job: Job) -> Decision:
     """Branch maps of `A^-1 u`, where the operator's inverse is not at hand."""
     name = "energy memory"
-    if not (energies(job).on and relaxation.decide(job).on):
+    if not _relaxing_energies(job):
         return Decision(name, False, "no energies of a viscoelastic body are asked for")
-    grid, numerics = job.grid, job.numerics
-    invertible = grid.boundary == "periodic" and numerics.kernel == "spectral" and numerics.precision == "double"
+    invertible = _is_invertible(job) and job.numerics.precision == "double"
     why = "the preconditioner is the inverse" if invertible else "the preconditioner is not the inverse"
     return Decision(name, not invertible, why)
+
+
+def _relaxing_energies(job: Job) -> bool:
+    return energies(job).on and relaxation.decide(job).on
+
+
+def _is_invertible(job: Job) -> bool:
+    """Whether the preconditioner is the inverse of the operator, but for its precision."""
+    return job.grid.boundary == "periodic" and job.numerics.kernel == "spectral"
 
 
 def branch_dissipation(job: Job) -> Decision:
@@ -154,9 +160,15 @@ def mesh_check(job: Job) -> Decision:
 
 
 def mixed_precision(job: Job) -> Decision:
-    """A preconditioner in single precision, with transforms of its own."""
-    precision = job.numerics.precision
-    return Decision("mixed precision", precision == "mixed", f"numerics.precision is {precision}")
+    """A preconditioner in single precision, with transforms of its own, which costs no iteration."""
+    name, numerics = "mixed precision", job.numerics
+    if numerics.precision != "double":
+        return Decision(name, numerics.precision == "mixed", f"numerics.precision is {numerics.precision}")
+    if numerics.tolerance < LOOSE:
+        return Decision(name, False, f"numerics.tolerance is below {LOOSE:g}")
+    if _relaxing_energies(job) and _is_invertible(job):
+        return Decision(name, False, "energies take the preconditioner for the inverse of the operator")
+    return Decision(name, True, f"a solve to a tolerance of {LOOSE:g} or more takes as many iterations with it")
 
 
 TABLE: tuple[Callable[[Job], Decision], ...] = (

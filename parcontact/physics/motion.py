@@ -11,6 +11,7 @@ from .body import Heights
 from .surface import Surface
 
 Vector = tuple[float, float]
+SAME_PART = 1e-9  # of a cell: positions that are whole cells apart differ by their rounding, which is less
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
@@ -58,8 +59,8 @@ class AnyFraction:
 
 
 class PartCells:
-    """Sliding along x on a periodic box by whole cells, or by a part of one now and then: one map, made anew when the
-    part has changed, and an index offset for the whole cells."""
+    """Sliding along x on a periodic box, not by whole cells at times: one map, made anew when the part of a cell beside
+    the whole ones has changed, and an index offset for these."""
 
     def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
         self._surface = surface
@@ -70,7 +71,7 @@ class PartCells:
     def at(self, displacement: tuple[float, float]) -> Heights:
         cells = displacement[0] / self._cell
         whole = math.floor(cells + SAME_PLACE)
-        part = cells - whole if abs(cells - whole) > SAME_PLACE else 0.0
+        part = SAME_PART * round((cells - whole) / SAME_PART) if cells - whole > SAME_PLACE else 0.0
         if part != self._part:
             self._surface.slab.tally["shift"] += 1
             self._surface.heights((part * self._cell, 0.0), self._map)

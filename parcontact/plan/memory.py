@@ -30,6 +30,8 @@ from ..solve.steady import SteadySolver
 from ..solve.surround import grids_for
 from ..steady_sliding.sliding import tolerance_of
 
+TRANSFORMS = "transforms"  # that every job has
+
 
 @dataclass(frozen=True)
 class Holding:
@@ -88,14 +90,14 @@ def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
     symbol = Convolution.footprint(spectrum, job.grid.ny)
-    yield _transform("transforms", job, job.grid.points, precision, ranks, rank)
+    yield _transform(TRANSFORMS, job, job.grid.points, precision, ranks, rank)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
         yield _transform("padded transforms and operator", job, lengths, precision, ranks, rank, with_symbol=True)
     else:
         yield Holding("operator", symbol)
     if decisions.mixed_precision(job).on:
         what, points = "single transforms and preconditioner", job.grid.points
-        yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True)
+        yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True, lent=True)
     else:
         yield Holding("preconditioner", symbol)
     grids = grids_for(job.grid.dx, job.grid.dy)
@@ -152,11 +154,12 @@ def _transform(
     ranks: int,
     rank: int,
     with_symbol: bool = False,
+    lent: bool = False,
 ) -> Holding:
-    """A transform with its buffers, and the symbol of the operator that alone uses it."""
-    spectrum, blocks, sent = footprint(job.grid.points, lengths, dtype, ranks, rank)
+    """A transform with its buffers, its spectrum perhaps `lent`, and the symbol of the operator that alone uses it."""
+    spectrum, blocks, sent = footprint(job.grid.points, lengths, dtype, ranks, rank, lent)
     symbol = Convolution.footprint(spectrum, lengths[1]) if with_symbol else 0
-    return Holding(what, spectrum + blocks + symbol, transform_name(lengths, dtype), sent)
+    return Holding(what, (0 if lent else spectrum) + blocks + symbol, transform_name(lengths, dtype), sent)
 
 
 def _maps(job: Job) -> Iterator[Maps]:
@@ -167,8 +170,7 @@ def _maps(job: Job) -> Iterator[Maps]:
     if relaxation.decide(job).on:
         yield Maps("branches", ZenerBody.count_maps(len(fold_branches_of(job).kept)), precision)
     else:
-        moved = decisions.sliding(job).on and not decisions.part_cells(job).on
-        yield Maps("moved heights", ElasticBody.count_maps(moved), precision)
+        yield Maps("moved heights", ElasticBody.count_maps(decisions.along_x(job)), precision)
     if decisions.energy_memory(job).on:
         yield Maps("energy memory", ElasticPressure.count_maps(relaxation_of(job).moduli.size), np.float64)
     for name, effect in effects_that_follow(job).items():

@@ -138,11 +138,12 @@ class Scaling:
 
     def _messages(self, job: Job, sample: Sample, ranks: int) -> float:
         """On the grid of some job; counts are those of the sample's."""
-        names = [holding.transform for holding in memory.holdings(sample.job) if holding.transform]
-        sent = [holding.sent for holding in memory.holdings(job, ranks) if holding.transform]
+        sent = {holding.what: holding.sent for holding in memory.holdings(job, ranks) if holding.transform}
         exchanges = sum(
-            _per_step(sample, name) * self.machine.transpose(size, ranks)
-            for name, size in zip(names, sent, strict=True)
+            _per_step(sample, holding.transform)
+            * self.machine.transpose(sent.get(holding.what, sent[memory.TRANSFORMS]), ranks)
+            for holding in memory.holdings(sample.job)
+            if holding.transform
         )
         return exchanges + (_per_step(sample, "allreduce") + SUMS_PER_STEP) * self.machine.sum(ranks)
 

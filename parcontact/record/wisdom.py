@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import private
+from ..effects import decisions
 from ..job import Job
+from ..parallel import fft
 from ..parallel.fft import export_wisdom, import_wisdom
 from ..parallel.fftw import pyfftw
 from ..parallel.slab import Slab
@@ -82,7 +84,8 @@ def _place(job: Job, slab: Slab) -> Path | None:
     with suppress(OSError):
         cpu = next((line for line in CPUINFO.read_text().splitlines() if line.startswith("model name")), "")
     steady = [job.initial.state, job.steady is not None]
-    facts = [platform.machine(), cpu, pyfftw.fftw_version]
-    facts += [slab.comm.size, job.grid.points, job.grid.boundary, job.numerics.kernel, job.numerics.precision, steady]
+    numerics, mixed = job.numerics, decisions.mixed_precision(job).on
+    facts = [platform.machine(), cpu, pyfftw.fftw_version, zlib.crc32(Path(fft.__file__).read_bytes())]
+    facts += [slab.comm.size, job.grid.points, job.grid.boundary, numerics.kernel, numerics.precision, mixed, steady]
     name = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
     return directory / name

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..parallel.slab import Array, Slab, deal
+from ..parallel.slab import Array, Slab, deal, reused
 from . import kernels
 from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
@@ -217,13 +217,14 @@ class ContactSolver:
         return None
 
     def _turn(
-        self, h: Array, level: float, slope: float, members: float, centred: bool, z: Array
+        self, h: Array, level: float, slope: float, members: float, centred: bool, free: Array
     ) -> tuple[float, float]:
         """Put the new search direction into `_t`; returns its slope `<r, t>`, and the exact step over the last one.
 
         The residual is `u - h - level` on the working set; the last displacement is in `_w`. `slope` is that of the
-        last direction, 0 for one to be forgotten. The map z is free to be used.
+        last direction, 0 for one to be forgotten. There is a map that is `free`.
         """
+        z = reused(free, free.shape, self._t.dtype)
         kernels.residual(self._working, self._u, h, level, z)
         self._surround.apply(self._working, z)
         sums = kernels.products(self._working, self._u, h, level, self._w, z, self._t)

@@ -1,7 +1,9 @@
 """In what precision solvers keep search directions, which are as good when they are rounded.
 
-Whatever a direction is, the step along it is right, and so is the image of what comes out, which is made anew. Only
-where hardly more digits are asked for than single precision has, rounding costs further steps.
+Whatever a direction is, the step along it is right, and so is the image of what comes out, which is made anew. The same
+holds of the residuals and of the preconditioner that directions are made of. In partial contact rounding costs contact
+solves no iteration, even to 1e-11; full contact, which one step solves, is then good to hardly more digits than single
+precision has.
 """
 
 import numpy as np

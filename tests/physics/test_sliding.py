@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import Heights
-from parcontact.physics.motion import AnyFraction, WholeCells
+from parcontact.physics.motion import AnyFraction, PartCells, WholeCells
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface
 
@@ -82,6 +82,32 @@ def test_whole_cells_cost_nothing(comm: MPI.Intracomm) -> None:
     for cells in range(5):
         path.at((cells * SIZE[0] / NX, 0.0))
     assert tally.since(before) == {}
+
+
+def test_part_of_a_cell(communicators: list[MPI.Intracomm]) -> None:
+    """The heights made anew where the surface is, to their rounding and 1e-9 of what a cell changes them by."""
+    for comm in communicators:
+        surface = surface_on(comm)
+        path, exact = PartCells(surface), AnyFraction(surface)
+        for cells in (0.0, 0.3, 1.0 - 1e-9, 7.5, -3.25, 17.3):
+            position = (cells * SIZE[0] / NX, 0.0)
+            assert_allclose(whole(path.at(position), surface.slab), whole(exact.at(position), surface.slab), atol=1e-14)
+
+
+def test_the_same_part_of_a_cell_costs_nothing(comm: MPI.Intracomm) -> None:
+    """Whatever the rounding of positions, and to the same digits, whichever of them came first."""
+    surface = surface_on(comm)
+    tally = surface.slab.tally
+    path, other = PartCells(surface), PartCells(surface)
+    positions = [(cells + 0.7) * (SIZE[0] / NX) * (1.0 + n * 2e-16) for n, cells in enumerate((2, 3, 5, 1000))]
+    first = path.at((positions[0], 0.0))
+    before = tally.copy()
+    for position, cells in zip(positions, (2, 3, 5, 1000), strict=True):
+        moved = path.at((position, 0.0))
+        assert moved.base is first.base
+        assert moved.offset == cells % NX
+    assert tally.since(before) == {}
+    assert_array_equal(other.at((positions[-1], 0.0)).base, first.base)
 
 
 def test_single_precision(comm: MPI.Intracomm) -> None:
