@@ -132,3 +132,18 @@ def test_second_order_of_a_step() -> None:
             body.commit(trial, np.sin(3e3 * step * dt) + trial.effective)
         found.append(pair.look(dt, trial, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0).difference)
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("times", "dt", "order"),
+    [([1.0], 1e-6, 2.0), (np.logspace(-9.0, 9.0, 73).tolist(), 1e-3, 1.0), ([1.0], 0.0, 2.0), ([], 1e-3, 2.0)],
+)
+def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: float) -> None:
+    """Two where the branch is slow, to z = dt/tau; one where there are as many branches of every time, to the share of
+    those beyond the ends. A jump, and a body of no branch, have none: two is what is told."""
+    slab, prony = Slab(MPI.COMM_SELF, 4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
+    body = ZenerBody(slab, prony, "exponential")
+    trial = body.begin(dt, Heights(slab.zeros()))
+    body.commit(trial, np.ones((1, 4)))
+    look = Embedded(slab, body, DX).look(dt, trial, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
+    assert look.order == pytest.approx(order, rel=1e-5)
