@@ -83,6 +83,11 @@ def test_steady_wave_stays_with_error_of_second_order(frictions: Callable[..., l
     assert 3.6 < errors[1] / errors[2] < 4.4
 
 
+def test_cells_much_longer_than_wide(frictions: Callable[..., list[float]]) -> None:
+    """A strip whose shortest waves, across it, are 1/2000 of its length: in full contact the closed form, to 1e-9."""
+    assert frictions(WAVE, "grid.size=[2.5e-4, 2.5e-7]")[0] == pytest.approx(friction_of_wave(2.0e5, 0.04), rel=1e-9)
+
+
 @pytest.mark.mpi(2)
 @pytest.mark.parametrize(("text", "bound"), [(ROUGH, 4e-3), (FREE, 1e-2)], ids=["rough", "free sphere"])
 def test_steady_contact_stays(frictions: Callable[..., list[float]], text: str, bound: float) -> None:

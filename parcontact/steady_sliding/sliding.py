@@ -131,7 +131,8 @@ class SteadySliding:
         assert self.contact is not None
         base, fft, prony, grid = self.base, self.base.fft, self.base.prony, self.base.job.grid
         spectrum, speed = fft.forward(self.contact.u), self.base.in_units(velocity)
-        powers = np.zeros((prony.moduli.size, 2 + int(np.log2(max(grid.points)))))
+        cells = max(max(grid.size) / grid.dx, max(grid.size) / grid.dy)  # along the longer side, of the smaller length
+        powers = np.zeros((prony.moduli.size, 2 + int(np.log2(cells * (1 + 1e-9)))))
         for rows in deal(fft.my, PARTS):
             omega = np.abs(base.half_space.frequencies(fft, speed, rows))
             compliance = base.half_space.symbol(fft, rows)
