@@ -1,6 +1,5 @@
 """Where the rigid surface is: `h(x, t) = h0(x - s(t))`, with s its displacement [m]."""
 
-import math
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +10,7 @@ from .body import Heights
 from .surface import Surface
 
 Vector = tuple[float, float]
-SAME_PART = 1e-9  # of a cell: positions that are whole cells apart differ by their rounding, which is less
+PARTS = 10**9  # of a cell: nearer positions are the same, as those whole cells apart are but for their rounding
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
@@ -65,15 +64,14 @@ class PartCells:
     def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
         self._surface = surface
         self._cell = surface.cell[0]
-        self._part = 0.0
+        self._part = 0
         self._map = surface.heights((0.0, 0.0), surface.slab.empty(dtype))
 
     def at(self, displacement: tuple[float, float]) -> Heights:
         cells = displacement[0] / self._cell
-        whole = math.floor(cells + SAME_PLACE)
-        part = SAME_PART * round((cells - whole) / SAME_PART) if cells - whole > SAME_PLACE else 0.0
+        whole, part = divmod(round(cells * PARTS), PARTS)
         if part != self._part:
             self._surface.slab.tally["shift"] += 1
-            self._surface.heights((part * self._cell, 0.0), self._map)
+            self._surface.heights((part / PARTS * self._cell, 0.0), self._map)
             self._part = part
         return Heights(self._map, whole % self._surface.slab.nx)

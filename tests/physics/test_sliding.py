@@ -94,6 +94,18 @@ def test_part_of_a_cell(communicators: list[MPI.Intracomm]) -> None:
             assert_allclose(whole(path.at(position), surface.slab), whole(exact.at(position), surface.slab), atol=1e-14)
 
 
+def test_a_very_small_part_of_a_cell(comm: MPI.Intracomm) -> None:
+    """Steps of 1e-7 of a cell move the surface by that, to 1 %, which is 1e-9 of a cell: stiff bodies feel them."""
+    surface = surface_on(comm)
+    path, exact = PartCells(surface), AnyFraction(surface)
+    start = whole(exact.at((0.0, 0.0)), surface.slab)
+    for cells in (1e-7, -1e-7, 6e-7):
+        position = (cells * SIZE[0] / NX, 0.0)
+        change = whole(exact.at(position), surface.slab) - start
+        found = whole(path.at(position), surface.slab) - start
+        assert_allclose(found, change, atol=0.01 * np.abs(change).max())
+
+
 def test_the_same_part_of_a_cell_costs_nothing(comm: MPI.Intracomm) -> None:
     """Whatever the rounding of positions, and to the same digits, whichever of them came first."""
     surface = surface_on(comm)
