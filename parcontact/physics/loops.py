@@ -20,18 +20,19 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
     """Advance the branches, `h_k <- decay_k h_k + gain_k buffer`, and form the next effective heights in `buffer`:
     `heights(i - offset) + sum weight_k h_k - weight_u u`.
 
-    In the precision of the maps, in which only `1 - decay` has the digits of a decay near 1.
+    Branches advance in the precision of the maps, in which only `1 - decay` has the digits of a decay near 1; what they
+    weigh is added up in double precision, as much of it cancels where a body is stiff at once.
     """
     count, ny, nx = branches.shape
     start, number = offset % nx, buffer.dtype.type
-    effective, c_u = np.empty(nx, buffer.dtype), number(weight_u)
+    effective = np.empty(nx)
     for j in range(ny):
         effective[start:] = heights[j, : nx - start]
         effective[:start] = heights[j, nx - start :]
         for i in range(nx):
-            effective[i] -= c_u * u[j, i]
+            effective[i] -= weight_u * u[j, i]
         for k in range(count):
-            a, b, c = number(1.0 - decay[k]), number(gain[k]), number(weight[k])
+            a, b, c = number(1.0 - decay[k]), number(gain[k]), weight[k]
             for i in range(nx):
                 branches[k, j, i] += b * buffer[j, i] - a * branches[k, j, i]
                 effective[i] += c * branches[k, j, i]
