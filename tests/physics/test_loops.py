@@ -40,16 +40,14 @@ def test_begin(offset: int, count: int) -> None:
 
 
 def test_small_losses_in_single_precision() -> None:
-    """A branch that loses 1e-7 of itself in a step, less than the last digit of its decay, loses just that beside what
-    it gains; the step rounds it to 6e-8 of its size at most."""
-    loss, count = 1e-7, 1000
-    branches, work = np.full((1, 1, 8), 2.0, np.float32), np.full((1, 8), 1.0, np.float32)
-    u = heights = np.zeros((1, 8), np.float32)
-    gain = 2.0 * loss + 2.0**-20  # that of a whole number of digits more
-    for _ in range(count):
-        loops.begin(branches, np.array([1.0 - loss]), np.array([gain]), work, np.zeros(1), 0.0, u, heights, 0)
-        work[...] = 1.0
-    assert_allclose(branches, 2.0 + count * 2.0**-20, rtol=1e-7)
+    """A branch loses its share in the mean over many points to 2e-9, the roundings of 1e5 points: a decay half-way
+    between two numbers of single precision, were it rounded to one of them, would make it wrong by 4e-8."""
+    loss = 1000.5 * 2.0**-24
+    branches = np.random.default_rng(1).uniform(1.0, 2.0, (1, 100, 1000)).astype(np.float32)
+    exact = branches * np.float64(1.0 - loss)
+    still = np.zeros((100, 1000), np.float32)
+    loops.begin(branches, np.array([1.0 - loss]), np.zeros(1), still.copy(), np.zeros(1), 0.0, still, still, 0)
+    assert abs(np.mean(branches - exact)) < 2e-9
 
 
 @pytest.mark.parametrize("offset", OFFSETS)
