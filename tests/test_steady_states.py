@@ -9,20 +9,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from rubbers import complex_modulus
+from steady_scenes import CREEP_TIME, G0, RADIUS, sliding
 
-from parcontact import job as jobs
-from parcontact import scene
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import RunError
-from parcontact.parallel.slab import Array, Slab
+from parcontact.parallel.slab import Array
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve import projected, steady
 from parcontact.solve.steady import SteadyContact, SteadySolver
 from parcontact.steady_sliding import sliding as steady_sliding
 from parcontact.steady_sliding.sliding import Point, SteadySliding, branch_maps
-from parcontact.theory import cylinder_sliding, full_contact
+from parcontact.theory import full_contact
 
-RADIUS, G0, FORCE, CREEP_TIME = 1.0e-2, 2.75e6, 0.15, 1.0e-2
+FORCE = 0.15  # N
 CONTACT = (3 * FORCE * RADIUS / (16 * G0)) ** (1 / 3)  # a*, Hertz with the instantaneous modulus [m]
 SPHERE = """\
 grid: {{points: {points}, size: {size}, boundary: free}}
@@ -40,13 +39,6 @@ material:
   branches: [{modulus: 2.0e+6, relaxation_time: 1.0e-3}, {modulus: 5.0e+5, relaxation_time: 1.0e-5}]
 history: [{pressure: 2.0e6}]
 """
-
-
-def sliding(path: Path, text: str, comm: MPI.Intracomm, *overrides: str) -> SteadySliding:
-    file = path / f"steady-{comm.rank}.yaml"
-    file.write_text(text)
-    job = jobs.load(file, overrides)
-    return SteadySliding(scene.frame(job, Slab(comm, *job.grid.points)))
 
 
 def sphere_at(path: Path, comm: MPI.Intracomm, speed: float, points: int = 256, box: float = 7.0) -> Point:
@@ -116,31 +108,6 @@ def test_full_contact_in_any_direction(shared_path: Path, comm: MPI.Intracomm, v
     normal = point.measures.pressure * 3.0e-4 * 2.5e-4
     assert power / (np.hypot(*velocity) * normal) == pytest.approx(float(exact), rel=1e-9)  # along the velocity
     assert sum(point.dissipated) == pytest.approx(power, rel=1e-9)
-
-
-STALLING = [(100.0, speed) for speed in (2.675, 2.7, 2.825, 3.0, 3.05, 3.3, 3.45)]  # points come and go in a long tail
-
-
-@pytest.mark.parametrize(("ratio", "speed"), [(2.0, 1.0), (10.0, 0.3), (10.0, 3.0), *STALLING])
-def test_cylinder(shared_path: Path, comm: MPI.Intracomm, ratio: float, speed: float) -> None:
-    """A line contact against the semi-analytic rigid cylinder to 1 %: one row, periodic, extrapolated in 1/box."""
-    load = 10.0  # N/m
-    half = float(np.sqrt(4 * load * RADIUS / (np.pi * 4 * G0)))  # a0
-    found = []
-    for box in (60.0, 120.0):
-        points = round(box * 32)
-        text = (
-            f"grid: {{points: [{points}, 1], size: [{box * half!r}, {half!r}]}}\n"
-            "surface: {shape: cylinder, radius: 1.0e-2}\n"
-            f"material: {{model: zener, modulus_inf: {G0 / ratio!r}, branches: [{{modulus: {G0 * (1 - 1 / ratio)!r}, "
-            f"relaxation_time: {CREEP_TIME / ratio!r}}}]}}\n"
-            f"history: [{{pressure: {load / (box * half)!r}}}]\nnumerics: {{tolerance: 1.0e-7}}\n"
-        )
-        point = sliding(shared_path, text, comm).solve((speed * half / CREEP_TIME, 0.0), load / (box * half))
-        found.append(point.measures.friction * RADIUS / half)
-    extrapolated = found[1] + (found[1] - found[0]) / 3  # images act as 1/box^2
-    exact = float(cylinder_sliding.sliding_cylinder(ratio, speed)[0])
-    assert extrapolated == pytest.approx(exact, rel=1e-2)
 
 
 def test_starts(shared_path: Path, comm: MPI.Intracomm) -> None:

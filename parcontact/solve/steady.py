@@ -34,7 +34,7 @@ from .surround import Surround
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
-WAYS = ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
+WAYS = 2 * ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
 MAX_DIRECTIONS = 10  # of the linear steps on a set
 LOOSE = 1.5e-3  # tolerance with which those beyond the projected steps' are in single precision: with a smaller one
 # rounded directions took up to half as many steps more where a body is a thousand times as stiff at once as in the end
@@ -144,7 +144,8 @@ class SteadySolver:
         """The active set, from the set of the pressure x.
 
         What a linear solve leaves of its residual makes wrong points of the next set, so the first way is to solve
-        well. Sets may stall still, and then the other way often leads on.
+        well. Sets may stall still, as single points are left out that should be in contact and make the linear solves
+        slow. Then all points as near as the solution seems to be wrong are taken in, and the other way goes on.
         """
         u, slab, working, linear = self._u, self.slab, self._working, self._linear
         kappa = KAPPA * self._stiffness()
@@ -172,6 +173,7 @@ class SteadySolver:
             best = min(best, guess)
             if since >= MAX_STALLED_SETS and others:
                 (rounds, reduction), *others = others
+                self._take_in(h, best * self._length)
                 best, since = np.inf, 0
             if not np.isfinite(guess) or since >= MAX_STALLED_SETS or steps >= self.max_steps:
                 self._admit(x, mean)
@@ -207,6 +209,11 @@ class SteadySolver:
             return np.inf
         return max(wrong / positive / self._length, deepest / self._length, negative / positive)
 
+    def _take_in(self, h: Array, gap: float) -> None:
+        """Add the points to the set that are at most this far from the surface."""
+        count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
+        _add_near(self._u, h, gaps / count + gap, self._working)
+
     def _admit(self, x: Array, mean: float) -> None:
         """Make x admissible: not negative, under the load; and u its image."""
         load = self.slab.sum(kernels.clip(x))[0]
@@ -241,6 +248,14 @@ def _add(working, value, x):
     for j in range(x.shape[0]):
         for i in range(x.shape[1]):
             x[j, i] += value if working[j, i] else 0.0
+
+
+@loop
+def _add_near(u, h, d, working):
+    """Mark points where `u - h <= d`, too."""
+    for j in range(u.shape[0]):
+        for i in range(u.shape[1]):
+            working[j, i] |= u[j, i] - h[j, i] <= d
 
 
 @loop
