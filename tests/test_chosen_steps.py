@@ -265,7 +265,8 @@ def test_a_body_without_load_has_an_error_too() -> None:
 
 
 def test_errors_do_not_depend_on_the_direction() -> None:
-    """A wave that slides along its own direction, whichever that is; across it there is no friction."""
+    """A wave that slides along its own direction, whichever that is; across it there is no friction. Equal to 1e-6: the
+    directions of loose solves are in single precision, which rounds by 6e-8."""
     estimates = []
     for waves, velocity in (([2, 0], [0.1, 0.0]), ([0, 2], [0.0, 0.1]), ([2, 0], [0.0, 0.1])):
         wave = {"shape": "wave", "amplitude": 1e-6, "waves": waves}
@@ -276,6 +277,6 @@ def test_errors_do_not_depend_on_the_direction() -> None:
         errors = rows[-1].errors
         assert errors is not None
         estimates.append(errors.friction.time if errors.friction else 0.0)
-    assert estimates[0] == pytest.approx(estimates[1], rel=1e-9)
+    assert estimates[0] == pytest.approx(estimates[1], rel=1e-6)
     assert estimates[0] > 0.0
     assert estimates[2] == 0.0

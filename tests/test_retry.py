@@ -162,7 +162,8 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
 
 LIGHT = {**PRESS, "pressure": 2e4}
 HEAVY = {"name": "heavy", "pressure": 1e7}
-SINGLE = {"precision": "single", "tolerance": 1.5e-6}  # which rounding allows under the small load, not under the large
+SINGLE = {"precision": "single", "tolerance": 5e-6}  # a fifth of what rounding allows under the large load, 2.8e-5,
+# and five times what it allows under the small one: which it is must not be a matter of the last digits
 
 
 def failed(bench: Bench, history: list[dict[str, Any]], numerics: dict[str, Any]) -> tuple[dict[str, Any], Path, str]:

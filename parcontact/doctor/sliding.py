@@ -10,6 +10,7 @@ from .times import INTEGRATORS
 
 STIFF = 2 * HEIGHT  # pressure amplitude of a wave in full contact over modulus and wavenumber
 CELLS = 6
+EDGE = 2e-3  # of the largest pressure: what solves to 1e-5 leave to single points near the edge of contact
 
 
 def shortest_wave(bench: Bench) -> None:
@@ -111,7 +112,8 @@ def stop(bench: Bench) -> None:
     bench.expect("loss of area", max(0.0, float(-np.diff(areas).min())), 0.0, 0.0)
     bench.expect("friction at rest", rows[-1].measures.friction / rows[0].measures.friction, 0.0, 1e-6, scale=1.0)
     elastic, _ = bench.march(crossed([{"pressure": 1e4}], material=zener(LONG_TERM, [], [])))
-    bench.expect_all("pressure at rest", bench.whole(march, "pressure"), bench.whole(elastic, "pressure"), 1e-6)
+    within = EDGE if bench.single else 1e-6
+    bench.expect_all("pressure at rest", bench.whole(march, "pressure"), bench.whole(elastic, "pressure"), within)
 
 
 def extreme_velocities(bench: Bench) -> None:

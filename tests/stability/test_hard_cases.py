@@ -1,7 +1,7 @@
 """The cases in which contact codes fail, each at its physical outcome, in every precision, on any number of ranks.
 
 What is expected and how far off it may be stands with the cases in parcontact/doctor. In single precision every number
-may be off by 3e-4, and solves are to 1e-5.
+may be off by 3e-4, and solves are to 1e-5, which leaves more to pressures near the edge of contact.
 """
 
 import pytest
