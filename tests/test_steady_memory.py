@@ -94,7 +94,7 @@ def test_plan_tells_both() -> None:
     """In rows of their own, where there is a steady start."""
     planned = job(*SCENES["along x"])
     rows = {text[2:26].rstrip(): text[26:].split() for text in report.maps(planned, [1, 2])}
-    for what, sets in (("steady start, before", False), ("steady start, at worst", True)):
+    for what, sets in (("steady start, before", False), ("steady start, with sets", True)):
         assert rows[what] == [f"{memory.steady_start(planned, ranks, sets=sets) / 1e6:.4g}" for ranks in (1, 2)]
     virgin = planned.model_copy(update={"initial": type(planned.initial)()})
     assert not any("steady" in text for text in report.maps(virgin, [1]))

@@ -24,7 +24,7 @@ class Convolution:
     def __init__(
         self, fft: FFT, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, even: bool = True
     ) -> None:
-        self.fft = fft
+        self.fft, self.even = fft, even
         count, scale = fft.my // 2 + 1 if even else fft.my, 1.0 / (fft.mx * fft.my)
         widths = [columns.stop - columns.start for columns in fft.column_blocks]
         self.symbols: list[NDArray[np.inexact]] = [np.empty((count, width), dtype) for width in widths]
@@ -39,6 +39,16 @@ class Convolution:
     def footprint(spectrum: int, my: int, even: bool = True, is_complex: bool = False) -> int:
         """Bytes of a real symbol, or a complex one, beside a transform whose spectrum has so many in `my` rows."""
         return spectrum // my * (my // 2 + 1 if even else my) // (1 if is_complex else 2)
+
+    def mapped(self, function: Callable[[NDArray[np.inexact]], NDArray[np.inexact]], dtype: DTypeLike) -> "Convolution":
+        """The operator whose symbol is a function of this one's."""
+        scale = self.fft.mx * self.fft.my
+
+        def part(rows: slice) -> NDArray[np.inexact]:
+            blocks = [symbol[rows] for symbol in self.symbols]
+            return function(scale * np.concatenate(blocks, axis=1)) if blocks else np.empty((0, 0))
+
+        return Convolution(self.fft, part, dtype, self.even)
 
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""

@@ -71,7 +71,8 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     """Bytes of all maps of a rank while the steady state is found from which a run starts, before those of `holdings`
     are made: as a rule, or where the solver changes `sets` of points. 0 for a run that starts from another state.
 
-    In a free box the table of the wake, made before that, may take more for a moment.
+    In a free box the table of the wake, made before that, may take more for a moment; so may, up to a quarter more than
+    with sets, what is tried when these have failed.
     """
     if not decisions.steady_start(job).on:
         return 0

@@ -15,7 +15,7 @@ DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
 LARGE = 1e10  # bytes from which on there are told GB
 HALF_MESH = 0.3  # of the time of a run, that on half the mesh: a quarter of the points, some more calls
 HALF_MESH_CHOSEN = 0.2  # the same in steps that are chosen, half as many
-STEADY_STARTS = (("steady start, before", False), ("steady start, at worst", True))  # and whether by sets of points
+STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
 MARK = "*"  # of figures that were taken while other programs were at work
 
 

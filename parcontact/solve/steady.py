@@ -116,6 +116,12 @@ class SteadySolver:
             start.fill(0.0)
             return SteadyContact(start, self._u, math.nan, nothing, 0, 0, 0, "no point is left that carries load")
 
+    def judge(self, operator: Operator, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
+        """The approach and the certificate of an admissible pressure, such as a solution, for another operator, whose
+        image of it is then `u`. Collective."""
+        operator.apply(p, self._u)
+        return self._certify(p, h, mean)
+
     def _solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         if not self.slab.sum(kernels.total(start))[0] > 0.0:
             start.fill(mean)

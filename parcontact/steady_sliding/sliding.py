@@ -2,8 +2,9 @@
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,9 @@ from ..physics.convolution import PARTS, Convolution, wavenumbers
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..scene import Frame
-from ..solve import nested
+from ..solve import nested, proximal
 from ..solve.certificate import Certificate
+from ..solve.proximal import Proximal
 from ..solve.steady import SteadyContact, SteadySolver
 
 COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
@@ -54,6 +56,9 @@ class Level:
     slab: Slab
     fft: FFT
     heights: Array
+
+
+Make = Callable[[Level, Vector], SteadySolver | Proximal]
 
 
 class SteadySliding:
@@ -93,8 +98,8 @@ class SteadySliding:
         mean = pressure / self.base.units.pressure
         speed, calls = math.hypot(*velocity), 0.0
         reduced = self._slow * speed
-        for start, narrow in self._starts(reduced, pressure):
-            contact, more = self._descend(velocity, mean, start, narrow)
+        for start, solver in self._starts(reduced, pressure):
+            contact, more = self._descend(velocity, mean, start, solver)
             calls += more
             if contact.converged:
                 break
@@ -153,34 +158,36 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(self, speed: float, pressure: float) -> Iterator[tuple[Array | None, bool]]:
+    def _starts(self, speed: float, pressure: float) -> Iterator[tuple[Array | None, Make]]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
-        each, whether the solver is to be the `narrow` one: the last resort, but on a line of points it always is.
+        each, what makes the solver: as a rule the usual one, then the `narrow` one, which it always is on a line of
+        points, and at last the one of proximal points.
 
         The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
         appear and vanish.
         """
         if self.contact is None:
-            yield None, False
+            yield None, self._solver
         elif pressure == self._pressure and max(speed, self._speed) <= NEAR * min(speed, self._speed):
-            yield from ((self.contact.p, False), (None, False))
+            yield from ((self.contact.p, self._solver), (None, self._solver))
         else:
-            yield from ((None, False), (self.contact.p, False))
+            yield from ((None, self._solver), (self.contact.p, self._solver))
         if 1 not in self.base.job.grid.points:
-            yield None, True
+            yield None, partial(self._solver, narrow=True)
+        yield None, self._proximal
 
     def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
         self.contact, self._speed, self._pressure = contact, speed, pressure
 
-    def _descend(self, velocity: Vector, mean: float, start: Array | None, narrow: bool) -> tuple[SteadyContact, float]:
+    def _descend(self, velocity: Vector, mean: float, start: Array | None, solver: Make) -> tuple[SteadyContact, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took."""
         tally, calls = self.base.slab.tally, 0.0
 
         def solve(level: Level, p: Array) -> SteadyContact:
             nonlocal calls
             before = tally["operator"]
-            contact = self._solver(level, velocity, narrow).solve(level.heights, mean, p)
+            contact = solver(level, velocity).solve(level.heights, mean, p)
             calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
             return contact
 
@@ -191,17 +198,27 @@ class SteadySliding:
             p[...] = start
         return solve(self.levels[0], p), calls
 
-    def _solver(self, level: Level, velocity: Vector, narrow: bool) -> SteadySolver:
+    def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> SteadySolver:
+        return self._solver_for(level, *self.operators(level, velocity, self.base.prony), narrow)
+
+    def _proximal(self, level: Level, velocity: Vector) -> Proximal:
+        operator, inverse = self.operators(level, velocity, self.base.prony)
+        kind = self.base.fft.complex
+        nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
+        solver = self._solver_for(level, nearer, nearer_inverse, narrow=True)
+        return Proximal(solver, operator, operator.mapped(proximal.pull, self.base.fft.dtype), self.base.dtype)
+
+    def _solver_for(
+        self, level: Level, operator: Convolution, preconditioner: Convolution, narrow: bool
+    ) -> SteadySolver:
         base, numerics = self.base, self.base.job.numerics
-        finest = level is self.levels[0]
         tolerance = tolerance_of(numerics.tolerance)
-        operator, preconditioner = self.operators(level, velocity, base.prony)
         return SteadySolver(
             level.slab,
             operator,
             preconditioner,
             base.height / base.units.height,
-            tolerance if finest else max(tolerance, COARSE_TOLERANCE),
+            tolerance if level is self.levels[0] else max(tolerance, COARSE_TOLERANCE),
             20 * numerics.max_iterations,
             dtype=base.dtype,
             narrow=narrow,

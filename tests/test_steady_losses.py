@@ -1,0 +1,92 @@
+"""Steady sliding of bodies a thousand times as stiff at once as in the end, whose loss tangent goes up to 16: sets of
+points come and go there without an end, and proximal points lead to a solution."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from steady_scenes import CREEP_TIME, certificate, sliding
+from test_steady_lines import LINE, cylinder_on
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.prony import Prony
+from parcontact.solve import proximal
+from parcontact.steady_sliding.sliding import SteadySliding
+
+RATIO, MODULUS, TIME = 1000.0, 1.0e6, 1.0e-3  # G0/G_inf, G_inf [Pa], relaxation time [s]
+PEAK = 2.5e-4 / (2 * np.pi * TIME * np.sqrt(RATIO))  # at which the loss tangent of waves of 0.25 mm is largest [m/s]
+ROUGH = (
+    "grid: {points: 64, size: 1.0e-3}\n"
+    "surface: {shape: rough, hurst: 0.8, long_wavelength: 5.0e-4, short_wavelength: 1.25e-4, rms_slope: 0.05}\n"
+    f"material: {{model: zener, modulus_inf: {MODULUS!r}, branches: [{{modulus: {MODULUS * (RATIO - 1)!r}, "
+    f"relaxation_time: {TIME!r}}}]}}\n"
+    "history: [{pressure: 1.0}]\nnumerics: {tolerance: 1.0e-4}\n"
+)
+
+
+@pytest.fixture
+def _alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No other way is tried: whether one does depends on the rounding of the transforms."""
+    monkeypatch.setattr(SteadySliding, "_starts", lambda states, *_: iter([(None, states._proximal)]))
+
+
+@pytest.mark.usefixtures("_alone")
+@pytest.mark.parametrize(("speed", "share"), [(0.1, 0.1), (0.3, 0.6), (1.0, 0.1)])
+def test_rough(shared_path: Path, comm: MPI.Intracomm, speed: float, share: float) -> None:
+    """By an operator of numpy's own, the contact conditions are met."""
+    states = sliding(shared_path, ROUGH, comm)
+    pressure = share * 0.05 * MODULUS * float(np.sqrt(RATIO))
+    point = states.solve((speed * PEAK, 0.0), pressure)
+    assert point.certificate.worst <= 1e-4
+    assert certificate(states, speed * PEAK, pressure) <= 1e-4 * (1 + 1e-6)
+
+
+@pytest.mark.usefixtures("_alone")
+@pytest.mark.parametrize("speed", [2.0, 6.0, 10.0, 12.0])
+def test_line(shared_path: Path, comm: MPI.Intracomm, speed: float) -> None:
+    """The contact fills up to 0.8 of the box, and what is left of a set that is wrong does not tell where it ends."""
+    states, pressure = cylinder_on(shared_path, comm, RATIO, 60.0)
+    velocity = speed * LINE / CREEP_TIME
+    states.solve((velocity, 0.0), pressure)
+    assert certificate(states, velocity, pressure) <= 1e-7 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("constant", ["MAX_STEPS_TO_HALVE", "MOST_STEPS"])
+def test_what_cannot_be_solved_is_given_up(
+    shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, constant: str
+) -> None:
+    """When so many contacts have not halved the certificate, and when all have taken so many steps."""
+    states = sliding(shared_path, ROUGH, comm)
+    level, mean = states.levels[0], 1e6 / states.base.units.pressure
+    solver = states._proximal(level, (0.3 * PEAK, 0.0))
+    monkeypatch.setattr(proximal, constant, 0)
+    contact = solver.solve(level.heights, mean, level.slab.zeros())
+    assert contact.failure.startswith("no progress in ")
+    assert contact.certificate.worst > solver.tolerance
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("velocity", [(0.1, 0.0), (0.1, 0.07)])
+def test_operators(comm: MPI.Intracomm, velocity: tuple[float, float]) -> None:
+    """`A + S` is the sum of both, its inverse undoes it, to round-off, and waves lose no more than they store."""
+    slab = Slab(comm, 24, 20)
+    body, fft = HalfSpace((1.2, 1.0)), FFT(slab)
+    law = Prony(1.0, np.array([RATIO]), np.array([0.1]))
+    operator, inverse = body.sliding_operator(fft, velocity, law), body.sliding_inverse(fft, velocity, law)
+    pull = operator.mapped(proximal.pull, np.float64)
+    nearer = operator.mapped(proximal.nearer, np.complex128)
+    back = inverse.mapped(proximal.nearer_inverse, np.complex128)
+    p = np.random.default_rng(5).normal(size=(20, 24))
+    p = (p - p.mean())[slab.rows]
+    one, two, both, again = (slab.empty() for _ in range(4))
+    operator.apply(p, one)
+    pull.apply(p, two)
+    nearer.apply(p, both)
+    largest = slab.reduce([], [float(np.abs(both).max(initial=0.0))])[-1]
+    np.testing.assert_allclose(both, one + two, rtol=0, atol=1e-13 * largest)
+    np.testing.assert_allclose(back.apply(both, again), p, rtol=0, atol=1e-11)
+    for symbol in nearer.symbols:
+        assert np.all(np.abs(symbol.imag) <= symbol.real * (1 + 1e-12))
