@@ -4,7 +4,9 @@ What is made follows from the job alone, as `effects/decisions.py` decides; what
 Steady sliding takes the frame from here and brings a solver of its own.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -159,6 +161,15 @@ def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
     return _solver(replace(base, slab=slab, fft=FFT(slab, dtype=base.dtype, measured=False)), tolerance)
 
 
+def solver_in_double(base: Frame) -> Callable[[], ContactSolver] | None:
+    """What makes a solver whose operator is in double precision, for a retry; None where that of the scene is."""
+    if not decisions.single_operator(base.job).on:
+        return None
+    numerics = base.job.numerics.model_copy(update={"precision": "double"})
+    double = replace(base, job=base.job.model_copy(update={"numerics": numerics}))
+    return partial(solver_on, double, base.slab, numerics.tolerance)
+
+
 def facts(built: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
     found = built.frame.roughness
@@ -195,16 +206,19 @@ def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:
 
 def _solver(base: Frame, tolerance: float) -> ContactSolver:
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
-    operators = base.half_space.operator(base.fft), _preconditioner(base)
+    operators = _operators(base)
     grids = grids_for(base.job.grid.dx, base.job.grid.dy)
     return ContactSolver(base.slab, *operators, height, tolerance, limit, base.dtype, grids)
 
 
-def _preconditioner(base: Frame) -> Convolution:
+def _operators(base: Frame) -> tuple[Convolution, Convolution]:
+    """The operator of the half space, and its preconditioner."""
+    body = base.half_space
     if not decisions.mixed_precision(base.job).on:
-        return base.half_space.inverse(base.fft)
+        return body.operator(base.fft), body.inverse(base.fft)
     single = FFT(base.slab, dtype=np.float32, measured=base.fft.measured, lender=base.fft)
-    return base.half_space.inverse(single)
+    own = single if decisions.single_operator(base.job).on else base.fft
+    return body.operator(own), body.inverse(single)
 
 
 def _energy(base: Frame, solver: ContactSolver, material: ElasticBody | ZenerBody) -> ElasticEnergy | ZenerEnergy:

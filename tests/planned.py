@@ -47,7 +47,13 @@ JOBS: dict[str, Json] = {
     "single": {"material": TWO, "history": [CELLS], "numerics": {"precision": "single"}},
     "long cells": {"grid": {"size": [1e-3, 1e-5]}, "history": [SLIDE]},
     "waves of two cells": {"grid": {"points": 16}, "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [8, 0]}},
-    "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed"}},
+    "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed", "tolerance": 1e-4}},
+    "mixed, loose": {"history": [SLIDE], "numerics": {"precision": "mixed"}},
+    "free, mixed, loose": {
+        "grid": {"boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-2},
+        "numerics": {"precision": "mixed"},
+    },
 }
 SWEEP = {"history": [SLIDE], "sweep": [{"history.0.duration": [1e-3, 2e-3, 4e-3]}]}
 MACHINE = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10)

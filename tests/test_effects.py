@@ -87,6 +87,11 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
         {"numerics": {"precision": "mixed"}},
         None,
     ),
+    "operator in single precision": (
+        {"numerics": {"precision": "mixed", "tolerance": 0.99e-3}},
+        {"numerics": {"precision": "mixed", "tolerance": 1e-3}},
+        None,
+    ),
     "surface spectrum": (
         {"surface": SPHERE},
         {},
@@ -135,6 +140,31 @@ def test_preconditioner_of_loose_solves(changes: Json, on: bool) -> None:
     numerics = {key: value for key, value in changes.items() if key != "energy"}
     planned = job(history=[PRESS], material=RUBBER, numerics=numerics, output={"energy": "energy" in changes})
     assert row(planned, "mixed precision").on == on
+
+
+def test_single_operator() -> None:
+    """On, only the surface and the forces are transformed in double precision, as often as with other tolerances."""
+    off, on, _ = ROWS["operator in single precision"]
+    double, single = whole(job(**off)), whole(job(**on))
+    assert double["fft"] == single["fft"]
+    assert single[f"fft {NX}x{NY} float32"] == 2 * single["operator"]
+    assert double[f"fft {NX}x{NY} float32"] == 2 * ITERATIONS
+
+
+@pytest.mark.parametrize(
+    ("changes", "on"),
+    [
+        ({"precision": "mixed"}, True),
+        ({"precision": "double"}, False),
+        ({"precision": "single"}, False),
+        ({"precision": "mixed", "energy": True}, False),
+    ],
+)
+def test_operator_of_very_loose_solves(changes: Json, on: bool) -> None:
+    """In single precision only where that is asked for, and no energies are balanced."""
+    numerics = {"tolerance": 1e-3, "precision": changes["precision"]}
+    planned = job(history=[PRESS], material=RUBBER, numerics=numerics, output={"energy": "energy" in changes})
+    assert row(planned, "operator in single precision").on == on
 
 
 def test_isolated_contact() -> None:

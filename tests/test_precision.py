@@ -47,7 +47,7 @@ Results = tuple[dict[str, NDArray[np.float64]], NDArray[np.float64], int]
 NAMES = ("friction", "contact_area", "approach", "max_pressure", "work", "dissipated")
 
 
-def results(boundary: str, precision: str) -> Results:
+def results(boundary: str, precision: str, tolerance: float = 9e-6, energy: bool = True) -> Results:
     """Of pressing and sliding over a third of the box: what was measured, the last pressures, operator calls."""
     surface: list[dict[str, Any]] = [{**ROUGH, "short_wavelength": 6.2e-5, "rms_slope": 0.05}]
     if boundary == "free":
@@ -60,8 +60,8 @@ def results(boundary: str, precision: str) -> Results:
             {"pressure": 1e5, "duration": 1e-4, "time_step": {"first": 1e-6, "growth": 1.3}},
             {"pressure": 1e5, "velocity": 1.0, "distance": 3e-4, "cells_per_step": 1},
         ],
-        "numerics": {"precision": precision, "tolerance": 9e-6},  # at 1e-5 rounding decides when the second step stops
-        "output": {"energy": True},
+        "numerics": {"precision": precision, "tolerance": tolerance},  # 1e-5: rounding ends the second step sooner
+        "output": {"energy": energy},
     }
     march, found = marched(data)
     series = {name: column(found, name)[2:] for name in NAMES}
@@ -81,3 +81,17 @@ def test_marches_beside_double_precision(boundary: str) -> None:
             assert np.abs(series[name] - double[name]).max() <= allowed * scale, (precision, name)
         assert np.abs(found - p).max() <= pressures * p.max()
         assert took <= 1.1 * calls
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_loose_marches_beside_double_precision(boundary: str) -> None:
+    """With an operator in single precision, too: rounding may end a solve an iteration sooner or later, so that results
+    agree to the tolerance of what is largest (measured: 2e-7 to 1e-4), with at most a fifth more calls (measured: a
+    tenth, of the free body)."""
+    tolerance = 1e-3
+    double, p, calls = results(boundary, "double", tolerance, energy=False)
+    series, found, took = results(boundary, "mixed", tolerance, energy=False)
+    for name in NAMES[:4]:
+        assert np.abs(series[name] - double[name]).max() <= tolerance * np.abs(double[name]).max(), name
+    assert np.abs(found - p).max() <= tolerance * p.max()
+    assert took <= 1.2 * calls

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from ..job import Job, Spectral
 from ..job.cells import first_between_cells
-from ..solve.precision import LOOSE
+from ..solve.precision import LOOSE, VERY_LOOSE
 from . import folded_branches, relaxation
 from .effect import Decision
 
@@ -171,6 +171,18 @@ def mixed_precision(job: Job) -> Decision:
     return Decision(name, True, f"a solve to a tolerance of {LOOSE:g} or more takes as many iterations with it")
 
 
+def single_operator(job: Job) -> Decision:
+    """The operator in single precision, too, on the transforms of the preconditioner."""
+    name, numerics = "operator in single precision", job.numerics
+    if numerics.precision != "mixed":
+        return Decision(name, False, f"numerics.precision is {numerics.precision}")
+    if numerics.tolerance < VERY_LOOSE:
+        return Decision(name, False, f"numerics.tolerance is below {VERY_LOOSE:g}")
+    if energies(job).on:
+        return Decision(name, False, "energies are balanced to more digits")
+    return Decision(name, True, f"a solve to a tolerance of {VERY_LOOSE:g} or more does not need more digits")
+
+
 TABLE: tuple[Callable[[Job], Decision], ...] = (
     *(
         relaxation.decide,
@@ -187,6 +199,7 @@ TABLE: tuple[Callable[[Job], Decision], ...] = (
     *(
         approach,
         mixed_precision,
+        single_operator,
         spectrum,
         energies,
         energy_memory,

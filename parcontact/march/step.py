@@ -17,7 +17,7 @@ from ..physics.entries import Entry
 from ..physics.measures import Measures
 from ..record.checkpoint import Contents
 from ..record.row import Row
-from ..scene import Scene, solver_on
+from ..scene import Scene, solver_in_double, solver_on
 from ..solve import cold, retry
 from ..solve.contact import Approach, Contact, MeanPressure
 from . import failure, state
@@ -210,7 +210,8 @@ class March:
     ) -> tuple[Contact, str]:
         """Retry a solve that failed; the contact, and what to say of it. Raises StepError when nothing helps."""
         scene = self.scene
-        contact, tried = retry.again(scene.solver, effective, control, failed, partial(solver_on, scene.frame))
+        on, in_double = partial(solver_on, scene.frame), solver_in_double(scene.frame)
+        contact, tried = retry.again(scene.solver, effective, control, failed, on, in_double)
         if contact.failure:
             moved = math.hypot(*self.starts.cells(step, self.state.position))
             raise failure.of_solve(scene, step, failed, contact, tried, effective, moved)

@@ -21,7 +21,8 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
     `heights(i - offset) + sum weight_k h_k - weight_u u`.
 
     Branches advance in the precision of the maps, in which only `1 - decay` has the digits of a decay near 1; what they
-    weigh is added up in double precision, as much of it cancels where a body is stiff at once.
+    weigh is added up in double precision, as much of it cancels where a body is stiff at once. Four branches at once
+    keep more of the memory's channels busy than one after the other.
     """
     count, ny, nx = branches.shape
     start, number = offset % nx, buffer.dtype.type
@@ -29,14 +30,34 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
     for j in range(ny):
         effective[start:] = heights[j, : nx - start]
         effective[:start] = heights[j, nx - start :]
+        change = buffer[j]
         for i in range(nx):
             effective[i] -= weight_u * u[j, i]
-        for k in range(count):
+        for k in range(0, count - 3, 4):
+            rows = branches[k, j], branches[k + 1, j], branches[k + 2, j], branches[k + 3, j]
+            _advance_four(*rows, decay[k:], gain[k:], weight[k:], change, effective)
+        for k in range(count - count % 4, count):
             a, b, c = number(1.0 - decay[k]), number(gain[k]), weight[k]
             for i in range(nx):
-                branches[k, j, i] += b * buffer[j, i] - a * branches[k, j, i]
+                branches[k, j, i] += b * change[i] - a * branches[k, j, i]
                 effective[i] += c * branches[k, j, i]
-        buffer[j, :] = effective
+        change[:] = effective
+
+
+@loop
+def _advance_four(a, b, c, d, decay, gain, weight, change, effective):
+    """The same of four branches in one row."""
+    number = change.dtype.type
+    fall_a, fall_b = number(1.0 - decay[0]), number(1.0 - decay[1])
+    fall_c, fall_d = number(1.0 - decay[2]), number(1.0 - decay[3])
+    rise_a, rise_b, rise_c, rise_d = number(gain[0]), number(gain[1]), number(gain[2]), number(gain[3])
+    weight_a, weight_b, weight_c, weight_d = weight[0], weight[1], weight[2], weight[3]
+    for i in range(change.size):
+        a[i] += rise_a * change[i] - fall_a * a[i]
+        b[i] += rise_b * change[i] - fall_b * b[i]
+        c[i] += rise_c * change[i] - fall_c * c[i]
+        d[i] += rise_d * change[i] - fall_d * d[i]
+        effective[i] += weight_a * a[i] + weight_b * b[i] + weight_c * c[i] + weight_d * d[i]
 
 
 @loop

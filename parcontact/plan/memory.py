@@ -91,11 +91,12 @@ def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
     symbol = Convolution.footprint(spectrum, job.grid.ny)
+    of_operator = np.dtype(np.float32) if decisions.single_operator(job).on else precision
     yield _transform(TRANSFORMS, job, job.grid.points, precision, ranks, rank)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
-        yield _transform("padded transforms and operator", job, lengths, precision, ranks, rank, with_symbol=True)
+        yield _transform("padded transforms and operator", job, lengths, of_operator, ranks, rank, with_symbol=True)
     else:
-        yield Holding("operator", symbol)
+        yield Holding("operator", symbol * of_operator.itemsize // precision.itemsize)
     if decisions.mixed_precision(job).on:
         what, points = "single transforms and preconditioner", job.grid.points
         yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True, lent=True)

@@ -84,8 +84,8 @@ def _place(job: Job, slab: Slab) -> Path | None:
     with suppress(OSError):
         cpu = next((line for line in CPUINFO.read_text().splitlines() if line.startswith("model name")), "")
     steady = [job.initial.state, job.steady is not None]
-    numerics, mixed = job.numerics, decisions.mixed_precision(job).on
+    numerics, single = job.numerics, [decisions.mixed_precision(job).on, decisions.single_operator(job).on]
     facts = [platform.machine(), cpu, pyfftw.fftw_version, zlib.crc32(Path(fft.__file__).read_bytes())]
-    facts += [slab.comm.size, job.grid.points, job.grid.boundary, numerics.kernel, numerics.precision, mixed, steady]
+    facts += [slab.comm.size, job.grid.points, job.grid.boundary, numerics.kernel, numerics.precision, single, steady]
     name = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
     return directory / name

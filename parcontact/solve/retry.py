@@ -1,11 +1,11 @@
-"""What is tried when a contact solve has failed: shorter steps from where it stands, a cold start on nested grids, and
-guesses of where contact is.
+"""What is tried when a contact solve has failed: an operator in double precision, if it was not, shorter steps from
+where it stands, a cold start on nested grids, and guesses of where contact is.
 
 Nothing here is made or called for a solve that succeeds. What is tried depends on the failed solve alone, so that all
 ranks try the same, and a run that is repeated tries it again.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,15 +19,21 @@ SHORT = 0.5  # length of a safeguarded step over the exact one
 
 
 def again(
-    solver: ContactSolver, h: Array, control: Control, failed: Contact, solver_on: SolverOn
+    solver: ContactSolver,
+    h: Array,
+    control: Control,
+    failed: Contact,
+    solver_on: SolverOn,
+    in_double: Callable[[], ContactSolver] | None = None,
 ) -> tuple[Contact, list[str]]:
     """Try a failed solve again until it succeeds or nothing is left to try; the last contact, and what was tried.
 
-    `solver_on(slab, tolerance)` makes a solver of the same body on another grid. Every attempt is counted as `retry`;
+    `solver_on(slab, tolerance)` makes a solver of the same body on another grid, `in_double()` one whose operator is in
+    double precision, where that of `solver` is not. Every attempt is counted as `retry`;
     iterations are those of all attempts. Collective.
     """
     contact, tried, iterations = failed, list[str](), failed.iterations
-    for name, contact in _attempts(solver, h, control, failed, solver_on):
+    for name, contact in _attempts(solver, h, control, failed, solver_on, in_double):
         solver.slab.tally["retry"] += 1
         tried.append(name)
         iterations += contact.iterations
@@ -37,11 +43,22 @@ def again(
 
 
 def _attempts(
-    solver: ContactSolver, h: Array, control: Control, failed: Contact, solver_on: SolverOn
+    solver: ContactSolver,
+    h: Array,
+    control: Control,
+    failed: Contact,
+    solver_on: SolverOn,
+    in_double: Callable[[], ContactSolver] | None,
 ) -> Iterator[tuple[str, Contact]]:
     """One attempt after the other, each made when it is asked for, all in the map of the failed one."""
-    p = failed.p
-    if np.isfinite(failed.certificate.worst):
+    p, contact = failed.p, failed
+    if in_double is not None:
+        if not np.isfinite(failed.certificate.worst):
+            p.fill(0.0)
+        solver = in_double()
+        contact = solver.solve(h, control, p)
+        yield "an operator in double precision", contact
+    if np.isfinite(contact.certificate.worst):
         yield "shorter steps", solver.solve(h, control, p, SHORT)
     grids = start_on_coarse_grids(solver, h, control, p, solver_on)
     contact = solver.solve(h, control, p)
