@@ -104,6 +104,20 @@ def test_an_operator_in_single_precision_is_made_double(comm: MPI.Intracomm) -> 
     np.testing.assert_allclose(p, exact, rtol=0, atol=2e-3 * largest)
 
 
+@pytest.mark.mpi(2)
+@pytest.mark.parametrize(("limit", "solved"), [(500, True), (1, False)])
+def test_what_would_do_is_solved_in_double_precision(comm: MPI.Intracomm, limit: int, solved: bool) -> None:
+    """A job that takes solves as they end has those of double precision, the operator's rounding is not what ends them;
+    what that does not solve is taken, and nothing else is tried."""
+    numerics = {"precision": "mixed", "tolerance": 1e-3, "accept_unconverged": True, "max_iterations": limit}
+    load = 1e11 if solved else 1e4
+    data = {"grid": GRID, "surface": ROUGH, "material": ELASTIC, "history": [{"pressure": load}], "numerics": numerics}
+    march, found = marched(data, comm=comm)
+    assert march.scene.slab.tally["retry"] == 1
+    assert (found[-1].certificate.worst <= 1e-3) == solved
+    assert found[-1].remark.endswith("with an operator in double precision") == solved
+
+
 def test_no_cost_where_nothing_fails() -> None:
     """No operator call but those of the steps, no transform of another size."""
     data = {"grid": GRID, "surface": ROUGH, "material": ZENER, "history": [PRESS, SLIDE]}

@@ -68,6 +68,15 @@ def test_what_cannot_be_solved_is_given_up(
     assert contact.certificate.worst > solver.tolerance
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_what_grows_without_bound_is_given_up(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """Pressures on sets that came and went grew there until single precision could not hold them."""
+    states = sliding(shared_path, ROUGH.replace("0.05}", "0.05, seed: 1}").replace("1.0e-4}", "5.0e-3}"), comm)
+    pressure = 0.1 * 0.05 * MODULUS * float(np.sqrt(RATIO))
+    states.solve((0.3 * PEAK, 0.0), pressure)
+    assert certificate(states, 0.3 * PEAK, pressure) <= 5e-3 * (1 + 1e-6)
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("velocity", [(0.1, 0.0), (0.1, 0.07)])
 def test_operators(comm: MPI.Intracomm, velocity: tuple[float, float]) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -19,7 +20,7 @@ from ..record.checkpoint import Contents
 from ..record.row import Row
 from ..scene import Scene, solver_in_double, solver_on
 from ..solve import cold, retry
-from ..solve.contact import Approach, Contact, MeanPressure
+from ..solve.contact import Approach, Contact, ContactSolver, MeanPressure
 from . import failure, state
 from .errors import Errors, Estimate
 from .failure import StepError
@@ -172,8 +173,9 @@ class March:
         if self.state.alpha == 0.0:  # nothing has been solved before
             cold.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
         contact, remark = self.scene.solver.solve(trial.effective, control, start), ""
-        if contact.failure and not self._accepts(contact):
-            contact, remark = self._retry(step, trial.effective, control, contact)
+        in_double = solver_in_double(self.scene.frame)
+        if contact.failure and not (self._accepts(contact) and in_double is None):
+            contact, remark = self._retry(step, trial.effective, control, contact, in_double)
         if step.passed:
             remark = "; ".join(filter(None, (remark, self._passed(step))))
         return contact, remark
@@ -206,13 +208,21 @@ class March:
         return self.scene.job.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
     def _retry(
-        self, step: Step, effective: Array, control: MeanPressure | Approach, failed: Contact
+        self,
+        step: Step,
+        effective: Array,
+        control: MeanPressure | Approach,
+        failed: Contact,
+        in_double: Callable[[], ContactSolver] | None,
     ) -> tuple[Contact, str]:
-        """Retry a solve that failed; the contact, and what to say of it. Raises StepError when nothing helps."""
-        scene = self.scene
-        on, in_double = partial(solver_on, scene.frame), solver_in_double(scene.frame)
-        contact, tried = retry.again(scene.solver, effective, control, failed, on, in_double)
+        """Retry a solve that failed, one that would do as it is only in double precision; the contact, and what to say
+        of it. Raises StepError when nothing helps."""
+        scene, would_do, on = self.scene, self._accepts(failed), partial(solver_on, self.scene.frame)
+        most = 1 if would_do else None
+        contact, tried = retry.again(scene.solver, effective, control, failed, on, in_double, most)
         if contact.failure:
+            if would_do and self._accepts(contact):
+                return contact, ""
             moved = math.hypot(*self.starts.cells(step, self.state.position))
             raise failure.of_solve(scene, step, failed, contact, tried, effective, moved)
         what = f"{failure.where(scene, step)}: the contact solve {failed.failure}"

@@ -7,6 +7,7 @@ ranks try the same, and a run that is repeated tries it again.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -25,15 +26,16 @@ def again(
     failed: Contact,
     solver_on: SolverOn,
     in_double: Callable[[], ContactSolver] | None = None,
+    most: int | None = None,
 ) -> tuple[Contact, list[str]]:
     """Try a failed solve again until it succeeds or nothing is left to try; the last contact, and what was tried.
 
     `solver_on(slab, tolerance)` makes a solver of the same body on another grid, `in_double()` one whose operator is in
-    double precision, where that of `solver` is not. Every attempt is counted as `retry`;
-    iterations are those of all attempts. Collective.
+    double precision, where that of `solver` is not; there are at most so many attempts. Every attempt is counted as
+    `retry`; iterations are those of all attempts. Collective.
     """
     contact, tried, iterations = failed, list[str](), failed.iterations
-    for name, contact in _attempts(solver, h, control, failed, solver_on, in_double):
+    for name, contact in islice(_attempts(solver, h, control, failed, solver_on, in_double), most):
         solver.slab.tally["retry"] += 1
         tried.append(name)
         iterations += contact.iterations

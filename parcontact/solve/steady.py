@@ -91,6 +91,7 @@ class SteadySolver:
         self._projected = Projected(slab, operator, preconditioner, dtype, narrow)
         kept = precision_of_directions(dtype, tolerance, LOOSE)
         self._linear = Directions(slab, operator, preconditioner, directions, dtype, kept, self._projected.lend())
+        self._lost = 1.0 / float(np.finfo(dtype).eps)  # a guess with which no digit of the load is left
         self._u = slab.zeros(dtype)
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
@@ -181,7 +182,7 @@ class SteadySolver:
                 (rounds, reduction), *others = others
                 self._take_in(h, best * self._length)
                 best, since = np.inf, 0
-            if not np.isfinite(guess) or since >= MAX_STALLED_SETS or steps >= self.max_steps:
+            if not guess < self._lost or since >= MAX_STALLED_SETS or steps >= self.max_steps:
                 self._admit(x, mean)
                 d, certificate = self._certify(x, h, mean)
                 failure = self._failure(certificate, since, steps)

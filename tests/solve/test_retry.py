@@ -126,3 +126,17 @@ def test_all_ranks_agree(comm: MPI.Intracomm) -> None:
     assert contact.converged
     assert_allclose(contact.p, alone.p[slab.rows], atol=1e-7 * alone.p.max())
     assert comm.allgather(contact.iterations) == [contact.iterations] * comm.size
+
+
+def test_an_operator_in_double_precision() -> None:
+    """It starts from nothing where the failed solve has left no numbers, and what is tried after it goes on with it."""
+    h, approach = rough(128), Approach(-0.02)
+    body, enough = solver(h), solver(h).solve(h, approach, np.zeros_like(h)).iterations
+    first = body.solve(h, approach, np.full_like(h, np.nan))
+    double, before = solver(h, max_iterations=enough - 1), body.slab.tally["operator"]
+    contact, tried = retry.again(body, h, approach, first, factory(np.ptp(h)), lambda: double)
+    assert not np.isfinite(first.certificate.worst)
+    assert contact.converged
+    assert tried == ["an operator in double precision", "shorter steps"]
+    assert contact.u is double.solve(h, approach, contact.p).u
+    assert body.slab.tally["operator"] == before
