@@ -221,6 +221,14 @@ def test_plans_that_somebody_prepared_are_not_read(cache: Path, tmp_path: Path) 
     assert [path.name for path in kept.parent.iterdir()] == [kept.name]
 
 
+def test_plans_are_those_of_a_precision(cache: Path, tmp_path: Path) -> None:
+    """An operator in single precision has transforms of its own."""
+    (tmp_path / "job.yaml").write_text(JOB)
+    slab, mixed = Slab(MPI.COMM_SELF, 16, 4), "numerics.precision=mixed"
+    jobs = [load(tmp_path / "job.yaml", [mixed, f"numerics.tolerance={size}"]) for size in ("1e-3", "1e-4")]
+    assert len({wisdom._place(job, slab) for job in jobs} - {None}) == 2
+
+
 def test_mpirun_without_a_home() -> None:
     """It takes the user's own, never a directory that others may fill."""
     clean = outside.environment()
