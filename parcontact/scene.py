@@ -208,7 +208,8 @@ def _solver(base: Frame, tolerance: float) -> ContactSolver:
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
     operators = _operators(base)
     grids = grids_for(base.job.grid.dx, base.job.grid.dy)
-    return ContactSolver(base.slab, *operators, height, tolerance, limit, base.dtype, grids)
+    kept = np.float32 if decisions.single_operator(base.job).on else None
+    return ContactSolver(base.slab, *operators, height, tolerance, limit, base.dtype, grids, kept)
 
 
 def _operators(base: Frame) -> tuple[Convolution, Convolution]:

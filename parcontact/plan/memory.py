@@ -104,7 +104,7 @@ def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
         yield Holding("preconditioner", symbol)
     grids = grids_for(job.grid.dx, job.grid.dy)
     numbers = precision.type, job.numerics.tolerance
-    yield Holding("solver", ContactSolver.footprint(*job.grid.points, *numbers, ranks, rank, grids))
+    yield Holding("solver", ContactSolver.footprint(*job.grid.points, *numbers, ranks, rank, grids, of_operator.type))
     if decisions.spectrum(job).on:
         yield Holding("surface spectrum", waves)
     for maps in _maps(job):

@@ -89,12 +89,13 @@ class Contact:
 
 
 class ContactSolver:
-    """Loop for contacts on one grid, and the maps that it works in: four, that of the direction in single precision
-    where the tolerance is loose, a byte per point, and those of `Surround`.
+    """Loop for contacts on one grid, and the maps that it works in: a pressure, two displacements, the direction, which
+    is in single precision where the tolerance is loose, a byte per point, and those of `Surround`.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
     lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `dtype` of maps;
-    `grids` of larger cells by which a residual is extended (`surround.grids_for`).
+    `grids` of larger cells by which a residual is extended (`surround.grids_for`); `kept`, the type of displacements,
+    that of maps unless the operator has fewer digits.
     """
 
     def __init__(
@@ -107,13 +108,15 @@ class ContactSolver:
         max_iterations: int,
         dtype: type[np.floating] = np.float64,
         grids: int | None = None,
+        kept: type[np.floating] | None = None,
     ) -> None:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
         self.dtype = dtype
         self._rounding = UNSEEN_RISE * float(np.finfo(dtype).eps)
         self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
-        self._u, self._w, self._other = (slab.zeros(dtype) for _ in range(3))
+        self._u, self._w = (slab.zeros(kept or dtype) for _ in range(2))
+        self._other = slab.zeros(dtype)
         self._t = slab.zeros(precision_of_directions(dtype, tolerance))
         self._working = slab.zeros(np.bool_)
         self._surround = Surround(slab, preconditioner, most=grids)
@@ -122,13 +125,21 @@ class ContactSolver:
 
     @staticmethod
     def footprint(
-        nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, grids: int | None = None
+        nx: int,
+        ny: int,
+        dtype: type[np.floating],
+        tolerance: float,
+        ranks: int,
+        rank: int,
+        grids: int | None = None,
+        kept: type[np.floating] | None = None,
     ) -> int:
         """Bytes that it holds on a rank."""
-        rows, direction = deal(ny, ranks)[rank], np.dtype(precision_of_directions(dtype, tolerance))
-        return (3 * np.dtype(dtype).itemsize + direction.itemsize + 1) * (
-            rows.stop - rows.start
-        ) * nx + Surround.footprint(nx, ny, ranks, rank, grids)
+        rows = deal(ny, ranks)[rank]
+        maps = dtype, kept or dtype, kept or dtype, precision_of_directions(dtype, tolerance)
+        bytes_of_point = 1 + sum(np.dtype(each).itemsize for each in maps)
+        cells = Surround.footprint(nx, ny, ranks, rank, grids)
+        return bytes_of_point * (rows.stop - rows.start) * nx + cells
 
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
         """Solve for heights `h`, starting from the pressure `start`, none of it negative, in whose place the solution
@@ -179,9 +190,9 @@ class ContactSolver:
         return self.operator.apply(p, self._u)
 
     def lend(self) -> tuple[Array, Array, Array]:
-        """Three maps for work between solves, the last one that of the direction: the next solve does not keep what is
-        in them."""
-        return self._w, self._other, self._t
+        """Three maps for work between solves, of a pressure, a displacement and a direction: the next solve does not
+        keep what is in them."""
+        return self._other, self._w, self._t
 
     # -- the steps of a solve; `mean` is the mean pressure asked for, None with a given approach -----------------------
 
