@@ -95,3 +95,17 @@ def test_loose_marches_beside_double_precision(boundary: str) -> None:
         assert np.abs(series[name] - double[name]).max() <= tolerance * np.abs(double[name]).max(), name
     assert np.abs(found - p).max() <= tolerance * p.max()
     assert took <= 1.2 * calls
+
+
+@pytest.mark.parametrize(("tolerance", "kept"), [(1e-3, np.float32), (0.9e-3, np.float64)])
+def test_displacements_have_the_digits_of_the_operator(tolerance: float, kept: type) -> None:
+    """And the map in which a march keeps the displacement of the body, to take a step back, those of the body."""
+    data = {
+        "grid": {"points": 32, "size": 1e-3},
+        "surface": {**ROUGH, "short_wavelength": 1.25e-4},
+        "material": DECADES,
+    }
+    numerics = {"precision": "mixed", "tolerance": tolerance}
+    scene = begun({**data, "history": [{"pressure": 1e4}], "numerics": numerics}).scene
+    assert scene.solver.displace(scene.slab.zeros()).dtype == kept
+    assert scene.solver.lend()[0].dtype == np.float64

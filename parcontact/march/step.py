@@ -173,9 +173,10 @@ class March:
         if self.state.alpha == 0.0:  # nothing has been solved before
             cold.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
         contact, remark = self.scene.solver.solve(trial.effective, control, start), ""
-        in_double = solver_in_double(self.scene.frame)
-        if contact.failure and not (self._accepts(contact) and in_double is None):
-            contact, remark = self._retry(step, trial.effective, control, contact, in_double)
+        if contact.failure:
+            in_double = solver_in_double(self.scene.frame)
+            if in_double is not None or not self._accepts(contact):
+                contact, remark = self._retry(step, trial.effective, control, contact, in_double)
         if step.passed:
             remark = "; ".join(filter(None, (remark, self._passed(step))))
         return contact, remark
