@@ -1,49 +1,63 @@
 """The error budget of a step: what the step shows, with what is known of the run.
 
-What the embedded pair shows changes slowly while steps are alike: then it is looked at in every few of them only.
+What the embedded pair shows, and by how much the two views of friction differ, changes slowly while steps are alike:
+then each is looked at in every few of them only.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..job import Rough
+from ..job import Cylinder, Flat, Job, Rough, Wave
 from ..job.timeline import Step
 from ..physics.body import Trial, ZenerBody
 from ..physics.budget import ErrorBudget, estimate
 from ..physics.embedded import Embedded, Look
 from ..physics.entries import Entry
 from ..physics.measures import Measures
+from ..physics.prony import Prony
 from ..physics.seen import Known, Seen
+from ..physics.slopes import friction_by_energy
 from ..physics.time_error import time_error
 from ..scene import Scene
 from ..solve.contact import Contact
 
-NAME = "budget/look"  # in a checkpoint
+PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
 NO_LOOK = Look(0.0, 0.0)
 ALIKE_STEPS = 4  # of one stage and one length, to which one look at the embedded pair applies at most
+ALIKE_VIEWS = 5  # the same of the two views of friction; odd, as steps may be quarters of a cell
 
 
 @dataclass(frozen=True)
 class LastLook:
-    """At the embedded pair, in a step of this stage and length [s]; it stands for so many steps `so_far`."""
+    """What was seen in a step of this stage and length [s]; it stands for so many steps `so_far`."""
 
     stage: float = -1.0
     dt: float = 0.0
     so_far: float = 0.0
-    look: Look = NO_LOOK
+    seen: tuple[float, ...] = ()
 
-    def stands_for(self, step: Step) -> bool:
-        """Whether what it has shown applies to one more step."""
-        return (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < ALIKE_STEPS
+    def stands_for(self, step: Step, most: int) -> bool:
+        """Return whether what it has shown applies to one more step, of so many at most."""
+        return (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < most
+
+    def once_more(self) -> "LastLook":
+        """Return it with one more step for which it stands."""
+        return replace(self, so_far=self.so_far + 1.0)
 
     @property
     def numbers(self) -> list[float]:
         """As a checkpoint has them."""
-        return [self.stage, self.dt, self.so_far, *astuple(self.look)]
+        return [self.stage, self.dt, self.so_far, *self.seen]
+
+    @classmethod
+    def of(cls, numbers: list[float]) -> "LastLook":
+        """Return the one of a checkpoint."""
+        stage, dt, so_far, *seen = numbers
+        return cls(stage, dt, so_far, tuple(seen))
 
 
 @dataclass(frozen=True)
@@ -56,28 +70,25 @@ class Estimate:
 
 
 class Errors:
-    """Estimates of the steps of one scene; allocates nothing, remembers the last look."""
+    """Estimates of the steps of one scene; allocates nothing, remembers the last looks."""
 
     def __init__(self, scene: Scene) -> None:
         grid, material, self.slab = scene.job.grid, scene.material, scene.slab
-        waves = [shape.short_wavelength for shape in scene.job.surface if isinstance(shape, Rough)]
-        self.known = Known(
-            min(waves) / max(grid.dx, grid.dy) if waves else None,
-            1 in grid.points,
-            scene.folded.bound,
-            scene.job.numerics.integrator == "exponential",
-            material.prony if isinstance(material, ZenerBody) else None,
-        )
+        exponential = scene.job.numerics.integrator == "exponential"
+        prony = material.prony if isinstance(material, ZenerBody) else None
+        self.known = known_of(scene.job, scene.folded.bound, exponential, prony)
         self._slope_unit = scene.units.height / scene.units.length
         self._pressure_unit = scene.units.pressure
         self._cell = grid.dx, grid.dy
         cell = grid.dx / scene.units.length
         self._pair = Embedded(self.slab, material, cell) if isinstance(material, ZenerBody) else None
-        self._last = self._before = LastLook()
+        self._material, self._height, self._cyclic = material, scene.units.height, grid.boundary == "periodic"
+        self._last = self._before = (LastLook(), LastLook())
 
     def of(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Estimate:
         """That of a step just committed; collective."""
-        look = self._look(step, trial, contact, measures)
+        self._before = self._last
+        look, apart = self._look(step, trial, contact, measures), self._views_apart(step, contact, measures)
         if measures.contact_area == 0.0:
             if step.judge is not None and self._pair is not None:
                 look = self._pair.look_without_load(step.dt, trial)
@@ -95,33 +106,79 @@ class Errors:
             step.dt,
             max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
             look.angle,
+            apart,
         )
         points = self.slab.points
         return Estimate(estimate(self.known, seen, points), time_error(self.known, seen, points))
 
     def take_back(self) -> None:
-        """Forget the look at a step that is made anew."""
+        """Forget the looks at a step that is made anew."""
         self._last = self._before
 
     def entries(self) -> dict[str, Entry]:
-        """The last look, for a checkpoint; none of a body without a memory."""
-        return {} if self._pair is None else {NAME: Entry(np.array(self._last.numbers))}
+        """The last looks, for a checkpoint; none of a body without a memory."""
+        if self._pair is None:
+            return {}
+        return {name: Entry(np.array(last.numbers)) for name, last in zip((PAIR, VIEWS), self._last, strict=True)}
 
     def restore(self, numbers: Mapping[str, Any]) -> None:
         """Go on from the arrays of a checkpoint; one that has no look is followed by a new one."""
-        if NAME in numbers:
-            stage, dt, so_far, *look = numbers[NAME].tolist()
-            self._last = LastLook(stage, dt, so_far, Look(*look))
+        pair, views = (LastLook.of(numbers[name].tolist()) if name in numbers else LastLook() for name in (PAIR, VIEWS))
+        self._last = pair, views
 
     def _look(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Look:
         """What the pair shows of a step, or of the one like it that was looked at last; collective."""
-        self._before = self._last
+        last, views = self._last
         if self._pair is None or measures.contact_area == 0.0:
-            self._last = LastLook()
-        elif self._last.stands_for(step):
-            self._last = replace(self._last, so_far=self._last.so_far + 1.0)
+            self._last = LastLook(), views
+            return NO_LOOK
+        if last.stands_for(step, ALIKE_STEPS):
+            last = last.once_more()
         else:
             load = measures.pressure * self.slab.points / (trial.alpha * self._pressure_unit)
             look = self._pair.look(step.dt, trial, contact.p, contact.u, load, measures.contact_area)
-            self._last = LastLook(float(step.stage), step.dt, 1.0, look)
-        return self._last.look
+            last = LastLook(float(step.stage), step.dt, 1.0, astuple(look))
+        self._last = last, views
+        return Look(*last.seen)
+
+    def _views_apart(self, step: Step, contact: Contact, measures: Measures) -> float:
+        """By how much friction by the slopes of the rigid surface and of the body differ; collective.
+
+        Of an elastic body the latter is 0.
+        """
+        own = measures.friction - measures.friction_interface
+        if not isinstance(self._material, ZenerBody) or measures.friction == 0.0:
+            return max(own, 0.0)
+        pair, last = self._last
+        if last.stands_for(step, ALIKE_VIEWS):
+            last = last.once_more()
+        else:
+            direction, own = _viscous(step.velocity, measures)
+            other = friction_by_energy(self.slab, contact.p, self._material.u, self._cell, direction, self._cyclic)
+            last = LastLook(float(step.stage), step.dt, 1.0, (abs(other * self._height - own),))
+        self._last = pair, last
+        return last.seen[0]
+
+
+def known_of(job: Job, folded: float, exponential: bool, prony: Prony | None) -> Known:
+    """Return what is known of a job before it begins, with the bound of its `folded` branches and what relaxes."""
+    waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
+    cells = min(waves) / max(job.grid.dx, job.grid.dy) if waves else None
+    return Known(cells, 1 in job.grid.points or _ridges(job.surface), folded, exponential, prony)
+
+
+def _ridges(shapes: Sequence[Any]) -> bool:
+    """Return whether the surface is of cylinders and waves along one axis of the grid, as then edges of contact are."""
+    across = {"y" if shape.axis == "x" else "x" for shape in shapes if isinstance(shape, Cylinder)}
+    waves = [shape.waves for shape in shapes if isinstance(shape, Wave)]
+    across |= {axis for x, y in waves for axis, count in (("x", x), ("y", y)) if count}
+    return len(across) == 1 and all(isinstance(shape, Cylinder | Wave | Flat) for shape in shapes)
+
+
+def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:
+    """Return the unit direction of sliding, at rest that against the force, and friction along it without the
+    interface's."""
+    x, y = velocity if any(velocity) else (-measures.force_x, -measures.force_y)
+    size = math.hypot(x, y)
+    along = -(measures.force_x * x + measures.force_y * y) / (size * measures.normal_force)
+    return (x / size, y / size), along - measures.friction_interface

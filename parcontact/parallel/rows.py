@@ -34,21 +34,41 @@ def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
     The first row of a map has the last one before it if the map is `cyclic`, otherwise itself. A rank without rows gets
     zeros.
     """
-    ranks = [rank for rank, part in enumerate(slab.dealt) if part.start < part.stop]
+    return _nearest(slab, field, 1, cyclic, 1)[0]
+
+
+def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
+    """The rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
+    collective.
+
+    A map that is not `cyclic` goes on with rows like its first and its last. A rank without rows gets zeros.
+    """
+    return _nearest(slab, field, count, cyclic, 1), _nearest(slab, field[::-1], count, cyclic, -1)
+
+
+def _nearest(slab: Slab, own: Array, count: int, cyclic: bool, way: int) -> Array:
+    """The rows before the first of this rank's `own`; if `way` is -1, rows and ranks are in reverse order.
+
+    They are passed on from rank to rank one by one, as a rank may have fewer rows than are asked for.
+    """
+    ranks = [rank for rank, part in enumerate(slab.dealt) if part.start < part.stop][::way]
+    found = np.zeros((count, slab.nx), own.dtype)
     if slab.comm.rank not in ranks:
-        return np.zeros(slab.nx, field.dtype)
-    place = ranks.index(slab.comm.rank)
-    first, last = place == 0, place == len(ranks) - 1
-    if len(ranks) == 1:
-        return field[-1] if cyclic else field[0]
-    row = field[0].copy()
-    target = slab.comm.Isend(field[-1], ranks[(place + 1) % len(ranks)]) if cyclic or not last else None
-    if cyclic or not first:
-        slab.comm.Recv(row, ranks[place - 1])
-    if target is not None:
-        target.Wait()
-        slab.tally["bytes sent"] += row.nbytes
-    return row
+        return found
+    place, alone = ranks.index(slab.comm.rank), len(ranks) == 1
+    first, last = place == 0 and not cyclic, place == len(ranks) - 1 and not cyclic
+    for k in range(count):
+        leaving = own[-1 - k] if k < len(own) else found[k - len(own)]
+        found[k] = own[0] if first or not alone else leaving
+        if alone:
+            continue
+        target = None if last else slab.comm.Isend(np.ascontiguousarray(leaving), ranks[(place + 1) % len(ranks)])
+        if not first:
+            slab.comm.Recv(found[k], ranks[place - 1])
+        if target is not None:
+            target.Wait()
+            slab.tally["bytes sent"] += found[k].nbytes
+    return found
 
 
 def _arriving(source: slice, target: slice, count: int, ny: int) -> slice:

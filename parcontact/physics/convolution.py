@@ -55,12 +55,38 @@ class Convolution:
         self.fft.slab.tally["operator"] += 1
         return self.fft.convolve(field, self.symbols, out)
 
+    def loss(self, field: Array, size: tuple[float, float], direction: tuple[float, float]) -> float:
+        """Return `-sum p du/ds`, with the slope along a unit `direction` of what a field p makes, u; collective.
+
+        In Fourier space that is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a box of `size` (padded, where the
+        transform is): for a pressure under a surface that slides along s at the speed v, the power that the body
+        dissipates over v. It is 0 for an operator with a real symbol, as that of an elastic body is.
+        """
+        total, spectrum = 0.0, self.fft.forward(field)
+        lengths = size[0] * self.fft.mx / self.fft.slab.nx, size[1] * self.fft.my / self.fft.slab.ny
+        for rows in deal(self.fft.my, PARTS):
+            qx, qy = travelling_wavenumbers(self.fft, lengths, rows)
+            along = self.fft.multiplicity * (qx * direction[0] + qy * direction[1])
+            places = np.abs(self.fft.modes[1][rows, 0]) if self.even else rows
+            for columns, symbol in zip(self.fft.column_blocks, self.symbols, strict=True):
+                waves = spectrum[rows, columns]
+                power = (waves.real**2 + waves.imag**2) * symbol[places].imag
+                total += float((power * along[:, columns]).sum(dtype=np.float64))
+        return self.fft.slab.sum(total)[0]
+
 
 def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
     """Angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to the shape of these
     rows of it."""
     along_x, along_y = fft.modes
     return 2 * np.pi / size[0] * along_x, 2 * np.pi / size[1] * along_y[rows]
+
+
+def travelling_wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
+    """Return `wavenumbers`, but 0 for that of Nyquist, whose wave has two signs: its slope vanishes on the grid."""
+    qx, qy = wavenumbers(fft, size, rows)
+    along_x, along_y = fft.modes
+    return np.where(2 * np.abs(along_x) == fft.mx, 0.0, qx), np.where(2 * np.abs(along_y[rows]) == fft.my, 0.0, qy)
 
 
 def padded_lengths(nx: int, ny: int) -> tuple[int, int]:

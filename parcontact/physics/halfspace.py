@@ -28,7 +28,7 @@ from numpy.typing import DTypeLike
 from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
-from .convolution import ALL, Convolution, padded_lengths, tabulate, wavenumbers
+from .convolution import ALL, Convolution, padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 from .wake import wake
@@ -99,8 +99,11 @@ class HalfSpace:
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 
     def frequencies(self, fft: FFT, velocity: Vector, rows: slice = ALL) -> Array:
-        """Angular frequency `q v` of each wave under a surface of that velocity [length/s]; shape `fft.shape`."""
-        qx, qy = wavenumbers(fft, self.size, rows)
+        """Angular frequency `q v` of each wave under a surface of that velocity [length/s]; shape `fft.shape`.
+
+        A wave at a Nyquist wavenumber stands along it.
+        """
+        qx, qy = travelling_wavenumbers(fft, self.size, rows)
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:

@@ -32,7 +32,7 @@ class Seen:
     in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
     shares; by how many cells the surface slid in it, in how many seconds; the points that penetrate without pressure,
     as a share of those in contact; by what angle a wave turned that is as high as the surface under the pressure
-    and changes as much."""
+    and changes as much; by how much friction by the slopes of the rigid surface and of the body differ."""
 
     complementarity: float
     difference: float
@@ -45,6 +45,7 @@ class Seen:
     seconds: float = 0.0
     penetrating: float = 0.0
     angle: float = 0.0
+    views_apart: float = 0.0
 
     @property
     def correction(self) -> float:

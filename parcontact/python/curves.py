@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +28,10 @@ Values = str | float | Sequence[float] | Array | None
 class Curve:
     """Steady states, point by point: arrays of shape (points,), of each temperature all velocities under each pressure.
 
-    `velocity` [m/s], `pressure` [Pa, mean], `friction` [-], `contact_area` [share of the nominal], `force_x`, `force_y`
+    `velocity` [m/s], `pressure` [Pa, mean], `friction` [-, by energy: dissipated power over load and velocity, and what
+    an interface adds], `friction_slopes` [-, by the slopes of the rigid surface], `error_friction`, `error_area` [-,
+    relative, of friction and of the corrected area], `contact_area`, `contact_area_corrected` [share of the nominal,
+    as counted and corrected by its edges], `force_x`, `force_y`
     [N, on the rigid surface], `approach`, `mean_gap` [m], `max_pressure` [Pa], `residual` [-, the certificate];
     `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene;
     `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference].
@@ -39,7 +42,11 @@ class Curve:
     velocity: Array
     pressure: Array
     friction: Array
+    friction_slopes: Array
+    error_friction: Array
+    error_area: Array
     contact_area: Array
+    contact_area_corrected: Array
     force_x: Array
     force_y: Array
     approach: Array
@@ -52,7 +59,7 @@ class Curve:
     failures: tuple[str, ...] = ()
 
 
-MEASURED = ("friction", "contact_area", "force_x", "force_y", "approach", "mean_gap", "max_pressure")
+MEASURED = ("contact_area", "contact_area_corrected", "force_x", "force_y", "approach", "mean_gap", "max_pressure")
 
 
 def steady(
@@ -98,15 +105,22 @@ def steady(
 
 
 def _curve(wanted: Sequence[curve.Wanted], points: Sequence[Point | None], failures: tuple[str, ...]) -> Curve:
+    def each(value: Callable[[Point], float]) -> Array:
+        return np.array([math.nan if point is None else value(point) for point in points])
+
     def all_of(name: str) -> Array:
-        return np.array([math.nan if point is None else getattr(point.measures, name) for point in points])
+        return each(lambda point: getattr(point.measures, name))
 
     branches = max((len(point.dissipated) for point in points if point), default=0)
     return Curve(
         np.array([at.speed for at in wanted]),
         np.array([at.pressure for at in wanted]),
         **{name: all_of(name) for name in MEASURED},
-        residual=np.array([math.nan if point is None else point.certificate.worst for point in points]),
+        friction=each(lambda point: point.friction),
+        friction_slopes=all_of("friction"),
+        error_friction=each(lambda point: point.error_friction),
+        error_area=each(lambda point: point.errors.area.total),
+        residual=each(lambda point: point.certificate.worst),
         power=np.array([(math.nan,) * branches if point is None else point.dissipated for point in points]),
         temperature=np.array([at.temperature for at in wanted]),
         shift_factor=np.array([math.nan if point is None else point.shift_factor for point in points]),

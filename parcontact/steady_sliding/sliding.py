@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import RunError
+from ..march.errors import known_of
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab, deal
+from ..physics.budget import ErrorBudget, estimate_steady
 from ..physics.convolution import PARTS, Convolution, wavenumbers
+from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..physics.prony import Prony
+from ..physics.seen import Seen
 from ..scene import Frame
-from ..solve import nested, proximal
+from ..solve import kernels, nested, proximal
 from ..solve.certificate import Certificate
 from ..solve.proximal import Proximal
 from ..solve.steady import SteadyContact, SteadySolver
@@ -33,6 +37,8 @@ class Point:
     """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN where none was asked for), by what factor
     relaxation times are longer than at the reference, what it measures, its certificate, and what it took.
 
+    `friction` is the power that the body dissipates, over load and velocity, and what an interface adds; that of
+    `measures` is by the slopes of the rigid surface. They differ by the mesh, and `errors` is the budget of the former.
     `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did (`solve.steady`).
     `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box).
     """
@@ -42,11 +48,19 @@ class Point:
     temperature: float
     shift_factor: float
     measures: Measures
+    friction: float
+    errors: ErrorBudget
     certificate: Certificate
     operator_calls: float
     sets: int
     seconds: float
     dissipated: tuple[float, ...]
+
+
+    @property
+    def error_friction(self) -> float:
+        """The relative error of friction; NaN where there is none."""
+        return self.errors.friction.total if self.errors.friction else math.nan
 
 
 @dataclass(frozen=True)
@@ -58,7 +72,7 @@ class Level:
     heights: Array
 
 
-Make = Callable[[Level, Vector], SteadySolver | Proximal]
+Make = Callable[[Level, Vector], tuple[SteadySolver | Proximal, Convolution]]
 
 
 class SteadySliding:
@@ -74,6 +88,7 @@ class SteadySliding:
         finest, *coarser = nested.levels_of(base.slab, heights)
         self.levels = [Level(base.slab, base.fft, finest.heights)]
         self.levels += [Level(level.slab, FFT(level.slab, dtype=base.fft.dtype), level.heights) for level in coarser]
+        self._known = known_of(base.job, 0.0, True, None)
         self.contact: SteadyContact | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
         self.temperature, self._slow = math.nan, time_factor_of(base.job)
@@ -99,7 +114,7 @@ class SteadySliding:
         speed, calls = math.hypot(*velocity), 0.0
         reduced = self._slow * speed
         for start, solver in self._starts(reduced, pressure):
-            contact, more = self._descend(velocity, mean, start, solver)
+            contact, more, by_energy = self._descend(velocity, mean, start, solver)
             calls += more
             if contact.converged:
                 break
@@ -114,9 +129,32 @@ class SteadySliding:
         if not measures.finite:
             raise RunError(f"steady sliding at {speed:g} m/s under {pressure:g} Pa: its results would not be finite")
         lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
+        friction, errors = self._judge(contact, by_energy, velocity, measures)
         seconds = time.perf_counter() - began
         place = velocity, pressure, self.temperature, self._slow
-        return Point(*place, measures, contact.certificate, calls, contact.sets, seconds, lost)
+        return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost)
+
+    def _judge(
+        self, contact: SteadyContact, by_energy: float, velocity: Vector, measures: Measures
+    ) -> tuple[float, ErrorBudget]:
+        """Return friction from that by energy, with what an interface adds, and how wrong it and the area are;
+        collective."""
+        base, speed = self.base, math.hypot(*velocity)
+        load, rise = base.slab.sum(*slope_under(contact.p, self.levels[0].heights))
+        slopes = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / (speed * measures.normal_force)
+        friction = by_energy + measures.friction_interface
+        seen = Seen(
+            contact.certificate.complementarity,
+            difference=0.0,
+            order=2.0,
+            slope=math.sqrt(rise / load) / (2.0 * base.job.grid.dx) * base.units.height,
+            friction=friction,
+            area=measures.contact_area,
+            corrected=measures.contact_area_corrected,
+            penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
+            views_apart=abs(slopes - friction),
+        )
+        return friction, estimate_steady(self._known, seen, base.slab.points)
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
@@ -180,33 +218,42 @@ class SteadySliding:
     def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
         self.contact, self._speed, self._pressure = contact, speed, pressure
 
-    def _descend(self, velocity: Vector, mean: float, start: Array | None, solver: Make) -> tuple[SteadyContact, float]:
-        """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took."""
+    def _descend(
+        self, velocity: Vector, mean: float, start: Array | None, solver: Make
+    ) -> tuple[SteadyContact, float, float]:
+        """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took, and
+        friction by energy, without an interface."""
         tally, calls = self.base.slab.tally, 0.0
 
-        def solve(level: Level, p: Array) -> SteadyContact:
+        def solve(level: Level, p: Array) -> tuple[SteadyContact, Convolution]:
             nonlocal calls
             before = tally["operator"]
-            contact = solver(level, velocity).solve(level.heights, mean, p)
+            chosen, operator = solver(level, velocity)
+            contact = chosen.solve(level.heights, mean, p)
             calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
-            return contact
+            return contact, operator
 
         p = self.base.slab.empty(self.base.dtype)
         if start is None:
-            nested.descend(self.levels, lambda level, below: solve(level, below).p, p)
+            nested.descend(self.levels, lambda level, below: solve(level, below)[0].p, p)
         else:
             p[...] = start
-        return solve(self.levels[0], p), calls
+        contact, operator = solve(self.levels[0], p)
+        speed, unit, load = math.hypot(*velocity), self.base.units.height / self.base.units.length, kernels.total(p)
+        lost = operator.loss(p, self.base.size, (velocity[0] / speed, velocity[1] / speed))
+        return contact, calls, lost / (self.base.slab.sum(load)[0] or math.nan) * unit
 
-    def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> SteadySolver:
-        return self._solver_for(level, *self.operators(level, velocity, self.base.prony), narrow)
+    def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> tuple[SteadySolver, Convolution]:
+        operator, inverse = self.operators(level, velocity, self.base.prony)
+        return self._solver_for(level, operator, inverse, narrow), operator
 
-    def _proximal(self, level: Level, velocity: Vector) -> Proximal:
+    def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
         operator, inverse = self.operators(level, velocity, self.base.prony)
         kind = self.base.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
         solver = self._solver_for(level, nearer, nearer_inverse, narrow=True)
-        return Proximal(solver, operator, operator.mapped(proximal.pull, self.base.fft.dtype), self.base.dtype)
+        pull = operator.mapped(proximal.pull, self.base.fft.dtype)
+        return Proximal(solver, operator, pull, self.base.dtype), operator
 
     def _solver_for(
         self, level: Level, operator: Convolution, preconditioner: Convolution, narrow: bool

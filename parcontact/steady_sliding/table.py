@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..effects.interface import InterfaceColumns, interface_of, shares
+from ..effects.interface import InterfaceColumns, interface_of
 from ..record import curve_points, files, measures
 from ..record.growing import GrowingTable
 from .sliding import Point, SteadySliding
@@ -16,9 +16,10 @@ COLUMNS = (
     *("residual", "penetration", "operator_calls", "seconds"),
 )
 LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
+ERRORS = ("error_friction", "error_area", "friction_slopes")
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 WAVES = ("velocity", "pressure", "wavelength", "share")
-HEAD = "velocity [m/s]    load [Pa]      area  friction  calls  residual"
+HEAD = "velocity [m/s]    load [Pa]      area  friction  error  calls  residual"
 
 
 class CurveTable:
@@ -29,7 +30,7 @@ class CurveTable:
         branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
         self.interface = InterfaceColumns.columns if interface_of(sliding.base.job) else ()
         added = (*(HEATED if heated else ()), *self.interface)
-        self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
+        self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
@@ -67,18 +68,20 @@ class CurveTable:
 
     def write(self, point: Point, waves: Any) -> None:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
-        forces = (m.force_x, m.force_y, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
+        forces = (m.force_x, m.force_y, point.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        last = [m.friction_x, m.contact_area_corrected]
+        last = [point.friction * point.velocity[0] / speed, m.contact_area_corrected]
         last += (point.temperature, point.shift_factor) if self.heated else ()
-        last += shares(m, point.velocity) if self.interface else ()
+        last += (point.friction - m.friction_interface, m.friction_interface) if self.interface else ()
+        last += point.error_friction, point.errors.area.total, m.friction
         if self._waves:
             for wavelength, share in zip(*waves, strict=True):
                 self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
         cells = [speed, m.pressure, *forces, *solve, *point.dissipated, *last]
         self._file.append([repr(float(value)) for value in cells])
         self.say(
-            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} {point.operator_calls:6.0f} "
+            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {point.friction:9.6f} "
+            f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
             f"{c.worst:9.2e}{f'  {point.temperature:g} C' if self.heated else ''}"
         )
 
@@ -107,3 +110,8 @@ class CurveTable:
         self._file.close()
         if self._waves:
             self._waves.close()
+
+
+def _percent(share: float) -> str:
+    """Return a relative error in six characters."""
+    return "> 100%" if share >= 1.0 else f"{100 * share:5.2g}%"
