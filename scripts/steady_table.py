@@ -59,7 +59,7 @@ def main(points: int) -> int:
     for speed, (friction, approach) in TABLE.items():
         began = time.perf_counter()
         point = solve(sliding, speed)
-        found = point.measures.friction * RADIUS / CONTACT, point.measures.approach * RADIUS / CONTACT**2
+        found = point.friction * RADIUS / CONTACT, point.measures.approach * RADIUS / CONTACT**2
         off = [value / exact - 1.0 for value, exact in zip(found, (friction, approach), strict=True) if exact]
         wrong += any(abs(value) > 5e-3 for value in off)
         second = f"{approach:8.4f} {off[1]:+7.2%}" if approach else 16 * " "
@@ -69,7 +69,7 @@ def main(points: int) -> int:
             flush=True,
         )
     for speed, limit, what in ((0.003, 0.9 * 0.003, "0.9 V*"), (1000.0, 7.2 / 1000.0, "7.2/V*")):
-        found = solve(sliding, speed).measures.friction * RADIUS / CONTACT
+        found = solve(sliding, speed).friction * RADIUS / CONTACT
         wrong += abs(found / limit - 1.0) > 2e-2
         print(f"V* = {speed:g}: {found:.7f} over the limit {what}: {found / limit:.4f}", flush=True)
     print("all within 0.5 %, limits within 2 %" if not wrong else f"{wrong} are off")

@@ -114,7 +114,9 @@ def test_curve_from_the_command_line(run_parcontact: Callable, tmp_path: Path) -
     assert done.returncode == 0, done.stderr
     columns = read(tmp_path / "out/wave/steady.csv")
     assert columns["friction_x"] == columns["friction"]  # along +x, the force against it
-    assert list(columns)[-2] == "friction_x"
+    assert columns["friction_slopes"] == pytest.approx(columns["friction"], rel=1e-9)  # in full contact, all waves seen
+    last = ["friction_x", "contact_area_corrected", "error_friction", "error_area", "friction_slopes"]
+    assert list(columns)[-5:] == last
     for speed, pressure, friction, force, power in zip(
         *(columns[name] for name in ("velocity", "pressure", "friction", "force_x", "dissipated_0")), strict=True
     ):

@@ -46,6 +46,8 @@ CORRECTED_ORDER = 1.0  # of the corrected area
 EDGES, STRAIGHT_EDGES = 0.25, 3.0  # of the correction of the area; along edges that follow the grid
 SMALL_SPOTS = 0.6  # of the square of the correction, which is large where spots of contact are a few cells wide
 NOISE = 0.4  # of the slope of the surface, times the complementarity: tangential force where there is no friction
+WHOLE_CELLS, PARTS_OF_CELLS = 1.0, 0.5  # of the difference of the views; between cells much of it is averaged out
+SAME_PLACE = 1e-6  # relative: steps this near whole cells are such
 BY_ENERGY, BY_ENERGY_WAVES = 0.5, 0.1  # of the difference of the views, and of the mesh error of marches
 ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
 AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
@@ -104,7 +106,8 @@ def _friction(known: Known, seen: Seen, points: int) -> Parts:
     spots, steep = count_spots(known, seen, points), max(1.0, seen.slope / seen.friction)
     solver = SOLVER_FRICTION * seen.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
     noise = NOISE * max(seen.complementarity, ROUNDING) * seen.slope / seen.friction / math.sqrt(spots)
-    mesh = max(_mesh_by_cells(known, seen, points), seen.views_apart / seen.friction)
+    share = WHOLE_CELLS if abs(seen.slid - round(seen.slid)) <= SAME_PLACE * seen.slid else PARTS_OF_CELLS
+    mesh = max(_mesh_by_cells(known, seen, points), share * seen.views_apart / seen.friction)
     return Parts(max(solver, noise), time_error(known, seen, points), known.folded, mesh)
 
 

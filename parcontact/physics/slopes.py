@@ -9,7 +9,7 @@ Slopes are differences of the eighth order,
 
     du/dx = sum_k c_k (u(x + k dx) - u(x - k dx))/dx,      c = 4/5, -1/5, 4/105, -1/280,
 
-which are within 0.2 % of those of a wave of 8 cells, and within 6 % of those of a wave of 4. Unlike the slope of a
+which are within 0.03 % of those of a wave of 8 cells, and within 3 % of those of a wave of 4. Unlike the slope of a
 Fourier series they need only points near the contact, in periodic and in free boxes alike.
 """
 

@@ -102,9 +102,11 @@ def _finer(job: Job, sample: Sample, accuracy: float) -> float:
 
 
 def mesh_error(sample: Sample, name: str) -> float | None:
-    """The part of the error of friction or area that the mesh of a sample makes; None where there is none."""
+    """Return the part of the error of friction or area that the mesh of a sample makes; None where there is none, and
+    for friction that cannot be told from none, which no mesh makes exact to a share of it."""
     weight = sample.total(f"{name} weight")
-    return sample.total(f"{name} mesh error") / weight if weight else None
+    error = sample.total(f"{name} mesh error") / weight if weight else None
+    return None if name == "friction" and error is not None and error >= 1.0 else error
 
 
 def shortest_wave(job: Job) -> float | None:
@@ -232,11 +234,13 @@ def _basis(costs: Costs) -> Iterator[str]:
     """What was measured, and what is scaled from it."""
     sample = costs.scaling.samples[0]
     calls = sample.total("operator") / max(sample.steps, 1)
-    time, mesh = time_error(StageCost(0), sample), mesh_error(sample, "friction") or mesh_error(sample, "area") or 0.0
+    time, mesh = time_error(StageCost(0), sample), mesh_error(sample, "friction")
+    mesh = mesh_error(sample, "area") if mesh is None else mesh
+    by_mesh = "errors by the mesh unknown" if mesh is None else f"{_per_cent(mesh)} by the mesh"
     points = " x ".join(map(str, sample.job.grid.points))
     yield (
         f"measured on {points} points: times, {calls:.3g} operator calls a step, errors of {_per_cent(time)} by time "
-        f"steps and {_per_cent(mesh)} by the mesh"
+        f"steps, {by_mesh}"
     )
     yield (
         "scaled: cells by what the shortest wave or a contact spot needs, steps by the order of the integrator, "

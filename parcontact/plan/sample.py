@@ -23,7 +23,7 @@ from ..parallel.slab import Slab, deal
 from ..record.row import Row
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
-from ..steady_sliding.sliding import SteadySliding
+from ..steady_sliding.sliding import Point, SteadySliding
 from . import trial
 
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever
@@ -162,14 +162,27 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
         if temperature == temperature:
             sliding.heat(temperature)
         velocity = (speed * wanted.direction[0], speed * wanted.direction[1])
-        stage.add(1.0, _cost(slab, partial(_solve_or_fail, sliding, velocity, pressure)))
+        points: list[Point] = []
+        cost = _cost(slab, partial(_solve_or_fail, sliding, velocity, pressure, points))
+        stage.add(1.0, cost | dict(_errors_of_point(points)))
     return building, [stage]
 
 
-def _solve_or_fail(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> None:
-    """A state that cannot be solved costs what it has cost."""
+def _solve_or_fail(
+    sliding: SteadySliding, velocity: tuple[float, float], pressure: float, points: list[Point]
+) -> None:
+    """Append the state to `points`; one that cannot be solved costs what it has cost."""
     with suppress(RunError):
-        sliding.solve(velocity, pressure)
+        points.append(sliding.solve(velocity, pressure))
+
+
+def _errors_of_point(points: list[Point]) -> Iterator[tuple[str, float]]:
+    """Yield the mesh errors of steady states, which all weigh the same."""
+    for point in points:
+        for name, parts in (("friction", point.errors.friction), ("area", point.errors.area)):
+            if parts is not None:
+                yield f"{name} weight", 1.0
+                yield f"{name} mesh error", parts.mesh
 
 
 def _spread(count: int) -> list[int]:

@@ -17,6 +17,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene import frame
 from ..steady_sliding import curve
+from ..steady_sliding.missed import describe_missed
 from ..steady_sliding.sliding import Point, SteadySliding
 from .jobs import Given, read, warn_of
 
@@ -101,6 +102,9 @@ def steady(
             points.append(None)
             failures.append(str(error))
             warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+    if slab.root:
+        for text in describe_missed([point for point in points if point], found.numerics.accuracy):
+            warnings.warn(text, UserWarning, stacklevel=2)
     return _curve(wanted.points, points, tuple(failures))
 
 

@@ -1,6 +1,7 @@
 """What a run says: one line per step on root, a progress bar on a terminal, the same lines in run.log."""
 
 import os
+import re
 import sys
 import time
 from contextlib import suppress
@@ -14,6 +15,8 @@ from . import files
 from .row import Row
 
 HEAD = "    step        time [s]    load [Pa]      area  friction   iter  residual"
+STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
+WARNING = "warning: "
 EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
 LEFT_SECONDS = 30.0  # between two lines with the time left, where there is no terminal for a bar
 
@@ -24,6 +27,12 @@ def line(row: Row) -> str:
         f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} "
         f"{row.iterations:6d} {row.certificate.worst:9.2e}"
     )
+
+
+def warnings_of(log: Path) -> list[str]:
+    """Return the warnings in a log, each once and in their order; none where there is no log."""
+    lines = [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
+    return list(dict.fromkeys(line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)))
 
 
 def always(text: str) -> bool:
@@ -57,7 +66,7 @@ class Console:
 
     def warn(self, text: str, shown: bool = True) -> None:
         """A message that is shown even to those who asked for quiet, or is for run.log only."""
-        self.log(f"warning: {text}")
+        self.log(f"{WARNING}{text}")
         if shown:
             self._write(f"warning: {printable(text)}", sys.stderr)
 

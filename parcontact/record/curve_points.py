@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
+LOG = "steady.log"  # beside its table: what was said of it
 CLOSE = 1e-6  # relative: speeds and pressures that are the same but for rounding
 
 Point = tuple[float, float, float]  # speed [m/s], mean pressure [Pa], temperature [deg C], NaN for the material's

@@ -19,13 +19,13 @@ from typing import Any
 from ..errors import InputError, InUseError, TakenError
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
-from . import checkpoint, files, hdf5, marker, stopfile
+from . import checkpoint, curve_points, files, hdf5, marker, stopfile
 from .marker import SCENE, SECTIONS, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
-    "steady": ("steady.csv", "steady_waves.csv", "steady.h5", "steady_theory.csv"),
+    "steady": ("steady.csv", "steady_waves.csv", "steady.h5", "steady_theory.csv", curve_points.LOG),
     "study": ("study.csv", "study.txt", "convergence.png", "work_precision.png"),
 }
 COPIES = {  # of the job: as given, and with every default

@@ -10,7 +10,8 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from . import checkpoint, hdf5, marker, measures, slide, sweep_table, theory_settings
+from . import checkpoint, curve_points, hdf5, marker, measures, slide, sweep_table, theory_settings
+from .console import warnings_of
 from .marker import Claim
 from .resolved import RESOLVED, shown_job
 
@@ -86,6 +87,11 @@ def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
             f"  friction curve: {len(speeds)} points from {min(speeds):g} to {max(speeds):g} m/s; the largest friction "
             f"is {columns['friction'][best]:.6g} at {speeds[best]:g} m/s under {columns['pressure'][best]:g} Pa"
         )
+        errors = {name: slide.largest(columns[name]) for name in slide.ERRORS if name in columns}
+        if errors:
+            told = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
+            yield f"  largest estimated errors of the curve: {told}"
+        yield from (f"  warning: {text}" for text in warnings_of(directory / curve_points.LOG))
 
 
 def _checkpoints(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

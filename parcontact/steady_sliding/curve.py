@@ -113,7 +113,7 @@ def run(
         columns = wanted.waves, bool(wanted.temperatures)
         table = _on_root(slab, lambda: CurveTable(directory.path, sliding, *columns, quiet))
         if table:
-            table.warn(list(filter(shows, doubts)))
+            table.warn(doubts, shows)
         maps = _maps(job, slab, wanted, directory)
         try:
             with Signals().noted() as signals:
@@ -228,7 +228,7 @@ class _Curve:
         def write() -> None:
             if table:
                 table.write(point, shares)
-                table.warn(list(filter(self.shows, self.watch.judge_point(point.measures, at))))
+                table.warn(self.watch.judge_point(point.measures, at), self.shows)
 
         hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
 

@@ -1,14 +1,16 @@
 """steady.csv and steady_waves.csv: a line for each point of a friction curve, on root, and what is said of it."""
 
 import math
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..effects.interface import InterfaceColumns, interface_of
 from ..record import curve_points, files, measures
+from ..record.console import Console, always
+from ..record.curve_points import LOG
 from ..record.growing import GrowingTable
+from .missed import describe_missed
 from .sliding import Point, SteadySliding
 
 COLUMNS = (
@@ -26,6 +28,7 @@ class CurveTable:
     """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
 
     def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, heated: bool, quiet: bool) -> None:
+        self._console, self._accuracy = Console(directory / LOG, quiet, 0), sliding.base.job.numerics.accuracy
         self.path, self.heated, self.quiet, self.failed = directory / "steady.csv", heated, quiet, 0
         branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
         self.interface = InterfaceColumns.columns if interface_of(sliding.base.job) else ()
@@ -34,6 +37,7 @@ class CurveTable:
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
+        self._points: list[Point] = []
         self.say(HEAD)
 
     def _read(self) -> list[curve_points.Point]:
@@ -60,17 +64,18 @@ class CurveTable:
     def say(self, text: str) -> None:
         if not self.quiet or text.startswith("parcontact"):
             print(text, flush=True)
+        self._console.log(text)
 
-    def warn(self, texts: list[str]) -> None:
-        """What is shown even to those who asked for quiet."""
+    def warn(self, texts: list[str], shown: Callable[[str], bool] = always) -> None:
+        """Write warnings to the log, and show those that are `shown` even to those who asked for quiet."""
         for text in texts:
-            print(f"warning: {text}", file=sys.stderr, flush=True)
+            self._console.warn(text, shown(text))
 
     def write(self, point: Point, waves: Any) -> None:
         m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
         forces = (m.force_x, m.force_y, point.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        last = [point.friction * point.velocity[0] / speed, m.contact_area_corrected]
+        last = [point.friction * (point.velocity[0] / speed), m.contact_area_corrected]
         last += (point.temperature, point.shift_factor) if self.heated else ()
         last += (point.friction - m.friction_interface, m.friction_interface) if self.interface else ()
         last += point.error_friction, point.errors.area.total, m.friction
@@ -79,6 +84,7 @@ class CurveTable:
                 self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
         cells = [speed, m.pressure, *forces, *solve, *point.dissipated, *last]
         self._file.append([repr(float(value)) for value in cells])
+        self._points.append(point)
         self.say(
             f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {point.friction:9.6f} "
             f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
@@ -91,6 +97,7 @@ class CurveTable:
         self.warn([*mended, *([lost] if lost else [])])
         if self.known:
             self._sort()
+        self.warn(list(describe_missed(self._points, self._accuracy)))
         from ..record import plots  # matplotlib is slow to import, and for pictures only
 
         picture = plots.draw_steady(self.path)
@@ -107,6 +114,7 @@ class CurveTable:
         files.write(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
 
     def close(self) -> None:
+        self._console.close()
         self._file.close()
         if self._waves:
             self._waves.close()
