@@ -14,6 +14,7 @@ from parcontact.physics.body import ElasticBody, ZenerBody
 from parcontact.physics.embedded import Embedded
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
+from parcontact.physics.slopes import friction_by_energy
 from parcontact.solve.contact import ContactSolver, MeanPressure
 
 
@@ -60,6 +61,7 @@ def lasting(planned: Job) -> Counter[str]:
             load, dt = found.pressure * slab.points / (alpha * base.units.pressure), step.dt
             pair = Embedded(slab, body, base.job.grid.dx / base.units.length)
             pair.look(step.dt, trial, contact.p, contact.u, load, found.contact_area)
+            friction_by_energy(slab, contact.p, contact.u, (1.0, 1.0), (1.0, 0.0), True)  # as often
         earlier, last, p = last, p, earlier
     return slab.tally.copy()
 

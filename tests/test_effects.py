@@ -55,8 +55,8 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
         {"history": [PRESS], "material": RUBBER},
         {
             "map bytes": 3 * MAP,
-            "allreduce": 2,
-        },  # branch, displacement, effective heights; 2 looks at 5 steps
+            "allreduce": 4,
+        },  # branch, displacement, effective heights; 2 looks at 5 steps, and 2 at both views of friction
     ),
     "folded branches": (
         {"history": [PRESS], "material": FROZEN, "numerics": {"branch_error": 0.0}},

@@ -240,7 +240,7 @@ def test_warnings_are_those_of_python() -> None:
     with pytest.warns(UserWarning, match="slope"):
         next(pc.Simulation(steep, comm=MPI.COMM_SELF).steps())
     with pytest.warns(UserWarning, match="slope"):
-        pc.steady(steep, 0.1, 1e6, comm=MPI.COMM_SELF)
+        pc.steady({**steep, "numerics": {"accuracy": 0.1}}, 0.1, 1e6, comm=MPI.COMM_SELF)
 
 
 def test_a_finished_run_has_its_last_row(nowhere: Path) -> None:

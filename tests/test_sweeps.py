@@ -197,6 +197,7 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         assert float(mean["mu_dyn_mean"]) == pytest.approx(sum(values) / 3, rel=1e-12)
         spread = sum((value - sum(values) / 3) ** 2 for value in values) / 2
         assert float(mean["mu_dyn_std"]) == pytest.approx(spread**0.5, rel=1e-9)
+        assert float(mean["mu_dyn_sem"]) == pytest.approx((spread / 3) ** 0.5, rel=1e-9)
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
     case = here / "cases" / "001"
     for text in ((case / "run.log").read_text(), info_directory.describe(case)[0]):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from . import advice, extension, limits, meaning, size, table
+from . import advice, extension, imprint, limits, meaning, size, table
 from .chosen import ChosenSteps, most_cells
 from .chosen import describe as describe_steps
 from .fault import Fault
@@ -206,6 +206,7 @@ class Job(Part):
         return (
             *advice.resolution(*scene, self.numerics),
             *meaning.warnings(*scene, self.initial, self.steady),
+            *imprint.returns(*scene, self.initial),
             *size.warnings(self.grid, self.timeline(), self.output),
         )
 

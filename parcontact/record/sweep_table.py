@@ -16,6 +16,7 @@ from . import curve_points, files, measures, slide
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
 COLUMNS = ("state", *RESULTS, "residual", *slide.ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
+MEANS = "mean", "std", "sem"
 SEED = "seed"  # the last word of keys over whose values means are taken
 FAILURE = ".failure"  # why a case has failed
 
@@ -91,7 +92,8 @@ def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]])
 
 
 def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:
-    """Mean, standard deviation of a single case and number over the cases that differ by their seeds only."""
+    """Mean, standard deviation of a single case, standard error of the mean, and number, over the cases that differ by
+    their seeds only."""
     kept = [key for key in keys if key.split(".")[-1] != SEED]
     names = [name for name in COLUMNS if name in RESULTS or name.startswith("theory_")]
     groups: dict[str, list[dict[str, Any]]] = {}
@@ -103,9 +105,11 @@ def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[st
         for name in names:
             values = [row[name] for row in group if row["state"] == "done" and name in row]
             if values:
-                out |= {f"{name}_mean": fmean(values), f"{name}_std": stdev(values) if len(values) > 1 else ""}
+                std = stdev(values) if len(values) > 1 else math.nan
+                numbers = fmean(values), std, std / math.sqrt(len(values))
+                out |= {f"{name}_{what}": number for what, number in zip(MEANS, numbers, strict=True)}
         table.append(out)
-    return [*kept, "number", *(f"{name}_{what}" for name in names for what in ("mean", "std"))], table
+    return [*kept, "number", *(f"{name}_{what}" for name in names for what in MEANS)], table
 
 
 def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from .. import sanity, scene
 from ..errors import InputError, RunError
 from ..job.chosen import reached
+from ..job.sample import describe_sample
 from ..job.timeline import Timeline
 from ..march import loop
 from ..march.failure import StepError
@@ -181,9 +182,13 @@ class Journey:
         counts = ", ".join(f"{name} {count}" for name, count in sorted(self.slab.tally.items()))
         self.console.log(f"counts on root: {counts}")
 
+    @property
+    def _slides(self) -> bool:
+        return any(stage.speed for stage in self.job.history)
+
     def _tell_slide(self) -> None:
         """What sweeps collect of a run; a table that cannot be read now ends no run."""
-        if self.slab.root and any(stage.speed for stage in self.job.history):
+        if self.slab.root and self._slides:
             with suppress(OSError, InputError):
                 for text in slide.describe(self.job.history, measures.read(self.directory.path / "measures.csv")):
                     self.console.say(text)
@@ -193,6 +198,8 @@ class Journey:
         self._log_counts()
         for line in self.errors.summary.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
             console.say(line)
+        if self.errors.summary.area is not None and (text := describe_sample(self.job, self._slides)):
+            console.say(text)
         if self.stop:
             of = f"about {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")

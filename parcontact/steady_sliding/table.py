@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..effects.interface import InterfaceColumns, interface_of
+from ..job.sample import describe_sample
 from ..record import curve_points, files, measures
 from ..record.console import Console, always
 from ..record.curve_points import LOG
@@ -28,10 +29,10 @@ class CurveTable:
     """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
 
     def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, heated: bool, quiet: bool) -> None:
-        self._console, self._accuracy = Console(directory / LOG, quiet, 0), sliding.base.job.numerics.accuracy
+        self._console, self._job = Console(directory / LOG, quiet, 0), sliding.base.job
         self.path, self.heated, self.quiet, self.failed = directory / "steady.csv", heated, quiet, 0
-        branches = sliding.base.prony.moduli.size if sliding.base.job.grid.boundary == "periodic" else 0
-        self.interface = InterfaceColumns.columns if interface_of(sliding.base.job) else ()
+        branches = sliding.base.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
+        self.interface = InterfaceColumns.columns if interface_of(self._job) else ()
         added = (*(HEATED if heated else ()), *self.interface)
         self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
         self.known = self._read()
@@ -97,7 +98,9 @@ class CurveTable:
         self.warn([*mended, *([lost] if lost else [])])
         if self.known:
             self._sort()
-        self.warn(list(describe_missed(self._points, self._accuracy)))
+        self.warn(list(describe_missed(self._points, self._job.numerics.accuracy)))
+        if self._points and (text := describe_sample(self._job, slides=True)):
+            self.say(text)
         from ..record import plots  # matplotlib is slow to import, and for pictures only
 
         picture = plots.draw_steady(self.path)
