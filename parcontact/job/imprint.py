@@ -42,8 +42,8 @@ def returns(
             yield (
                 f"history.{index}: after {start:.3g} m of {speed * seconds:.3g} m the surface has come round the "
                 "periodic box to where this slide began, over its own imprint, which the body remembers for "
-                f"{memory:.3g} s: friction is that of the box then, and part of mu_dyn; use a shorter distance or a larger "
-                "grid.size"
+                f"{memory:.3g} s: friction is that of the box then, and part of mu_dyn; use a shorter distance or a "
+                "larger grid.size"
             )
 
 

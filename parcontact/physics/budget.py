@@ -25,7 +25,8 @@ Friction of steady sliding is the dissipated power over load and velocity, a sum
 cancellation. It is wrong in the same proportion as the pressures are, of which three numbers tell: the difference of
 the two views over the slope of the surface, the cells per shortest wave, and where spots of contact are a few cells
 wide, the correction of the area. Of 40 steady states on rough surfaces, with 2 to 8 cells per shortest wave and
-friction of 5e-4 to 0.5 of the slope, 96 % are wrong by at most twice the estimate, which is 3.8 times the error in the median.
+friction of 5e-4 to 0.5 of the slope, 96 % are wrong by at most twice the estimate, which is 3.8 times the error in the
+median.
 """
 
 import math

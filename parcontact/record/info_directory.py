@@ -64,7 +64,8 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield "  last row: " + ", ".join(f"{name} {value:.6g}" for name, value in last.items())
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
     if (directory / RESOLVED).exists():
-        yield from (f"  {text}" for text in slide.describe(shown_job(directory / RESOLVED).history, columns))
+        job = shown_job(directory / RESOLVED)
+        yield from (f"  {text}" for text in slide.describe(job.history, columns, job.grid.dx))
 
 
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -65,8 +65,32 @@ def largest(values: Iterable[float]) -> float:
     return max((value for value in values if value == value), default=math.nan)
 
 
-def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
-    """Sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing has slid.
+def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> float:
+    """By how much friction of the row `at` is above its mean over one cell [m] around it: steps between cells meet
+    points of the grid in turn, and friction goes up and down with them. 0 where rows are a cell apart or more."""
+    x, y = np.asarray(distance, float), np.asarray(friction, float)
+    near = np.abs(x - x[at]) <= cell / 2 * (1 + SAME_INSTANT)
+    if np.count_nonzero(near) < 3 or not x[near][0] < x[at] < x[near][-1]:
+        return 0.0
+    return max(float(y[at] - mean_over_end(x[near], y[near], 1.0)), 0.0)
+
+
+def _within(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> str:
+    """By how much the highest friction of some rows may be wrong: its estimated error, and the ripple on which it sits;
+    '' where none of this is known."""
+    friction = np.asarray(columns["friction"], float)[rows]
+    at = int(np.argmax(friction[1:])) + 1
+    error = float(columns[ERRORS[0]][rows[at]]) * friction[at] if ERRORS[0] in columns else math.nan
+    wave = ripple(np.asarray(columns["distance"], float)[rows], friction, at, cell)
+    both = wave + (error if error == error else 0.0)
+    if not both > 0.0:
+        return ""
+    return f" +- {both:.2g}" + (f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * both else "")
+
+
+def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> Iterator[str]:
+    """Sentences about the slide so far, from the columns of `measure` and of `errors`, on a grid of such cells [m];
+    none where nothing has slid.
 
     As long as the last slide has not begun, they are about the one before it, and say so.
     """
@@ -79,8 +103,10 @@ def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -
     if waits:
         ends_with = _slide(so_far).stop - 1
         yield f"the last slide has not begun; what follows is of the one before it, which ends with history.{ends_with}"
-    distance = np.asarray(columns["distance"], float)[_during(so_far, np.asarray(columns["time"], float))]
-    yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}, after {found.mu_max_distance:.4g} m of it"
+    rows = _during(so_far, np.asarray(columns["time"], float))
+    distance, within = np.asarray(columns["distance"], float)[rows], _within(columns, rows, cell)
+    after = f"after {found.mu_max_distance:.4g} m of it"
+    yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}{within}, {after}"
     length = f"{distance[-1] - distance[0]:.4g} m"
     yield f"mu_dyn, the mean friction over the last three quarters of its {length}, is {found.mu_dyn:.6g}"
     yield f"the mean contact area over the same is {found.contact_area:.6g}"

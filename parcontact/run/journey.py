@@ -190,7 +190,8 @@ class Journey:
         """What sweeps collect of a run; a table that cannot be read now ends no run."""
         if self.slab.root and self._slides:
             with suppress(OSError, InputError):
-                for text in slide.describe(self.job.history, measures.read(self.directory.path / "measures.csv")):
+                rows = measures.read(self.directory.path / "measures.csv")
+                for text in slide.describe(self.job.history, rows, self.job.grid.dx):
                     self.console.say(text)
 
     def _farewell(self) -> int:

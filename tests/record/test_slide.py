@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from parcontact.job import Stage
-from parcontact.record.slide import describe, mean_over_end, measure
+from parcontact.record.slide import describe, mean_over_end, measure, ripple
 
 REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
 CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}
@@ -74,23 +74,35 @@ def test_sentences_about_a_slide() -> None:
     """Each number with what it is; errors as far as they are known, the largest of the slide alone."""
     table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
     table["error_friction"] = [float("nan"), 0.5, 0.02, 0.03, float("nan"), 0.01]
-    assert list(describe(stages(REST, CLIMB, SETTLE), table)) == [
-        "mu_max, the highest friction of the slide, is 4, after 1 m of it",
+    assert list(describe(stages(REST, CLIMB, SETTLE), table, 0.1)) == [
+        "mu_max, the highest friction of the slide, is 4 +- 0.12, after 1 m of it",
         "mu_dyn, the mean friction over the last three quarters of its 4 m, is 2.33333",
         "the mean contact area over the same is 0.233333",
         "largest errors of the steps of the slide: friction 3 %",
     ]
-    assert not list(describe(stages(REST), table))
+    assert not list(describe(stages(REST), table, 0.1))
 
 
 def test_sentences_about_a_slide_that_others_follow() -> None:
     """As long as the last slide has not begun; then the sentences are about that one."""
     table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2))
     history = stages(REST, CLIMB, REST, {**CLIMB, "velocity": 3.0})
-    told = list(describe(history, table))
+    told = list(describe(history, table, 0.1))
     assert told[0] == "the last slide has not begun; what follows is of the one before it, which ends with history.1"
-    assert told[1:] == list(describe(history[:2], table))
+    assert told[1:] == list(describe(history[:2], table, 0.1))
     assert measure(history, table) is None
-    assert len(list(describe(stages(REST, CLIMB, SETTLE), rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5))))) == 3
+    assert len(list(describe(stages(REST, CLIMB, SETTLE), rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)), 0.1))) == 3
     begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
-    assert next(describe(history, begun)) == ("mu_max, the highest friction of the slide, is 7, after 1.5 m of it")
+    assert next(describe(history, begun, 0.1)) == ("mu_max, the highest friction of the slide, is 7, after 1.5 m of it")
+
+
+def test_mu_max_on_a_ripple() -> None:
+    """Of a height of 1 and the period of the cell, in steps of an eighth of it: its mean over a cell is 1 less, by
+    trapezoids to round-off. Steps of a cell do not show it."""
+    x = np.arange(0.0, 4.0 + 1e-9, 0.125)
+    friction = 5.0 + np.cos(2 * np.pi * x)
+    assert ripple(x, friction, 16, 1.0) == pytest.approx(1.0, rel=1e-12)
+    assert ripple(x[::8], friction[::8], 2, 1.0) == 0.0
+    table = rows(*zip(x / 2.0, x, friction, strict=True))
+    told = next(iter(describe(stages({**CLIMB, "duration": 2.0}), table, 1.0)))
+    assert "is 6 +- 1 (1 of it a ripple with the period of a cell), after" in told
