@@ -126,7 +126,7 @@ COLUMNS = {
     "measures.csv": [*measures.columns(0, InterfaceColumns.columns), "dissipated_K"],
     "steady.csv": [
         *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
-        *(*steady_table.HEATED, *InterfaceColumns.columns),
+        *(*steady_table.HEATED, *InterfaceColumns.columns, *steady_table.ERRORS),
     ],
     "steady_waves.csv": steady_table.WAVES,
     "theory.csv": prediction.COLUMNS,
