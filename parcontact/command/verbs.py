@@ -67,7 +67,8 @@ def check(options: argparse.Namespace) -> int:
             print(f"\n{job.included}")
         if job.about_steps:
             print(f"\ntime steps that are chosen: {job.about_steps}")
-        doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
+        each = [case.job for case in chosen]
+        doubts = [text for job in each for text in (*job.warnings, *_doubts(job))]
         for warning in dict.fromkeys(doubts):
             print(f"warning: {warning}")
         if cases[0].settings:
@@ -77,18 +78,20 @@ def check(options: argparse.Namespace) -> int:
 
 
 def _doubts(job: Job) -> list[str]:
-    """What is wrong with heights that only a look at them tells, for a root that no other ranks wait for."""
+    """What only a look at heights and measured moduli tells, for a root that no other ranks wait for."""
     from ..job import meaning
 
-    if meaning.says_all(job.surface) or ranks.launched() > 1:
+    if (meaning.says_all(job.surface) and not job.measured) or ranks.launched() > 1:
         return []
     from .. import sanity, scene
+    from ..effects.measured_range import describe_beyond
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
 
-    if not sanity.is_quickly_made(job):
-        return []
-    return sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    found = list(describe_beyond(job))
+    if sanity.is_quickly_made(job):
+        found += sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    return found
 
 
 def plan(options: argparse.Namespace) -> int:
@@ -97,6 +100,7 @@ def plan(options: argparse.Namespace) -> int:
     started = watch.age()
     world = ranks.start()
     from .. import sanity, scene
+    from ..effects.measured_range import describe_beyond
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..plan import machine, planning, whole_sweep
@@ -113,7 +117,7 @@ def plan(options: argparse.Namespace) -> int:
         planning.leave_sample(job, slab, wanted, options.sample, options.sample_points)
         return DONE
     whole = len(chosen) > 1
-    doubts = [] if whole else list(job.warnings)
+    doubts = [] if whole else [*job.warnings, *describe_beyond(job)]
     if whole:
         on_root(world, lambda: sweep_warnings.warn_once(chosen))
     for warning in (*doubts, *(sanity.of_surface(scene.frame(job, slab)) if sanity.is_quickly_made(job) else ())):
@@ -160,7 +164,7 @@ def fit(options: argparse.Namespace) -> int:
     compounds.refuse_foreign(target)
     band = excited_band(jobs.load(options.job)) if options.job else None
     law = given(options.shift, options.reference)
-    made = compound.fitted(options.table, options.poisson, options.reference, law, options.error)
+    made = compound.fitted(options.table, options.poisson, options.reference, law, options.error, options.weight)
     for line in compounds.write(made, target, band):
         print(line)
     return DONE

@@ -139,6 +139,8 @@ def _parser() -> argparse.ArgumentParser:
     fit.add_argument("--shift", metavar="LAW", default="wlf", help=text)
     text = "rms error of the logarithms of the moduli that is allowed beside the scatter of the data (default: 0.02)"
     fit.add_argument("--error", metavar="E", type=values.positive, default=0.02, help=text)
+    text = "which moduli the fit meets, where storage and loss contradict each other (default: both)"
+    fit.add_argument("--weight", choices=("both", "storage", "loss"), default="both", help=text)
     fit.add_argument("--poisson", metavar="NU", type=values.poisson, default=0.5, help="Poisson's ratio (default: 0.5)")
     fit.add_argument("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
     fit.set_defaults(act=verbs.fit)

@@ -113,6 +113,12 @@ Band = Annotated[
 ]
 
 
+Measured = Annotated[
+    tuple[Celsius, Celsius] | None,
+    Field(description="two temperatures [deg C], the lowest and the highest that were measured"),
+]
+
+
 def _stiff(modulus_inf: float, branches: tuple[ZenerBranch | PronyBranch | None, ...]) -> Iterator[Fault]:
     if None not in branches and modulus_inf + sum(branch.instant_modulus for branch in branches if branch) == 0:
         yield Fault("has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
@@ -133,6 +139,7 @@ class Zener(Part):
     shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C]")  # that of the reference
     band: Band = None
+    temperatures: Measured = None
 
     rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
 
@@ -165,19 +172,27 @@ class Dma(Part):
     shift: Literal["wlf", "arrhenius", "free"] = "wlf"
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C]")  # that of the reference
     error: Positive = Field(default=0.02, description="a positive rms error of the logarithms of the moduli [-]")
+    weight: Literal["both", "storage", "loss"] = "both"
 
     _fitted: Zener = PrivateAttr()
+    _doubts: tuple[str, ...] = PrivateAttr(default=())
 
     def model_post_init(self, context: Any) -> None:
         """Fits the compound."""
         try:
-            found = compound.fitted(self.path, self.poisson, self.reference, self.shift, self.error)
+            found = compound.fitted(self.path, self.poisson, self.reference, self.shift, self.error, self.weight)
         except InputError as error:
             refuse(Fault(f"cannot be fitted: {error}", ("path",)))
         made = Zener.model_validate(found.material())
         if faults := list(shifted(made.shift, self.temperature)):
             refuse(*faults)
+        self._doubts = tuple(f"material.path: {text}" for text in found.doubts())
         self._fitted = made.model_copy(update={"temperature": self.temperature})
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What to say of the fit."""
+        return self._doubts
 
     @property
     def fitted(self) -> Zener:

@@ -204,11 +204,18 @@ class Job(Part):
         material = self.material.fitted if isinstance(self.material, Dma) else self.material
         scene = self.grid, self.surface, material, self.history
         return (
+            *(self.material.doubts if isinstance(self.material, Dma) else ()),
             *advice.resolution(*scene, self.numerics),
             *meaning.warnings(*scene, self.initial, self.steady),
             *imprint.returns(*scene, self.initial),
             *size.warnings(self.grid, self.timeline(), self.output),
         )
+
+    @property
+    def measured(self) -> bool:
+        """Whether the material says at which frequencies or temperatures it was measured."""
+        body = self.material.fitted if isinstance(self.material, Dma) else self.material
+        return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
     def at_temperature(self, temperature: float) -> Job:
         """The same job with its material at another temperature [deg C]; raises InputError where it has no shift."""

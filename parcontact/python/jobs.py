@@ -9,6 +9,7 @@ from typing import Any
 
 from .. import job as jobs
 from .. import sanity
+from ..effects.measured_range import describe_beyond
 from ..job import Job
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
@@ -35,6 +36,6 @@ def of_parts(**parts: Any) -> Job:
 
 def warn_of(job: Job, frame: Frame) -> None:
     """Warn, on root, of what is allowed but means little; collective."""
-    for text in (*job.warnings, *sanity.of_surface(frame)):
+    for text in (*job.warnings, *describe_beyond(job), *sanity.of_surface(frame)):
         if frame.slab.root:
             warnings.warn(text, UserWarning, stacklevel=4)

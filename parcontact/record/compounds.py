@@ -35,6 +35,7 @@ def write(compound: Compound, target: Path, job_band: tuple[float, float] | None
     if compound.shift is not None:
         yield f"shift: {compound.shift}"
     yield f"material file: {target}, picture: {picture}"
+    yield from (f"warning: {text}" for text in compound.doubts())
     if job_band:
         yield from warnings(compound, job_band)
 

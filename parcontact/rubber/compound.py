@@ -3,27 +3,37 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..errors import InputError
 from .shift import WLF, Arrhenius, Factors, Shift
 
+if TYPE_CHECKING:
+    from .series import Weigh
+
 TITLE = "# Fitted by parcontact fit to"  # with which material files of fits begin
+POOR, HOPELESS = 0.2, 1.0  # rms errors of fits that are warned of, and refused
+CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # misfits of more than so many times the scatter, and so much, are told
+SWAPPED = 0.5  # of the misfit: that of exchanged moduli, if they were
 DIGITS = 7  # of the numbers in a material file
 
 
 @dataclass(frozen=True)
 class Compound:
     """What was measured (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
-    `shift` (None for a table of one temperature); `poisson` is the ratio with which Young's moduli were divided."""
+    `shift` (None for a table of one temperature); `poisson` is the ratio with which Young's moduli were divided; both
+    moduli count in the fit, or only the one to `weigh`."""
 
     measured: Any
     series: Any
     shift: Shift | None
     poisson: float
+    weigh: "Weigh" = "both"
 
     def material(self) -> dict[str, Any]:
         """The material section of a job."""
         pairs = zip(self.series.moduli, self.series.times, strict=True)
+        degrees = self.temperatures
         low, high = (_rounded(rate / (2 * math.pi)) for rate in self.series.band)
         return {
             "model": "zener",
@@ -32,18 +42,46 @@ class Compound:
             "branches": [{"modulus": _rounded(g), "relaxation_time": _rounded(t)} for g, t in pairs],
             **({"shift": _shift_section(self.shift)} if self.shift is not None else {}),
             "band": [low, high],
+            **({"temperatures": [_rounded(t) for t in (min(degrees), max(degrees))]} if self.shift and degrees else {}),
         }
+
+    @property
+    def temperatures(self) -> list[float]:
+        """At which the table was measured [deg C], rising; none if it does not say."""
+        return [each.temperature for each in self.measured.sets if each.temperature is not None]
+
+    @property
+    def _weighed(self) -> str:
+        return "moduli" if self.weigh == "both" else f"{self.weigh} modulus"
+
+    def doubts(self) -> list[str]:
+        """What to say of a fit that misses the table by more than it scatters."""
+        series, found = self.series, []
+        if series.error > POOR:
+            found.append(f"the fit misses the {self._weighed} by {series.error:.0%} (rms), more than {POOR:.0%}")
+        noise = 0.0 if math.isnan(series.scatter) else series.scatter
+        both = self.measured.kind == "frequency" and self.weigh == "both"
+        if both and series.best > max(CONTRADICTS * noise, LEAST_DOUBT):
+            storage, loss = series.alone
+            found.append(
+                f"no relaxation spectrum meets storage and loss moduli better than {series.best:.2%} together, while "
+                f"neighbours of one sweep scatter by {noise:.2%}: alone they are met to {storage:.2%} and {loss:.2%}; "
+                "they contradict each other (Kramers-Kronig), or the sweeps do not shift onto one another; check the "
+                "table, or weigh one of them: --weight storage, or loss"
+            )
+        return found
 
     def text(self) -> str:
         """The material file: what it is and how good, then the material."""
         series, shift, section = self.series, self.shift, self.material()
         at = f" at {shift.reference:g} C" if shift is not None else ""
         kind = "Young's moduli, divided by 2 (1 + poisson)" if self.measured.tension else "shear moduli"
-        temperatures = [each.temperature for each in self.measured.sets if each.temperature is not None]
+        temperatures = self.temperatures
+        noise = "" if math.isnan(series.scatter) else f"; neighbours of one sweep scatter by {series.scatter:.2%}"
         lines = [
             f"{TITLE} {self.measured.path.name}: {kind}, {self.measured.kind} domain.",
-            f"# {len(series.moduli)} branches; rms error of the moduli {series.error:.2%}, "
-            f"of which {series.scatter:.2%} is scatter of the data.",
+            f"# {len(series.moduli)} branches; rms error of the {self._weighed} {series.error:.2%}; the best that "
+            f"any relaxation spectrum does is {series.best:.2%}{noise}.",
             f"# Measured band, reduced{at}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",
             *([f"# Measured at {', '.join(f'{t:.4g}' for t in temperatures)} C."] if temperatures else []),
             "# All moduli are of shear [Pa], times in s"
@@ -55,9 +93,12 @@ class Compound:
         return "\n".join(lines) + "\n"
 
 
-def fitted(path: Path, poisson: float, reference: float | None, law: str | Shift, error: float) -> Compound:
+def fitted(
+    path: Path, poisson: float, reference: float | None, law: str | Shift, error: float, weigh: "Weigh" = "both"
+) -> Compound:
     """Read a table and fit it. `law` is wlf, arrhenius or free (constants are fitted too), or a shift that is known;
-    `reference` [deg C] defaults to the middle one of the measured temperatures. Raises InputError."""
+    `reference` [deg C] defaults to the middle one of the measured temperatures. Raises InputError, also for a table
+    that no fit meets."""
     from . import series, tables  # scipy is for fits only
 
     measured = tables.read(path, poisson)
@@ -67,9 +108,23 @@ def fitted(path: Path, poisson: float, reference: float | None, law: str | Shift
         shift = law
     elif len(temperatures) > 1:
         middle = temperatures[len(temperatures) // 2]
-        shift = series.find_shift(measured, middle if reference is None else reference, law)
+        shift = series.find_shift(measured, middle if reference is None else reference, law, weigh)
     logs = [shift.log_factor(t) for t in temperatures] if shift is not None and temperatures else None
-    return Compound(measured, series.fit(measured.sets, measured.kind, error, logs), shift, poisson)
+    found = Compound(measured, series.fit(measured.sets, measured.kind, error, logs, weigh), shift, poisson, weigh)
+    missed = found.series.error
+    exchanged = missed if missed <= POOR or measured.kind == "time" else series.swapped(measured.sets, logs)
+    if exchanged < SWAPPED * missed:
+        raise InputError(
+            f"{path}: storage and loss moduli seem to be exchanged: a fit misses them by {missed:.0%}, and by "
+            f"{exchanged:.0%} if each is taken for the other"
+        )
+    if missed > HOPELESS:
+        raise InputError(
+            f"{path}: the best fit misses the moduli by {missed:.0%} (rms), more than {HOPELESS:.0%}: they are not "
+            "those of one linear viscoelastic body, or the sweeps do not shift onto one another; check units and "
+            "temperatures"
+        )
+    return found
 
 
 def _shift_section(shift: Shift) -> dict[str, Any]:

@@ -12,16 +12,19 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
 from ..errors import InputError
+from .sane import scatter
 from .shift import WLF, Arrhenius, Factors, Shift
 from .tables import Measurement, Set
 
 Array = NDArray[np.float64]
+Weigh = Literal["both", "storage", "loss"]
 DENSE = 3  # times per decade of the best series that is looked for
 MOST = 48  # branches
 SPARE = 0.5  # decades of times beyond the data, to either side
@@ -39,35 +42,55 @@ SHORTEST = 0.3  # share of a sweep that must overlap with its neighbour's
 class Series:
     """`modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference temperature.
 
-    `error` is the rms of the logarithms of fitted over measured moduli, storage and loss together; `scatter` that of a
-    dense series, the scatter of the data; `band` [rad/s] holds the reduced frequencies of the data (of relaxation: the
-    inverse times).
+    `error` is the rms of the logarithms of fitted over measured moduli, of those that count; `best` that of a dense
+    series, than which none is better; `alone` the same of storage and of loss without the other; `scatter` that of
+    neighbours of one sweep about a smooth curve, nan if sweeps are too short to tell; `band` [rad/s] holds the reduced
+    frequencies of the data (of relaxation: the inverse times).
     """
 
     modulus_inf: float
     moduli: Array
     times: Array
     error: float
-    scatter: float
-    band: tuple[float, float]
+    band: tuple[float, float] = (0.0, 0.0)
+    best: float = math.nan
+    alone: tuple[float, float] = (math.nan, math.nan)
+    scatter: float = math.nan
 
 
-def fit(sets: Sequence[Set], kind: str, error: float, shifts: Sequence[float] | None = None) -> Series:
-    """The shortest series that meets an rms error of the logarithms; `shifts` are log10 a_T of the sets.
+def fit(
+    sets: Sequence[Set], kind: str, error: float, shifts: Sequence[float] | None = None, weigh: Weigh = "both"
+) -> Series:
+    """The shortest series that meets an rms error of the logarithms; `shifts` are log10 a_T of the sets, and `weigh`
+    says which of the moduli counts.
 
-    The scatter of the data, which no series meets, is what a dense one leaves; it is allowed besides, as a square.
+    What no series meets, as a dense one leaves it, is allowed besides, as a square.
     """
     at, data = _reduced(sets, kind, shifts or [0.0] * len(sets))
     rates = at if kind == "frequency" else 1.0 / at
     band = float(rates.min()), float(rates.max())
-    dense = _solve(at, data, kind, _dense(*band))
+    weigh = weigh if kind == "frequency" else "both"
+    dense = _solve(at, data, kind, _dense(*band), weigh)
     goal = math.hypot(error, dense.error)
     for count in range(1, MOST + 1):
-        tried = [_solve(at, data, kind, _grid(band, count, spare)) for spare in ENDS]
+        tried = [_solve(at, data, kind, _grid(band, count, spare), weigh) for spare in ENDS]
         found = min(tried, key=lambda series: series.error)
         if found.error <= goal:
-            return replace(found, scatter=dense.error, band=band)
-    return replace(dense, scatter=dense.error, band=band)
+            break
+    else:
+        found = dense
+    of_one: tuple[Weigh, Weigh] = ("storage", "loss")
+    known = kind == "frequency"
+    alone = [_solve(at, data, kind, _dense(*band), one).error for one in of_one] if known else [dense.error, math.nan]
+    sweeps = [(each.at, moduli) for each in sets for moduli in (each.storage, each.loss) if moduli.size]
+    return replace(found, band=band, best=dense.error, alone=(alone[0], alone[1]), scatter=scatter(sweeps))
+
+
+def swapped(sets: Sequence[Set], shifts: Sequence[float] | None = None) -> float:
+    """Return the error of a dense series for which storage and loss moduli are taken for each other."""
+    other = [replace(each, storage=each.loss, loss=each.storage) for each in sets]
+    at, data = _reduced(other, "frequency", shifts or [0.0] * len(sets))
+    return _solve(at, data, "frequency", _dense(float(at.min()), float(at.max()))).error
 
 
 def _grid(band: tuple[float, float], count: int, spare: float = SPARE) -> Array:
@@ -94,20 +117,26 @@ def _columns(at: Array, kind: str, times: Array) -> Array:
     return np.vstack([storage, np.hstack([z / (1.0 + z**2), np.zeros((at.size, 1))])])
 
 
-def _solve(at: Array, data: Array, kind: str, times: Array) -> Series:
+def _solve(at: Array, data: Array, kind: str, times: Array, weigh: Weigh = "both") -> Series:
     """The best moduli >= 0 for given times; those that are 0 are left out."""
     columns = _columns(at, kind, times)
-    *moduli, spring = found = nnls(columns / data[:, None], np.ones(data.size), maxiter=100 * times.size + 100)[0]
-    fitted = np.maximum(columns @ found, np.finfo(float).tiny)
-    error = float(np.sqrt(np.mean(np.log(fitted / data) ** 2)))
+    counts = {"both": slice(None), "storage": slice(at.size), "loss": slice(at.size, None)}[weigh]
+    scaled = columns[counts] / data[counts, None]
+    found = nnls(scaled, np.ones(len(scaled)), maxiter=100 * times.size + 100)[0]
+    fitted = np.maximum(columns[counts] @ found, np.finfo(float).tiny)
+    error = float(np.sqrt(np.mean(np.log(fitted / data[counts]) ** 2)))
+    if weigh == "loss":  # which does not see the spring: that is what the storage modulus lacks in the mean
+        storage = data[: at.size]
+        found[-1] = max(0.0, float(np.mean(1.0 - columns[: at.size] @ found / storage) / np.mean(1.0 / storage)))
+    *moduli, spring = found
     kept = np.asarray(moduli) > 0.0
-    return Series(float(spring), np.asarray(moduli)[kept], times[kept], error, error, (0.0, 0.0))
+    return Series(float(spring), np.asarray(moduli)[kept], times[kept], error)
 
 
 # -- the shift of measured sets ----------------------------------------------------------------------------------------
 
 
-def find_shift(measured: Measurement, reference: float, law: str) -> Shift:
+def find_shift(measured: Measurement, reference: float, law: str, weigh: Weigh = "both") -> Shift:
     """A law (`wlf`, `arrhenius` or `free`, for factors at the measured temperatures) that joins the sets of a
     measurement to one curve at a reference temperature [deg C].
 
@@ -125,7 +154,7 @@ def find_shift(measured: Measurement, reference: float, law: str) -> Shift:
         )
     if law == "free":
         return _relative(known, _overlaps(measured), reference)
-    return _fitted(measured, known, WLF_CONSTANTS if law == "wlf" else ENERGIES, reference)
+    return _fitted(measured, known, WLF_CONSTANTS if law == "wlf" else ENERGIES, reference, weigh)
 
 
 def _overlaps(measured: Measurement) -> list[float]:
@@ -165,7 +194,9 @@ def _relative(temperatures: Sequence[float], logs: Sequence[float], reference: f
     return Factors(tuple(temperatures), tuple(float(log - there) for log in logs), reference)
 
 
-def _fitted(measured: Measurement, temperatures: Sequence[float], ranges: Ranges, reference: float) -> Shift:
+def _fitted(
+    measured: Measurement, temperatures: Sequence[float], ranges: Ranges, reference: float, weigh: Weigh
+) -> Shift:
     """The constants for which one dense series meets all sets best: of a grid, then near to the best of these."""
 
     def law(constants: Array) -> WLF | Arrhenius:
@@ -181,7 +212,7 @@ def _fitted(measured: Measurement, temperatures: Sequence[float], ranges: Ranges
             return math.inf
         at, data = _reduced(measured.sets, measured.kind, shifts)
         rates = at if measured.kind == "frequency" else 1.0 / at
-        return _solve(at, data, measured.kind, _dense(float(rates.min()), float(rates.max()))).error
+        return _solve(at, data, measured.kind, _dense(float(rates.min()), float(rates.max())), weigh).error
 
     grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
     start = min(grid, key=error)

@@ -16,6 +16,8 @@ from typing import Protocol
 from ..errors import InputError
 
 GAS = 8.314462618  # J/(mol K)
+ENERGY = 1e3, 1e7  # J/mol: energies of activation are some 1e5
+CONSTANT = 1e-3, 1e4  # C1 [-] and C2 [K] of WLF
 ZERO = 273.15  # K at 0 deg C
 
 
@@ -95,8 +97,8 @@ def given(text: str, reference: float | None) -> str | Shift:
             raise InputError(f"--shift {text} needs --reference, the temperature [deg C] that its constants belong to")
         try:
             if name == "arrhenius":
-                return Arrhenius(float(rest), reference)
-            first, second = (float(part) for part in rest.split(","))
+                return Arrhenius(_within(text, float(rest), *ENERGY), reference)
+            first, second = (_within(text, float(part), *CONSTANT) for part in rest.split(","))
             return WLF(first, second, reference)
         except ValueError:
             form = "wlf:C1,C2" if name == "wlf" else "arrhenius:J/mol"
@@ -104,19 +106,27 @@ def given(text: str, reference: float | None) -> str | Shift:
     return _table(Path(text), reference)
 
 
+def _within(text: str, value: float, low: float, high: float) -> float:
+    if not low <= value <= high:
+        raise InputError(f"--shift {text}: {value:g} must be {low:g} to {high:g}")
+    return value
+
+
 def _table(path: Path, reference: float | None) -> Factors:
     try:
-        with path.open(newline="") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file, skipinitialspace=True) if row and not row[0].startswith("#")]
     except OSError as error:
         raise InputError(
             f"--shift must be wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file: {error}"
         ) from error
+    head = [[name.strip() for name in row] for row in rows[:2]]
+    units = 2 if head[:1] == [["T", "log_aT"]] and head[1:] in ([["C", "-"]], [["°C", "-"]]) else 1  # as pyvisco's
     try:
-        pairs = sorted((float(temperature), float(log)) for temperature, log in rows[1:])
+        pairs = sorted((float(temperature), float(log)) for temperature, log in rows[units:])
     except ValueError:
         raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of a_T") from None
-    if not rows or [name.strip() for name in rows[0]] != ["T[C]", "log_aT"] or len(pairs) < 2:
+    if (units == 1 and head[:1] != [["T[C]", "log_aT"]]) or len(pairs) < 2:
         raise InputError(f"{path}: a table of T[C],log_aT with at least two rows was expected")
     temperatures, logs = zip(*pairs, strict=True)
     if len(set(temperatures)) < len(temperatures):

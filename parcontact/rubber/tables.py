@@ -4,9 +4,12 @@ Two forms are read. Both name what their columns are; nothing is guessed.
 
 * Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between them):
   `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K), `tan_del`.
-* One header row in which units stand in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, any white space or comma between.
+* One header row in which units stand in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, any white space or comma between; or
+  words with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, a comma, semicolon or tab between.
+  A modulus without the word shear is Young's.
 
-Lines that begin with # are comments. Rows of one temperature are one set; without T all rows are one set.
+A missing storage or loss modulus follows from tan delta. Lines that begin with # are comments. Rows of one temperature
+are one set; without T all rows are one set.
 """
 
 import math
@@ -20,16 +23,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
 Kind = Literal["frequency", "time"]
 LARGEST_FILE = 50_000_000  # bytes
 LEAST_ROWS = 3  # of a set: fewer say nothing about a spectrum
-NEAR = 1.5  # degrees: rows whose temperatures differ by less belong to one set
+NEAR = 1.5  # degrees: measured temperatures of one set vary by less
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+RATES_OF = {"f", "omega"}  # one of them is needed
 RATES = {"Hz": 2 * math.pi, "rad/s": 1.0}
 TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "K": -273.15}
 NAMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
+WORDS = {  # in small letters, as instruments write them
+    **{"frequency": "f", "f_set": "f", "angular frequency": "omega", "w": "omega", "ω": "omega", "time": "t"},
+    **{"temperature": "T", "temp": "T", "storage modulus": "E_stor", "loss modulus": "E_loss"},
+    **{"shear storage modulus": "G_stor", "shear loss modulus": "G_loss", "relaxation modulus": "E_relax"},
+    **{"shear relaxation modulus": "G_relax", "tan delta": "tan_del", "tan(delta)": "tan_del", "tan_delta": "tan_del"},
+    **{"tan d": "tan_del", "tan δ": "tan_del", "tanδ": "tan_del", "loss factor": "tan_del"},
+}
+WITH_UNIT = re.compile(r"(.+?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))")  # Storage Modulus (MPa), E'[MPa]
 
 
 @dataclass(frozen=True)
@@ -96,6 +109,8 @@ def _split(line: str) -> list[str]:
 def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column], int]:
     """The columns, and how many lines name them."""
     number, head = lines[0]
+    if worded := _with_units(head):
+        return worded, 1
     if "[" in head:
         spaced = re.sub(r"\s+\[", "[", head)
         parts = [part for part in re.split(r"[,;\s]+", spaced) if part]
@@ -115,12 +130,24 @@ def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column
     return [_Column(*pair) for pair in zip(names, units, strict=False)], 2
 
 
+def _with_units(head: str) -> list[_Column]:
+    """The columns of a header of several words each, all of which name their units, but for tan delta; else none."""
+    columns = []
+    for part in _split(head) if re.search(r"[;\t,]", head) else ():
+        match = WITH_UNIT.fullmatch(part)
+        if match is None and _name(part) != "tan_del":
+            return []
+        unit = (match[2] or match[3] or "").strip() if match else ""
+        columns.append(_Column(_name(match[1]) if match else "tan_del", unit))
+    return columns
+
+
 def _name(text: str) -> str:
     """The name of a column as pyvisco spells it: E' is E_stor, f_set is f."""
     text = text.strip().replace("″", "''").replace("′", "'")
     if match := re.fullmatch(r"([EG])('{1,2}|\")", text):
         return f"{match[1]}_{NAMES[match[2]]}"
-    return {"f_set": "f", "w": "omega", "ω": "omega"}.get(text, text)
+    return WORDS.get(re.sub(r"\s+", " ", text.lower()), text)
 
 
 def _is_number(text: str) -> bool:
@@ -144,8 +171,13 @@ def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> 
 def _measurement(
     path: Path, columns: Sequence[_Column], rows: Array, numbers: Sequence[int], poisson: float
 ) -> Measurement:
+    names = [column.name for column in columns]
+    for name in names:
+        if names.count(name) > 1 or (name in RATES_OF and len(RATES_OF & set(names)) > 1):
+            raise InputError(f"{path}: two columns mean the same: {name} is given twice; remove one")
     values = {column.name: rows[:, k] for k, column in enumerate(columns)}
     units = {column.name: column.unit for column in columns}
+    _complete(path, values, units, numbers)
     modulus = _modulus(path, values)
     kind: Kind = "time" if f"{modulus}_relax" in values else "frequency"
     factor = 1.0 / (2.0 * (1.0 + poisson)) if modulus == "E" else 1.0
@@ -158,8 +190,22 @@ def _measurement(
         names = [f"{modulus}_stor", f"{modulus}_loss"]
     moduli = [_positive(path, n, values, numbers) * _unit(path, n, units, PRESSURES) * factor for n in names]
     temperatures = values["T"] + _unit(path, "T", units, TEMPERATURES) if "T" in values else None
+    refuse_odd(path, kind, at, moduli[0], temperatures)
     sets = tuple(_sets(path, at, moduli, temperatures))
+    if kind == "time":
+        refuse_rising(path, [each.storage for each in sets])
     return Measurement(path, kind, sets, modulus == "E")
+
+
+def _complete(path: Path, values: dict[str, Array], units: dict[str, str], numbers: Sequence[int]) -> None:
+    """Add the storage or loss modulus that follows from the other one and tan delta."""
+    for modulus in ("E", "G") if "tan_del" in values else ():
+        storage, loss = f"{modulus}_stor", f"{modulus}_loss"
+        if (storage in values) != (loss in values):
+            known, missing = (storage, loss) if storage in values else (loss, storage)
+            tangent = _positive(path, "tan_del", values, numbers)
+            values[missing] = values[known] * tangent if missing == loss else values[known] / tangent
+            units[missing] = units[known]
 
 
 def _modulus(path: Path, values: dict[str, Array]) -> str:
@@ -191,15 +237,29 @@ def _unit(path: Path, name: str, units: dict[str, str], known: dict[str, float])
 
 def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:
     """Rows of one temperature each, in the order of their rates."""
-    if temperatures is None:
-        groups = [np.arange(at.size)]
-    else:
-        order = np.argsort(temperatures, kind="stable")
-        groups = np.split(order, np.flatnonzero(np.diff(temperatures[order]) >= NEAR) + 1)
-    for rows in groups:
+    one = iter([np.arange(at.size)])
+    for rows in one if temperatures is None else _of_one_temperature(path, at, temperatures):
         mean = None if temperatures is None else float(temperatures[rows].mean())
         if rows.size < LEAST_ROWS:
             raise InputError(f"{path}: {rows.size} rows at {mean:g} C; at least {LEAST_ROWS} were expected")
         rows = rows[np.argsort(at[rows], kind="stable")]
         empty = np.zeros(0)
         yield Set(mean, at[rows], moduli[0][rows], moduli[1][rows] if len(moduli) > 1 else empty)
+
+
+def _of_one_temperature(path: Path, at: Array, temperatures: Array) -> Iterator[NDArray[np.intp]]:
+    """Rows of one temperature each, which may waver: of one sweep, in which no rate or time comes twice."""
+    order = np.argsort(temperatures, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(temperatures[order]) >= NEAR) + 1):
+        low, high = temperatures[rows[0]], temperatures[rows[-1]]
+        numbers = np.split(rows, np.flatnonzero(np.diff(temperatures[rows]) > 0.0) + 1)
+        several = high - low >= NEAR or np.unique(at[rows]).size < rows.size
+        if several and min(each.size for each in numbers) >= LEAST_ROWS:
+            yield from numbers
+        elif high - low >= NEAR:
+            raise InputError(
+                f"{path}: its temperatures from {low:.4g} to {high:.4g} C cannot be told apart: those of one sweep "
+                f"must be one number, or lie {NEAR:g} degrees and more from those of the next"
+            )
+        else:
+            yield rows

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from .. import sanity
 from ..effects import decisions
+from ..effects.measured_range import describe_beyond
 from ..errors import InputError, RunError
 from ..job import Job, Rough, RoughSpectrum
 from ..job.chosen import reached
@@ -84,7 +85,8 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         wisdom.recall(job, slab, origin.wisdom if origin else None)
         marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
         timeline = marching.timeline(options.until or 0.0)
-        doubts = () if options.beside else (*job.warnings, *sanity.of_surface(marching.scene.frame))
+        found = (*job.warnings, *describe_beyond(job), *sanity.of_surface(marching.scene.frame))
+        doubts = () if options.beside else found
         wisdom.keep(job, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = restart.claim(plain, origin)

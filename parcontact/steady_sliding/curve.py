@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from .. import sanity, scene
+from ..effects.measured_range import describe_beyond
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.signals import Signals
@@ -105,7 +106,7 @@ def run(
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
         base = scene.frame(job, slab)
-        doubts = [*job.warnings, *sanity.of_surface(base)]
+        doubts = [*job.warnings, *describe_beyond(job, wanted.temperatures), *sanity.of_surface(base)]
         sliding = SteadySliding(base)
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:

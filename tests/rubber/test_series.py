@@ -33,7 +33,7 @@ def test_noisy_sets_at_five_temperatures(tmp_path: Path) -> None:
     omega = np.geomspace(made.series.band[0], made.series.band[1], 400)
     assert np.sqrt(np.mean(np.abs(sum_of(made, omega) / measured.complex_modulus(omega) - 1.0) ** 2)) < 0.02
     assert made.series.moduli.size <= 12
-    assert 0.017 < made.series.scatter < 0.021  # the noise, but for what 250 numbers let a series follow
+    assert 0.017 < made.series.scatter < 0.023  # the noise, as 200 numbers know it
 
 
 def test_fewer_branches_are_worse(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_fewer_branches_are_worse(tmp_path: Path) -> None:
     sizes = []
     for asked in (0.3, 0.1, 0.02, 0.002):
         made = compound.fitted(path, 0.5, None, LAW, asked).series
-        assert made.error <= np.hypot(asked, made.scatter)
+        assert made.error <= np.hypot(asked, made.best)
         sizes.append(made.moduli.size)
     assert sizes == sorted(sizes)
     assert sizes[0] < sizes[-1]

@@ -37,7 +37,9 @@ def draw(compound: Compound, file: BinaryIO, job_band: tuple[float, float] | Non
 def _reduced(compound: Compound) -> Iterator[tuple[Set, np.ndarray]]:
     """The sets, and where they lie at the reference: frequencies [Hz], or times [s]."""
     for each in compound.measured.sets:
-        log = compound.shift.log_factor(each.temperature) if compound.shift is not None else 0.0
+        shift, log = compound.shift, 0.0
+        if shift is not None and each.temperature is not None:  # else measured at the reference
+            log = shift.log_factor(each.temperature)
         frequency = compound.measured.kind == "frequency"
         yield each, each.at * 10.0**log / (2 * np.pi) if frequency else each.at / 10.0**log
 

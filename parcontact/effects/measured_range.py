@@ -1,0 +1,40 @@
+"""Whether a job stays within the frequencies and temperatures at which its rubber was measured."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from ..job import Dma, Job, Zener
+from .folded_branches import excited_band
+from .relaxation import time_factor_of
+
+NEAR = 0.5  # decades beyond the measured band that pass: a surface has little of its last waves
+
+
+def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[str]:
+    """Yield a sentence for frequencies and one for temperatures that the material of a job was not measured at.
+
+    `temperatures` [deg C] are those of a friction curve; without any, that of the material.
+    """
+    body = job.material.fitted if isinstance(job.material, Dma) else job.material
+    if not isinstance(body, Zener):
+        return
+    degrees = [value for value in (*temperatures, *(() if temperatures else (body.temperature,))) if value is not None]
+    if body.temperatures is not None:
+        low, high = body.temperatures
+        beyond = [value for value in degrees if not low <= value <= high]
+        if beyond:
+            yield (
+                f"material: {', '.join(f'{value:g}' for value in beyond)} C is beyond the {low:g} to {high:g} C of its "
+                "measurement: the shift is an extrapolation there"
+            )
+    if body.band is None or (excited := excited_band(job)) is None:
+        return
+    factors = [time_factor_of(job.at_temperature(value)) for value in degrees if body.shift] or [body.time_factor]
+    low, high = excited[0] * min(factors), excited[1] * max(factors)  # as at the reference
+    for decades, side in ((math.log10(body.band[0] / low), "below"), (math.log10(high / body.band[1]), "above")):
+        if decades > NEAR:
+            yield (
+                f"material: the job excites {low:.3g} to {high:.3g} Hz, reduced to the reference temperature, "
+                f"{decades:.1f} decades {side} the measured {body.band[0]:.3g} to {body.band[1]:.3g} Hz: moduli are an "
+                "extrapolation there"
+            )

@@ -1,0 +1,63 @@
+"""What cannot be a measured rubber: wrong units and orders, told in a sentence before anything is fitted."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+MOST_DECADES = 40.0  # of frequencies or times in one table
+COLDEST = -150.0  # deg C: rubbers are not measured below
+SOFTEST, HARDEST = 3e3, 1e13  # Pa: of the largest modulus of a table; a soft gel, ten times diamond
+RISE = 0.1  # of a relaxation modulus from its first to its last time, beyond scatter
+
+
+def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: Array | None) -> None:
+    """Raise InputError for rates or times `at` [rad/s or s], moduli `storage` [Pa] and temperatures [deg C], each of
+    shape (n,), that no measurement has."""
+    what = "frequencies" if kind == "frequency" else "times"
+    decades = math.log10(at.max()) - math.log10(at.min())
+    if decades > MOST_DECADES:
+        raise InputError(f"{path}: its {what} span {decades:.0f} decades; at most {MOST_DECADES:g} were expected")
+    if storage.max() < SOFTEST or storage.max() > HARDEST:
+        bound = f"below {SOFTEST:g} Pa, softer than a gel" if storage.max() < SOFTEST else f"above {HARDEST:g} Pa"
+        raise InputError(f"{path}: its largest modulus is {storage.max():.3g} Pa, {bound}; is the unit right?")
+    if temperatures is not None and temperatures.min() < COLDEST:
+        raise InputError(
+            f"{path}: its lowest temperature is {temperatures.min():.4g} C, below {COLDEST:g} C; is the unit C, not K?"
+        )
+
+
+def refuse_rising(path: Path, sets: Sequence[Array]) -> None:
+    """Raise InputError where relaxation moduli of a set, by rising times, grow."""
+    for moduli in sets:
+        if moduli[-1] > (1.0 + RISE) * moduli[0]:
+            raise InputError(
+                f"{path}: a relaxation modulus rises with time, from {moduli[0]:.3g} to {moduli[-1]:.3g} Pa, and every "
+                "one falls; are these creep compliances, or storage moduli over frequency?"
+            )
+
+
+def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:
+    """Return the rms of the scatter of the logarithms of moduli: by how much a point differs from the curve through
+    its two neighbours on either side. `sweeps` are rates and moduli, each of shape (n,), by rising rates; nan where
+    all have less than five points.
+
+    The interpolation is cubic in the logarithms, so that a smooth curve has none; of independent errors it shows the
+    root of 1 + the squares of its weights, which is taken back.
+    """
+    found = []
+    for rates, moduli in sweeps:
+        x, y = np.log(rates), np.log(moduli)
+        for i in range(2, len(x) - 2):
+            others = [i - 2, i - 1, i + 1, i + 2]
+            if len(set(x[i - 2 : i + 3])) < 5:
+                continue
+            weights = [math.prod((x[i] - x[k]) / (x[j] - x[k]) for k in others if k != j) for j in others]
+            missed = y[i] - sum(w * y[j] for w, j in zip(weights, others, strict=True))
+            found.append(missed / math.sqrt(1.0 + sum(w**2 for w in weights)))
+    return float(np.sqrt(np.mean(np.square(found)))) if found else math.nan

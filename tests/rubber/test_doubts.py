@@ -1,0 +1,195 @@
+"""Tables that are not of one rubber, or in other units than they say; fits that miss; use beyond what was measured."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from parcontact.effects.measured_range import describe_beyond
+from parcontact.errors import InputError
+from parcontact.job import Job
+from parcontact.rubber import compound, sane, tables
+from parcontact.rubber.series import Weigh
+from parcontact.rubber.shift import Factors, given
+
+from . import measured
+
+
+def sweep(path: Path, head: str, columns: list[np.ndarray]) -> Path:
+    rows = zip(*columns, strict=True)
+    path.write_text("\n".join([head, *(",".join(f"{value:.10g}" for value in row) for row in rows)]) + "\n")
+    return path
+
+
+FREQUENCY = np.geomspace(1e-4, 1e7, 45)  # Hz
+MODULUS = measured.complex_modulus(2 * np.pi * FREQUENCY)
+STORAGE, LOSS = MODULUS.real / 1e6, MODULUS.imag / 1e6  # MPa
+
+
+# -- temperatures ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("step", [1.0, 0.4])
+def test_temperatures_near_to_each_other_are_sets_of_their_own(tmp_path: Path, step: float) -> None:
+    """Ten in steps of a degree or less, at each of which the same frequencies were measured."""
+    temperatures = tuple(step * np.arange(10.0))
+    found = tables.read(measured.write_sweeps(tmp_path / "rubber.csv", temperatures=temperatures))
+    assert [each.temperature for each in found.sets] == pytest.approx(temperatures)
+    assert all(each.at.size == measured.FREQUENCIES.size for each in found.sets)
+
+
+def test_temperatures_that_waver_and_touch_are_refused(tmp_path: Path) -> None:
+    rows = [FREQUENCY, STORAGE, LOSS, np.linspace(20.0, 25.0, FREQUENCY.size)]
+    with pytest.raises(InputError, match="temperatures from 20 to 25 C cannot be told apart"):
+        tables.read(sweep(tmp_path / "rubber.csv", "f[Hz],G'[MPa],G''[MPa],T[C]", rows))
+
+
+# -- units and orders --------------------------------------------------------------------------------------------------
+
+DEGREES = np.full(FREQUENCY.size, 40.0)
+FALLING = np.geomspace(9.0, 1.0, FREQUENCY.size)
+ODD: dict[str, tuple[str, list[np.ndarray], str]] = {
+    "MPa under Pa": ("f[Hz],G'[Pa],G''[Pa]", [FREQUENCY, STORAGE, LOSS], "Pa, below 3000 Pa, softer than a gel"),
+    "Pa under GPa": ("f[Hz],G'[GPa],G''[GPa]", [FREQUENCY, STORAGE * 1e6, LOSS * 1e6], "above 1e+13 Pa"),
+    "C under K": ("f[Hz],G'[MPa],G''[MPa],T[K]", [FREQUENCY, STORAGE, LOSS, DEGREES], "is -233.1 C, below -150 C"),
+    "one column twice": ("f[Hz],G'[MPa],G'[MPa],G''[MPa]", [FREQUENCY, STORAGE, LOSS, LOSS], "G_stor is given twice"),
+    "two rates": ("f[Hz],omega[rad/s],G'[MPa],G''[MPa]", [FREQUENCY, FREQUENCY, STORAGE, LOSS], "mean the same"),
+    "600 decades": ("f[Hz],G'[MPa],G''[MPa]", [FREQUENCY**30, STORAGE, LOSS], "span 330 decades"),
+    "a rising relaxation": ("t[s],G_relax[MPa]", [FREQUENCY, FALLING[::-1]], "rises with time, from 1e+06 to 9e+06 Pa"),
+}
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_what_no_rubber_is(tmp_path: Path, case: str) -> None:
+    head, columns, sentence = ODD[case]
+    with pytest.raises(InputError) as failure:
+        tables.read(sweep(tmp_path / "rubber.csv", head, columns))
+    assert sentence in str(failure.value)
+    assert "\n" not in str(failure.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [
+        ("Frequency (Hz),Storage Modulus (MPa),Loss Modulus (MPa)", [FREQUENCY, 3 * STORAGE, 3 * LOSS]),
+        ("Angular Frequency [rad/s],G' (MPa),G'' (MPa)", [2 * np.pi * FREQUENCY, STORAGE, LOSS]),
+        ("f (Hz),Shear storage modulus (MPa),Tan Delta", [FREQUENCY, STORAGE, LOSS / STORAGE]),
+        ("f[Hz],G''[MPa],tan_del[-]", [FREQUENCY, LOSS, LOSS / STORAGE]),
+    ],
+)
+def test_headers_of_instruments(tmp_path: Path, head: str, columns: list[np.ndarray]) -> None:
+    """Words with units in brackets of either kind; a modulus that tan delta stands for. Ten digits are written."""
+    (one,) = tables.read(sweep(tmp_path / "rubber.csv", head, columns)).sets
+    assert one.at == pytest.approx(2 * np.pi * FREQUENCY, rel=1e-9)
+    assert one.storage == pytest.approx(1e6 * STORAGE, rel=1e-9)
+    assert one.loss == pytest.approx(1e6 * LOSS, rel=1e-9)
+
+
+# -- misfit and scatter ------------------------------------------------------------------------------------------------
+
+
+def test_scatter_is_what_neighbours_differ_by() -> None:
+    """Of 3 %, by 1000 points, to a tenth (its own scatter is 3 %); a smooth curve, of a slope that changes by 1 in a
+    decade, has next to none."""
+    x = np.geomspace(1.0, 1e20, 1000)
+    smooth = np.exp(np.sin(np.log(x)))
+    dice = np.random.default_rng(1)
+    assert sane.scatter([(x, smooth)]) < 1e-5
+    assert sane.scatter([(x, smooth * np.exp(0.03 * dice.standard_normal(1000)))]) == pytest.approx(0.03, rel=0.1)
+    assert np.isnan(sane.scatter([(x[:4], smooth[:4])]))
+
+
+def contradiction(path: Path, factor: float = 3.0) -> Path:
+    """A loss modulus that is so many times what the storage modulus asks for (Kramers-Kronig)."""
+    return sweep(path, "f[Hz],G'[MPa],G''[MPa]", [FREQUENCY, STORAGE, factor * LOSS])
+
+
+def test_moduli_that_contradict_each_other(tmp_path: Path) -> None:
+    """The misfit is not told as scatter, of which there is none; either modulus alone is met to 2 %."""
+    path = contradiction(tmp_path / "rubber.csv")
+    made = compound.fitted(path, 0.5, None, "wlf", 0.02)
+    assert made.series.best > 0.2
+    assert made.series.scatter < 0.02  # four points per decade are not quite smooth
+    poor, torn = made.doubts()
+    assert poor.startswith("the fit misses the moduli by ")
+    assert "contradict each other (Kramers-Kronig)" in torn
+    goals: dict[Weigh, np.ndarray] = {"storage": STORAGE, "loss": 3 * LOSS}
+    for weigh, goal in goals.items():
+        one = compound.fitted(path, 0.5, None, "wlf", 0.02, weigh)
+        assert one.series.error < 0.02
+        assert one.doubts() == []
+        times, moduli = one.series.times, one.series.moduli
+        iwt = 2j * np.pi * FREQUENCY[:, None] * times
+        value = one.series.modulus_inf + (moduli * iwt / (1.0 + iwt)).sum(axis=1)
+        part = value.real if weigh == "storage" else value.imag
+        assert np.sqrt(np.mean(np.log(part / (1e6 * goal)) ** 2)) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("columns", "sentence"),
+    [
+        ([FREQUENCY, LOSS, STORAGE], "seem to be exchanged"),
+        ([FREQUENCY, STORAGE, STORAGE[::-1] ** 3], "the best fit misses"),
+    ],
+)
+def test_tables_that_no_fit_meets(tmp_path: Path, columns: list[np.ndarray], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        compound.fitted(sweep(tmp_path / "rubber.csv", "f[Hz],G'[MPa],G''[MPa]", columns), 0.5, None, "wlf", 0.02)
+
+
+# -- shifts ------------------------------------------------------------------------------------------------------------
+
+
+def test_shift_factors_as_pyvisco_writes_them(tmp_path: Path) -> None:
+    path = tmp_path / "factors.csv"
+    path.write_text("T,log_aT\nC, -\n40,-1\n20,0\n0,2\n", encoding="utf-8-sig")
+    assert given(str(path), None) == Factors((0.0, 20.0, 40.0), (2.0, 0.0, -1.0), 20.0)
+
+
+@pytest.mark.parametrize("text", ["arrhenius:1e9", "arrhenius:-5", "wlf:-8,100", "wlf:8,1e5"])
+def test_constants_that_no_rubber_has(text: str) -> None:
+    with pytest.raises(InputError, match=r"must be (0.001 to 10000|1000 to 1e\+07)"):
+        given(text, 20.0)
+
+
+# -- the measured range ------------------------------------------------------------------------------------------------
+
+
+def rubber(velocity: float, **more: Any) -> Job:
+    """Waves of 0.25 mm, which pass with v/0.25 mm."""
+    shift = {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}
+    branches = [{"modulus": 1e6, "relaxation_time": 1e-3}]
+    body = {"model": "zener", "modulus_inf": 1e6, "branches": branches, "shift": shift}
+    slide = {"pressure": 1e4, "velocity": velocity, "distance": 1e-4, "cells_per_step": 1}
+    measured_at = {"band": [1.0, 1e4], "temperatures": [-20.0, 60.0]}
+    wave = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}
+    material = {**body, **measured_at, **more}
+    return Job.model_validate(
+        {"grid": {"points": 32, "size": 1e-3}, "surface": wave, "material": material, "history": [slide]}
+    )
+
+
+def test_a_job_within_the_measured_range() -> None:
+    assert list(describe_beyond(rubber(0.1))) == []
+    assert list(describe_beyond(rubber(0.1), [20.0, 60.0])) == []
+    assert list(describe_beyond(rubber(1e3, band=None))) == []
+
+
+def test_a_job_beyond_the_measured_frequencies() -> None:
+    """100 m/s over 0.25 mm are 4e5 Hz, 1.6 decades above 1e4; at -20 C reduced by a_T, 10^5.8 there."""
+    (text,) = describe_beyond(rubber(100.0))
+    assert "excites 4e+05 to 4e+05 Hz" in text
+    assert "1.6 decades above the measured 1 to 1e+04 Hz" in text
+    (cold,) = describe_beyond(rubber(0.1, temperature=-20.0))
+    assert "decades above" in cold
+    (slow,) = describe_beyond(rubber(1e-5))
+    assert "1.4 decades below" in slow
+
+
+def test_temperatures_beyond_the_measured_ones() -> None:
+    job = rubber(0.1, band=None)
+    (text,) = describe_beyond(job, [-60.0, -40.0, 20.0, 120.0])
+    assert text.startswith("material: -60, -40, 120 C is beyond the -20 to 60 C")
+    (own,) = describe_beyond(rubber(0.1, band=None, temperature=80.0))
+    assert own.startswith("material: 80 C is beyond")
