@@ -93,11 +93,6 @@ def wish(campaign: "Campaign", trial: int) -> None:
 ALL: tuple[Callable[["Campaign", int], None], ...] = (race, link, vanish, lock, wish)
 
 
-def children(pid: int) -> list[int]:
-    """The ranks that an mpirun has started, in their order."""
-    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-
 def _noted(campaign: "Campaign", what: str, code: int) -> None:
     campaign.count[f"{what}, exit {code}"] += 1
     if code not in CODES:

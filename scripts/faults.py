@@ -148,7 +148,7 @@ class Campaign:
         time.sleep(self.random.uniform(0.0, 0.015))
 
     def _strike(self, process: subprocess.Popen[str], victims: str) -> None:
-        ranks = disturbances.children(process.pid)
+        ranks = outside.ranks_of(process.pid)
         chosen = ranks if victims != "one rank" else ranks[-1:] if self.random.random() < 0.5 else ranks[:1]
         for pid in ([process.pid] if victims == "mpirun and all" else []) + chosen:
             try:

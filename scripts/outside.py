@@ -1,6 +1,7 @@
 """How scripts that are themselves processes of MPI start others with mpirun."""
 
 import os
+from pathlib import Path
 
 
 def environment() -> dict[str, str]:
@@ -10,3 +11,12 @@ def environment() -> dict[str, str]:
     """
     clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
     return clean | {"OMPI_MCA_odls_base_sigkill_timeout": "0", "PRTE_MCA_odls_base_sigkill_timeout": "0"}
+
+
+def ranks_of(pid: int) -> list[int]:
+    """The ranks of an mpirun of scripts/setup, in their order: they are the children of its only child."""
+    return [rank for launcher in _children(pid) for rank in _children(launcher)]
+
+
+def _children(pid: int) -> list[int]:
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]

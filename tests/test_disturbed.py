@@ -139,16 +139,24 @@ def test_hang_up(here: Path, outside_mpi: dict[str, str]) -> None:
     assert newest(here / "out") == rows(here / "out") - 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_mpirun_that_is_told_to_end(here: Path, outside_mpi: dict[str, str], number: signal.Signals) -> None:
-    """Its ranks save, and leave 3 in the file for batch jobs, whatever code mpirun ends with."""
-    short = {"OMPI_MCA_odls_base_sigkill_timeout": "3", "PARCONTACT_EXIT_FILE": str(here / "code")}
-    process = start(["job.yaml", "--out", "out", *LONG], {**outside_mpi, **short}, ranks=2)
+    """Its ranks save the last step that they have made, and it ends with 3 as they do."""
+    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
     wait_for(process, lambda: rows(here / "out") > 3)
     process.send_signal(number)
     process.communicate(timeout=SECONDS)
-    assert (here / "code").read_text() == f"{AGAIN}\n"
+    assert process.returncode == AGAIN
     assert newest(here / "out") == rows(here / "out") - 1
+
+
+def test_mpirun_that_is_killed(here: Path, outside_mpi: dict[str, str]) -> None:
+    """No rank goes on without it: soon another run may use the directory."""
+    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
+    wait_for(process, lambda: rows(here / "out") > 3)
+    process.kill()
+    process.communicate(timeout=SECONDS)
+    assert __main__.main(["job.yaml", "--out", "out", "--quiet", "--until", "1e-9"]) == DONE
 
 
 def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> None:
