@@ -50,6 +50,20 @@ def opened(path: Path, flags: int) -> int:
     return handle
 
 
+def contents(path: Path) -> bytes:
+    """All of a regular file; raises OSError, and ValueError for anything else, a link too."""
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+    with open(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise ValueError("it is no regular file")
+        return file.read()
+
+
+def text(path: Path) -> str:
+    """As `contents`, in UTF-8."""
+    return contents(path).decode(errors="replace")
+
+
 def is_the_file(path: Path, handle: int) -> bool:
     """Whether a path still leads to the file that was opened."""
     try:

@@ -5,6 +5,7 @@ from pathlib import Path
 from .. import job as jobs
 from ..errors import InputError
 from ..job import Job, table
+from ..record import files
 from ..record.resolved import shown_job
 from .parts import Section, Table
 
@@ -22,5 +23,5 @@ def read(resolved: Path) -> tuple[Job, bool]:
 def section(job: Job, given: Path) -> Section:
     """A table of all keys, and the job file as it was given, if it is there."""
     rows = [row for row in table.rows(job) if not row[0].startswith(ELSEWHERE)]
-    texts = [("the job file as it was given", given.read_text(errors="replace"))] if given.is_file() else []
+    texts = [("the job file as it was given", files.text(given))] if given.is_file() else []
     return Section("What was asked", tables=[Table(("key", "value", "unit"), rows)], texts=texts)

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..record import files
+
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
 COUNTS = "counts on root: "
 STARTED = ("parcontact ", "in ", "machine: ", "batch job: ")
@@ -22,7 +24,7 @@ class Log:
 def read(directory: Path) -> Log:
     """Of a directory; empty where there is no log."""
     path = directory / "run.log"
-    lines = [STAMP.sub("", line) for line in path.read_text(errors="replace").splitlines()] if path.is_file() else []
+    lines = [STAMP.sub("", line) for line in files.text(path).splitlines()] if path.is_file() else []
     warnings = [line.removeprefix("warning: ") for line in lines if line.startswith("warning: ")]
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]
     machine = [line for line in lines if line.startswith(STARTED) or re.match(r"\d+ ranks?, ", line)]

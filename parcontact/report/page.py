@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ..errors import InputError
 from ..record import files, hdf5
 from ..record.provenance import PROGRAM
+from . import readable
 from .chapters import chapter, together
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
@@ -22,6 +23,7 @@ def write(directories: Sequence[Path], out: Path | None = None) -> Path:
     for directory in directories:
         if not directory.is_dir():
             raise InputError(f"{directory} is no directory")
+        readable.refuse_others(directory)
     target = out or directories[0] / NAME
     if target.suffix not in (".html", ".htm"):
         raise InputError(f"--out must end in .html, got {str(target)!r}")

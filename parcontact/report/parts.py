@@ -10,6 +10,7 @@ from pathlib import Path
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from ..record import files
 from ..record.pictures import style
 from ..record.pictures.charts import Chart, draw
 from ..record.pictures.run import Panel
@@ -100,7 +101,7 @@ def of_panel(panel: Panel, caption: str) -> Picture:
 
 def of_file(path: Path, kind: str = "text/csv") -> Download:
     """A file to be downloaded from the page."""
-    data = path.read_bytes()
+    data = files.contents(path)
     return Download(path.name, uri_of(data, kind), len(data))
 
 

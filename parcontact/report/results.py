@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ..record import measures, slide, sweep_table, theory_settings
+from ..record import files, measures, slide, sweep_table, theory_settings
 from ..record.pictures import histories, steady, sweep
 from ..record.pictures.run import Run
 from . import browse
@@ -62,14 +62,14 @@ def of_study(directory: Path) -> Section:
     names = [name for name in (rows[0] if rows else ()) if name != "fingerprint"]
     table = shortened(names, [[_short(row[name]) for name in names] for row in rows])
     told = directory / "study.txt"
-    sentences = told.read_text(errors="replace").splitlines() if told.is_file() else ["The study is not finished."]
+    sentences = files.text(told).splitlines() if told.is_file() else ["The study is not finished."]
     return Section("What accuracy costs", sentences, [table], list(_study_pictures(directory)))
 
 
 def _study_pictures(directory: Path) -> Iterator[Picture]:
     for name, caption in STUDY_PICTURES.items():
         if (directory / name).is_file():
-            yield Picture(uri_of((directory / name).read_bytes(), "image/png"), caption, wide=True)
+            yield Picture(uri_of(files.contents(directory / name), "image/png"), caption, wide=True)
 
 
 def shortened(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
