@@ -1,7 +1,7 @@
 """What Persson's theory predicts for a job with one rough surface: friction and contact area at each instant."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
@@ -119,19 +119,20 @@ def write_steady(job: Job, wanted: Request) -> Path:
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
     """The rows as theory.csv in the output directory of the job, with theory.yaml beside it; returns the table's path.
 
-    The settings are never those of another table: older ones are removed before, and new ones written after it.
+    The settings hold the checksum of their table, and so are never those of another one.
     """
     path = job.output.directory / theory_settings.TABLE
     with _told_where(path):
-        (path.parent / theory_settings.FILE).unlink(missing_ok=True)
-        _write(path, COLUMNS, rows)
+        _write(path, COLUMNS, rows, theory_settings.is_own_table)
         theory_settings.write(path.parent, settings)
     return path
 
 
-def _write(path: Path, columns: Sequence[str], rows: Iterator[Any]) -> None:
+def _write(
+    path: Path, columns: Sequence[str], rows: Iterator[Any], is_ours: Callable[[Path], bool] | None = None
+) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with files.replaced(path) as file:
+    with files.replaced(path, is_ours) as file:
         file.write(f"{','.join(columns)}\n".encode())
         for row in rows:
             file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())

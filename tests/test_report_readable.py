@@ -77,7 +77,7 @@ def test_modes_of_a_file_and_its_directories(tmp_path: Path, monkeypatch: pytest
     path = tmp_path / "deep" / "file"
     path.parent.mkdir()
     path.touch()
-    monkeypatch.setattr(readable.os, "geteuid", lambda: -1)
+    monkeypatch.setattr(os, "geteuid", lambda: -1)
     user, group = path.stat().st_uid, path.stat().st_gid
     allows = readable._allows
     for mode, expected in ((0o400, (True, False, False)), (0o044, (False, True, True)), (0o004, (False, False, True))):

@@ -126,6 +126,7 @@ def _maps(entries: Mapping[str, Entry]) -> dict[str, Array]:
 
 
 def _publish(part: Path, path: Path) -> None:
+    files.make_room(path, is_one)
     part.replace(path)
     hdf5.sync_one(path.parent)
 

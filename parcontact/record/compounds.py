@@ -27,7 +27,7 @@ def write(compound: Compound, target: Path, job_band: tuple[float, float] | None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         files.write(target, text)
-        with files.replaced(picture) as file:
+        with files.replaced(picture, files.is_marked) as file:
             pictures.draw(compound, file, job_band)
     except OSError as error:
         raise RunError(f"{target} cannot be written: {error}") from error

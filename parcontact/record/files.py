@@ -1,12 +1,16 @@
 """Files of an output directory: written under names that nobody can guess, never through a link, put aside unharmed."""
 
+import mmap
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
+
+MARK = "made by the program parcontact"  # in pages and in pictures, where their kind has a place for it
 
 
 def unused(path: Path) -> Path:
@@ -15,13 +19,18 @@ def unused(path: Path) -> Path:
 
 
 @contextmanager
-def replaced(path: Path) -> Iterator[BinaryIO]:
-    """A new file to write to, which takes the place of `path` at the end; after an error nothing has changed."""
+def replaced(path: Path, is_ours: Callable[[Path], bool] | None = None) -> Iterator[BinaryIO]:
+    """A new file to write to, which takes the place of `path` at the end; after an error nothing has changed.
+
+    With `is_ours`, what has the name and is not ours is put aside, and standard error says so.
+    """
     part = unused(path)
     file = part.open("xb")  # x: O_EXCL, which does not follow links
     try:
         with file:
             yield file
+        if is_ours is not None:
+            make_room(path, is_ours)
         part.replace(path)
     except BaseException:
         with suppress(OSError):
@@ -70,6 +79,30 @@ def is_the_file(path: Path, handle: int) -> bool:
         return os.path.samestat(os.fstat(handle), path.lstat())
     except OSError:
         return False
+
+
+def is_marked(path: Path) -> bool:
+    """Whether this program has made a page or a picture; raises OSError."""
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        if not os.fstat(handle).st_size:
+            return False
+        with mmap.mmap(handle, 0, access=mmap.ACCESS_READ) as data:
+            return data.find(MARK.encode()) >= 0
+    finally:
+        os.close(handle)
+
+
+def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
+    """Put aside what has a name unless it is a regular file that is ours, as `is_ours` tells, and no link."""
+    if not os.path.lexists(path):
+        return
+    ours = False
+    with suppress(OSError):
+        ours = stat.S_ISREG(path.lstat().st_mode) and is_ours(path)
+    if not ours and (aside := put_aside(path)):
+        said = f"warning: {path} was there and not written by this program: it is kept as {aside.name}"
+        print(said, file=sys.stderr, flush=True)
 
 
 def put_aside(path: Path) -> Path | None:

@@ -81,8 +81,8 @@ def _save(figure: Figure, stem: Path, options: Options) -> Path:
     if kind not in FORMATS:
         raise InputError(f"{target}: pictures are {', '.join(FORMATS)}; say which with --format")
     try:
-        with files.replaced(target) as file:
-            figure.savefig(file, dpi=style.DPI, format=kind)
+        with files.replaced(target, files.is_marked) as file:
+            style.save(figure, file, kind)
     except OSError as error:
         raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
     return target

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from . import files
+from .pictures.style import save
 
 TITLES = {
     "mu_max": "largest friction",
@@ -78,8 +79,8 @@ def _convergence(path: Path, curves: Sequence[Curve], doubts: Mapping[str, float
     first = figure.axes[0]
     first.set_ylabel("error [%]")
     figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    with files.replaced(path) as file:
-        figure.savefig(file, dpi=150, format="png")
+    with files.replaced(path, files.is_marked) as file:
+        save(figure, file, dpi=150)
     return path
 
 
@@ -138,8 +139,8 @@ def _work_precision(path: Path, points: Mapping[str, Sequence[Point]]) -> Path:
     for row in range(2):
         grid[row][0].set_ylabel("error [%]")
     grid[0][0].legend(frameon=False, fontsize=8, loc="upper right")
-    with files.replaced(path) as file:
-        figure.savefig(file, dpi=150, format="png")
+    with files.replaced(path, files.is_marked) as file:
+        save(figure, file, dpi=150)
     return path
 
 

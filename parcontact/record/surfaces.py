@@ -25,7 +25,7 @@ def describe(job: Job, heights: Array, told: list[str], picture: Path) -> Iterat
     sketch = pictures.Sketch(heights, job.grid.size, found, _measured(job))
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(picture) as file:
+        with files.replaced(picture, files.is_marked) as file:
             pictures.draw(sketch, file, picture.suffix[1:])
     except OSError as error:
         raise RunError(f"{picture} cannot be written: {error}") from error

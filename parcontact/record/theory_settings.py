@@ -1,5 +1,7 @@
 """theory.yaml: with which settings the predictions in theory.csv beside it were made."""
 
+import re
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -11,11 +13,12 @@ from . import files
 
 TABLE, FILE = "theory.csv", "theory.yaml"
 TEXT = """\
-# With which settings `parcontact theory` made theory.csv.
+# With which settings `parcontact theory` made theory.csv, whose CRC-32 is {checksum:08x}.
 gamma: {gamma!r}  # corrects friction in partial contact
 waves: {waves}  # continuum: those of the job's spectrum; lattice: those of the surface in its box
 program: parcontact {version}
 """
+CHECKSUM = re.compile(rb"# With which settings `parcontact theory` made theory.csv, whose CRC-32 is ([0-9a-f]{8})\.")
 
 
 class TheorySettings(NamedTuple):
@@ -30,14 +33,43 @@ class TheorySettings(NamedTuple):
 
 def write(directory: Path, settings: TheorySettings) -> None:
     """Leave the settings beside the table; raises OSError."""
-    files.write(directory / FILE, TEXT.format(**settings._asdict(), version=__version__))
+    known = {**settings._asdict(), "version": __version__, "checksum": _checksum(directory)}
+    with files.replaced(directory / FILE, is_ours) as file:
+        file.write(TEXT.format(**known).encode())
+
+
+def is_ours(path: Path) -> bool:
+    """Whether this program wrote a file of settings; raises OSError."""
+    return path.read_bytes().startswith(TEXT.partition("{")[0].encode())
+
+
+def is_own_table(path: Path) -> bool:
+    """Whether a table is the one that the settings beside it are of; raises OSError."""
+    return _told_checksum(path.with_name(FILE).read_bytes()) == _checksum(path.parent)
+
+
+def _told_checksum(text: bytes) -> int | None:
+    found = CHECKSUM.match(text)
+    return int(found[1], 16) if found else None
+
+
+def _checksum(directory: Path) -> int:
+    """Of the table in a directory; 0 if there is none."""
+    table = directory / TABLE
+    return zlib.crc32(table.read_bytes()) if table.is_file() else 0
 
 
 def read(directory: Path) -> TheorySettings | None:
-    """The settings of the table in a directory; None if there are none. Raises InputError for a damaged file."""
+    """The settings of the table in a directory; None if there are none, or those of another table.
+
+    Raises InputError for a damaged file.
+    """
     path = directory / FILE
     try:
-        data = yamltext.parse(path.read_bytes(), FILE).data
+        text = path.read_bytes()
+        if _told_checksum(text) not in (None, _checksum(directory)):
+            return None
+        data = yamltext.parse(text, FILE).data
         return TheorySettings(float(data["gamma"]), str(data["waves"]))
     except FileNotFoundError:
         return None

@@ -30,7 +30,8 @@ def write(directories: Sequence[Path], out: Path | None = None) -> Path:
     text = render(directories)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        files.write(target, text)
+        with files.replaced(target, files.is_marked) as file:
+            file.write(text.encode(errors="backslashreplace"))
     except OSError as error:
         raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
     return target
@@ -42,4 +43,4 @@ def render(directories: Sequence[Path]) -> str:
     loader = PackageLoader("parcontact", "report")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return shown.get_template(TEMPLATE).render(chapters=chapters, program=PROGRAM, made=made)
+    return shown.get_template(TEMPLATE).render(chapters=chapters, program=PROGRAM, made=made, mark=files.MARK)

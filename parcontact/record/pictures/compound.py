@@ -31,7 +31,7 @@ def draw(compound: Compound, file: BinaryIO, job_band: tuple[float, float] | Non
     _shift(bottom[1], compound)
     for axes in (*top, *bottom):
         axes.grid(alpha=0.3)
-    figure.savefig(file, dpi=150, format="png")
+    style.save(figure, file, dpi=150)
 
 
 def _reduced(compound: Compound) -> Iterator[tuple[Set, np.ndarray]]:

@@ -1,13 +1,15 @@
 """A movie of a map over its saved instants, as a GIF with one range of colours."""
 
 from pathlib import Path
+from typing import BinaryIO
 
 import h5py
 import numpy as np
 from matplotlib.animation import PillowWriter
+from PIL import Image
 
 from ...errors import InputError
-from .. import hdf5
+from .. import files, hdf5
 from . import units
 from .frames import Frames
 from .run import Fields
@@ -15,6 +17,18 @@ from .run import Fields
 FRAMES = 200  # at most: instants in between are left out
 SECONDS = 8.0  # for which it plays, unless its frames are too few
 FASTEST, SLOWEST = 20, 2  # frames per second
+
+
+class Writer(PillowWriter):
+    """Writes a GIF that is known as one of this program, whatever the name of its file."""
+
+    _frames: list[Image.Image]
+
+    def finish(self) -> None:
+        first, *others = self._frames
+        time = int(1000 / self.fps)  # ms
+        shown = {"append_images": others, "duration": time, "loop": 0}
+        first.save(self.outfile, "GIF", save_all=True, comment=files.MARK.encode(), **shown)
 
 
 def make(directory: Path, name: str, target: Path) -> Path:
@@ -26,18 +40,19 @@ def make(directory: Path, name: str, target: Path) -> Path:
             there = [key for key in ("pressure", "displacement", "gap", "height") if key in file]
             if name not in there or not fields.saved:
                 raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
-            _make(fields, name, target)
+            with files.replaced(target, files.is_marked) as movie:
+                _make(fields, name, movie)
     except hdf5.FAILURES as error:
         raise InputError(f"no movie from {path}: {hdf5.reason(error)}") from error
     return target
 
 
-def _make(fields: Fields, name: str, target: Path) -> None:
+def _make(fields: Fields, name: str, movie: BinaryIO) -> None:
     count = min(len(fields.saved), FRAMES)
     chosen = [fields.saved[int(k)] for k in np.linspace(0, len(fields.saved) - 1, count)]
     frames = Frames(fields.file, name, chosen)
-    writer = PillowWriter(fps=min(max(round(count / SECONDS), SLOWEST), FASTEST))
-    with writer.saving(frames.figure, str(target), dpi=110):
+    writer = Writer(fps=min(max(round(count / SECONDS), SLOWEST), FASTEST))
+    with writer.saving(frames.figure, movie.name, dpi=110):
         for index in chosen:
             time = units.text(float(fields.file["t"][index]), "s")
             frames.show(index, f"{name} at {time}, step {fields.steps[index]}")

@@ -1,6 +1,13 @@
 """How all pictures look: readable when printed 8 cm wide, in colours that colour-blind readers can tell apart."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from .. import files
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito 2008, no yellow
 DASHES = ("-", "--", "-.", ":")  # with the colours, for who prints in black and white
@@ -26,6 +33,14 @@ RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
+
+
+MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures say what has made them
+
+
+def save(figure: Figure, file: BinaryIO, kind: str = "png", dpi: int = DPI) -> None:
+    """Write a picture, a png, pdf or svg, that is known as one of this program."""
+    figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})
 
 
 def plain(text: str, most: int = 1000) -> str:

@@ -35,7 +35,7 @@ def draw(sketch: Sketch, file: BinaryIO, kind: str) -> None:
         figure = Figure(figsize=(style.WIDTH, 2 * style.HEIGHT), layout="constrained")
         for axes, panel in zip(figure.subplots(2, 2).ravel(), PANELS.values(), strict=True):
             panel(axes, sketch)
-        figure.savefig(file, dpi=style.DPI, format=kind)
+        style.save(figure, file, kind)
 
 
 def _map(axes: Axes, sketch: Sketch) -> None:
