@@ -20,7 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
 from .fftw import pyfftw
-from .slab import Array, Slab, allocate, deal, reused
+from .slab import Array, Slab, allocate, deal, dealt_to, reused
 from .transpose import Leg, count_legs, legs_of, wire_points
 
 Spectrum = NDArray[np.complexfloating]
@@ -54,7 +54,7 @@ def footprint(
     """Bytes of one rank in an `FFT` of these lengths for maps of `points = (nx, ny)`: of its spectrum, which may be
     lent, of all else that it holds, and what it sends in one transform."""
     itemsize, waves = 2 * np.dtype(dtype).itemsize, lengths[0] // 2 + 1
-    rows, columns = (part.stop - part.start for part in (deal(count, ranks)[rank] for count in (points[1], waves)))
+    rows, columns = (part.stop - part.start for part in (dealt_to(count, ranks, rank) for count in (points[1], waves)))
     height = _block_height(rows, waves * itemsize, lengths[1], ranks)
     blocks = height * lengths[0] * itemsize // 2 + (height * _pitch(waves, itemsize) * itemsize if ranks > 1 else 0)
     legs = legs_of(rows, height, count_legs(lengths[1] * waves * itemsize, ranks))

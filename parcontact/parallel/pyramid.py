@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .mpi import MPI
 from .regrid import fetch
-from .slab import Slab, deal
+from .slab import Slab, dealt_to
 
 FEW = 8  # times fewer cells than a rank has points: then every rank has all cells
 
@@ -23,28 +23,29 @@ FEW = 8  # times fewer cells than a rank has points: then every rank has all cel
 def steps_of(slab: Slab) -> list["Step"]:
     """All steps from a grid to a single cell, the finest first. A grid that every rank has is that of a rank alone."""
     grids = [slab]
-    for nx, ny, dealt in _larger(slab.nx, slab.ny, slab.dealt):
-        alone = len(dealt) == 1
+    dealt = slab.dealt
+    for nx, ny, alone in _larger(slab.nx, slab.ny, len(dealt)):
+        dealt = [slice(0, ny)] if alone else halves(dealt)
         grids.append(Slab(MPI.COMM_SELF if alone else slab.comm, nx, ny, slab.tally, dealt))
     return [Step(fine, coarse) for fine, coarse in pairwise(grids)]
 
 
 def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None) -> int:
     """Cells of the next grids, `most` of them or all, that a rank has."""
-    total = 0
-    for width, _, dealt in islice(_larger(nx, ny, deal(ny, ranks)), most):
-        part = dealt[rank if len(dealt) > 1 else 0]
+    total, part, last = 0, dealt_to(ny, ranks, rank), rank == ranks - 1
+    for width, height, alone in islice(_larger(nx, ny, ranks), most):
+        part = slice(0, height) if alone else slice(part.start // 2, (part.stop + last) // 2)  # as in `halves`
         total += width * (part.stop - part.start)
     return total
 
 
-def _larger(nx: int, ny: int, dealt: list[slice]) -> Iterator[tuple[int, int, list[slice]]]:
-    """Cells along x and y of each larger grid, and which rows each rank has; one part where every rank has all."""
-    enough = nx * ny // (FEW * len(dealt))
+def _larger(nx: int, ny: int, ranks: int) -> Iterator[tuple[int, int, bool]]:
+    """Cells along x and y of each larger grid, and whether every rank has all of them."""
+    enough, alone = nx * ny // (FEW * ranks), ranks == 1
     while nx * ny > 1:
         nx, ny = (nx + 1) // 2, (ny + 1) // 2
-        dealt = halves(dealt) if len(dealt) > 1 and nx * ny > enough else [slice(0, ny)]
-        yield nx, ny, dealt
+        alone = alone or nx * ny <= enough
+        yield nx, ny, alone
 
 
 def halves(dealt: list[slice]) -> list[slice]:

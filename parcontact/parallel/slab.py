@@ -25,6 +25,11 @@ def deal(count: int, ranks: int) -> list[slice]:
     return [slice(start, stop) for start, stop in pairwise(bounds)]
 
 
+def dealt_to(count: int, ranks: int, rank: int) -> slice:
+    """The part of one rank, as `deal` has it; however many ranks there are."""
+    return slice(count * rank // ranks, count * (rank + 1) // ranks)
+
+
 class Slab:
     """This rank's rows of `ny x nx` maps, and the collective operations on them.
 

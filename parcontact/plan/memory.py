@@ -17,7 +17,7 @@ from ..job import Job
 from ..march.state import State
 from ..parallel.fft import footprint, transform_name
 from ..parallel.regrid import coarser_points
-from ..parallel.slab import deal
+from ..parallel.slab import deal, dealt_to
 from ..physics.body import ElasticBody, ZenerBody
 from ..physics.convolution import Convolution
 from ..physics.energy import ElasticPressure
@@ -87,7 +87,7 @@ def saved(job: Job) -> int:
 
 
 def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
-    precision, part = np.dtype(job.numerics.map_type), deal(job.grid.ny, ranks)[rank]
+    precision, part = np.dtype(job.numerics.map_type), dealt_to(job.grid.ny, ranks, rank)
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
     symbol = Convolution.footprint(spectrum, job.grid.ny)
@@ -137,14 +137,15 @@ def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
     if not decisions.spectrum(job).on:
         return 0
     points, waves = job.grid.points, highest_waves(job)
-    dealt = deal(points[0] // 2 + 1, ranks)
-    shapes = [shape_of(waves, points, columns) for columns in (dealt if rank is None else [dealt[rank]])]
+    count = points[0] // 2 + 1
+    dealt = deal(count, min(ranks, count)) if rank is None else [dealt_to(count, ranks, rank)]  # more ranks have none
+    shapes = [shape_of(waves, points, columns) for columns in dealt]
     return max(rows * columns for rows, columns in shapes) * 2 * np.dtype(job.numerics.map_type).itemsize
 
 
 def _map(points: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int) -> int:
     """Bytes of a map on a rank."""
-    rows = deal(points[1], ranks)[rank]
+    rows = dealt_to(points[1], ranks, rank)
     return (rows.stop - rows.start) * points[0] * np.dtype(dtype).itemsize
 
 

@@ -212,7 +212,7 @@ def table(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     yield f"what accuracy costs, in {'friction; the contact area is then within' if slides else 'contact area'}"
     heads = (("area", 9), ("mesh", 14), ("steps" if costs.job.history else "states", 9))
     head = "".join(f"{text:>{width}}" for text, width in heads if slides or text != "area")
-    yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11}" + "".join(f"{ranks_text(n):>11}" for n in ranks)
+    yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11}" + "".join(f" {ranks_text(n):>10}" for n in ranks)
     for name, each in rows:
         grid, held = each.job.grid, each.costs.held(1) / size
         area = f"{_per_cent(each.area):>9}" if slides else ""

@@ -91,7 +91,7 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     width = max(len(what) for what in (*(holding.what for holding in columns[0]), *(what for what, _ in before)))
     totals = [sum(holding.bytes for holding in column) for column in columns]
     unit, size = unit_of(max(totals))
-    yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f"{ranks_text(count):>13}" for count in ranks)
+    yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f" {ranks_text(count):>12}" for count in ranks)
     for row in zip(*columns, strict=True):
         yield f"  {row[0].what:{width}}" + "".join(f"{holding.bytes / size:13.4g}" for holding in row)
     yield f"  {'in all':{width}}" + "".join(f"{total / size:13.4g}" for total in totals)

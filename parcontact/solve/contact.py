@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..parallel.slab import Array, Slab, deal, reused
+from ..parallel.slab import Array, Slab, dealt_to, reused
 from . import kernels
 from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
@@ -135,7 +135,7 @@ class ContactSolver:
         kept: type[np.floating] | None = None,
     ) -> int:
         """Bytes that it holds on a rank."""
-        rows = deal(ny, ranks)[rank]
+        rows = dealt_to(ny, ranks, rank)
         maps = dtype, kept or dtype, kept or dtype, precision_of_directions(dtype, tolerance)
         bytes_of_point = 1 + sum(np.dtype(each).itemsize for each in maps)
         cells = Surround.footprint(nx, ny, ranks, rank, grids)

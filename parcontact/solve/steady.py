@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import loop
-from ..parallel.slab import Array, Slab, deal
+from ..parallel.slab import Array, Slab, dealt_to
 from . import kernels
 from .certificate import Certificate
 from .gcr import Directions, gaps_on
@@ -101,7 +101,7 @@ class SteadySolver:
         nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, sets: bool = False
     ) -> int:
         """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
-        rows, kept = deal(ny, ranks)[rank], precision_of_directions(dtype, tolerance, LOOSE)
+        rows, kept = dealt_to(ny, ranks, rank), precision_of_directions(dtype, tolerance, LOOSE)
         bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * np.dtype(dtype).itemsize + 1
         bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
         surround = Surround.footprint(nx, ny, ranks, rank, surround_on(nx, ny)[0])
