@@ -70,6 +70,8 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
     if isinstance(part, jobs.HeightFile):
         rows = heightfile.read(part.path, part.dataset, fft.slab)
         return _transform(part.scale * rows, fft)
+    if isinstance(part, jobs.HeightArray):
+        return _transform(fft.slab.from_root(part.heights.values), fft)
     return Roughness(
         part.hurst,
         part.long_wavelength,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .errors import InputError, RunError
-from .job import HeightFile, Job, meaning, size
+from .job import Job, OnOneMesh, meaning, size
 from .job.timeline import Timeline
 from .parallel import rows
 from .parallel.slab import Array, Slab
@@ -59,7 +59,7 @@ def of_surface(frame: Frame) -> list[str]:
 def _of_surface(frame: Frame) -> Iterator[str]:
     if frame.roughness and (text := meaning.steep(frame.roughness.rms_slope)) and text not in frame.job.warnings:
         yield text
-    if any(isinstance(shape, HeightFile) for shape in frame.job.surface):
+    if any(isinstance(shape, OnOneMesh) for shape in frame.job.surface):
         heights = frame.surface.heights((0.0, 0.0), np.empty(frame.slab.shape, frame.dtype)).astype(np.float64)
         seams = list(_seams(frame, heights)) if frame.job.grid.boundary == "periodic" else []
         yield from seams or _resolution(frame, heights)  # a seam has a curvature of its own

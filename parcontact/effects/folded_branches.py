@@ -87,7 +87,7 @@ def bands(job: Job) -> Iterator[Band]:
             yield Band(max(low, longest), high, finest, only)
         elif isinstance(shape, jobs.Cylinder):
             yield Band(longest, finest, finest, (1.0, 0.0) if shape.axis == "y" else (0.0, 1.0))
-        elif isinstance(shape, jobs.Sphere | jobs.HeightFile | jobs.Topography | jobs.RoughSpectrum):
+        elif isinstance(shape, jobs.Sphere | jobs.OnOneMesh | jobs.Topography | jobs.RoughSpectrum):
             yield Band(longest, finest, finest, only)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from .fault import Fault
+from .heights import HeightArray
 from .history import AUTO, GeometricStep, Initial, Stage, Steady
 from .material import Elastic, Zener, ZenerBranch
 from .sections import Grid
@@ -75,6 +76,8 @@ def _heights(shape: Any, grid: Grid) -> Iterator[tuple[str, float]]:
             yield "center", length
     elif isinstance(shape, HeightFile):
         yield "scale", shape.scale
+    elif isinstance(shape, HeightArray):
+        yield "heights", shape.heights.largest
     elif isinstance(shape, Rough):
         if shape.rms_height is not None:
             yield "rms_height", shape.rms_height

@@ -53,6 +53,8 @@ def _number(source: Source, path: Key) -> int | float | None:
 
 def _plain(value: Any, path: Key, source: Source, place: Place) -> Any:
     """A value as what YAML could have been read as; what cannot be is a mistake."""
+    if is_array(value) and _is_map(value, path):
+        return value
     if hasattr(value, "tolist"):  # numpy's numbers and arrays
         value = value.tolist()
     if isinstance(value, os.PathLike):
@@ -66,6 +68,16 @@ def _plain(value: Any, path: Key, source: Source, place: Place) -> Any:
     if isinstance(value, list | tuple | range):
         return [_plain(item, (*path, index), source, place) for index, item in enumerate(value)]
     return _refuse(source, path, place, f"must be numbers, texts, lists or mappings, got {shorten(repr(value), 60)}")
+
+
+def is_array(value: Any) -> bool:
+    """Whether a value of Python data is an array, of numpy or as good as one."""
+    return hasattr(value, "__array__") and getattr(value, "ndim", 0) > 0
+
+
+def _is_map(value: Any, path: Key) -> bool:
+    """Whether an array stands where heights are due; one without a key is the value of an override."""
+    return path == ("surface",) or path[-1:] == ("heights",) or (value.ndim == 2 and path[:-1] in ((), ("surface",)))
 
 
 def _entries(value: Mapping[Any, Any], path: Key, source: Source, place: Place) -> list[tuple[str, Any]]:

@@ -13,7 +13,7 @@ from typing import Any
 from .history import Initial, Stage, Steady
 from .material import Elastic, PronyBranch, Zener
 from .sections import Grid
-from .surface import HeightFile, Rough, Sphere, Wave
+from .surface import OnOneMesh, Rough, Sphere, Wave
 from .topography import RoughSpectrum, Topography
 
 STEEPEST = 1.0  # rms slope, and radius of a contact over that of its sphere: beyond, slopes are not small
@@ -50,7 +50,7 @@ def steep(slope: float) -> str:
     )
 
 
-READ = HeightFile, RoughSpectrum, Topography  # shapes that come from files
+READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights only a look at them tells
 
 
 def says_all(surface: tuple[Any, ...]) -> bool:

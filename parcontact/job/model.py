@@ -14,17 +14,18 @@ from typing import Any, NamedTuple
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from . import advice, extension, imprint, limits, meaning, size, table
+from . import advice, extension, heights, imprint, limits, meaning, size, table
 from .chosen import ChosenSteps, most_cells
 from .chosen import describe as describe_steps
 from .fault import Fault
 from .history import Initial, Stage, Steady
 from .loading import Included
+from .mapping import is_array
 from .material import Dma, Elastic, Material, Zener, heated
 from .part import Context, Part, Rule
 from .sections import Checkpoint, Grid, Numerics, Output
 from .study import Study
-from .surface import HeightFile, Rough, Shape
+from .surface import OnOneMesh, Rough, Shape
 from .timeline import Timeline
 from .yamltext import dump
 
@@ -58,7 +59,7 @@ def _half_mesh_fits(grid: Grid, surface: tuple[Any, ...], output: Output) -> Ite
     if any(n % 2 for n in grid.points if n > 1):
         yield Fault(f"needs even numbers of grid.points, got {list(grid.points)}", key)
     for index, shape in enumerate(surface):
-        if isinstance(shape, HeightFile):
+        if isinstance(shape, OnOneMesh):
             yield Fault(f"the heights of surface.{index} are given on one mesh, and cannot be put on half of it", key)
     half = grid.model_copy(update={"points": tuple(max(n // 2, 1) for n in grid.points)})
     for fault in _waves_fit(half, surface):
@@ -122,6 +123,7 @@ class Job(Part):
         Rule(("grid", "numerics"), _kernel_fits),
         Rule(("surface",), _some_shape),
         Rule(("grid", "surface"), _waves_fit),
+        Rule(("grid", "surface"), heights.fit),
         Rule(("grid", "surface", "output"), _half_mesh_fits),
         Rule(("history", "steady"), _some_history),
         Rule(("history", "initial"), _some_load),
@@ -137,8 +139,8 @@ class Job(Part):
     @classmethod
     def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
         """Numbers unnamed stages, chooses the kernel by the boundary, and names the output after the job file."""
-        if isinstance(data.get("surface"), dict):
-            data["surface"] = [data["surface"]]
+        if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
+            data["surface"] = heights.with_shapes(data["surface"])
         if isinstance(data.get("history"), list):
             data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
         free = isinstance(data.get("grid"), dict) and data["grid"].get("boundary") == "free"
@@ -250,7 +252,7 @@ class Job(Part):
         return not isinstance(self.material, Elastic) and bool(getattr(self.material, "branches", True))
 
     def resolved(self) -> str:
-        """YAML text with every default filled in; it loads back to an equal job."""
+        """YAML text with every default filled in; it loads back to an equal job, where the files that it names are."""
         return dump(table.plain(self))
 
 

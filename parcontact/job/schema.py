@@ -17,6 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from . import extension, keys
+from .heights import Heights
 from .history import Ramp, numbers
 from .material import Material
 from .model import Job
@@ -142,4 +143,5 @@ _SIMPLE: dict[Any, Schema] = {
     float: {"type": "number"},
     str: {"type": "string"},
     Path: {"type": "string"},
+    Heights: {"allOf": [False]},  # nothing that a file could say
 }

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from .fault import Fault, refuse
+from .heights import HeightArray
 from .part import Context, Part, Rule, chosen, existing_file
 from .topography import RoughSpectrum, Topography
 from .values import Positive, Real, Seed, Whole
@@ -117,13 +118,15 @@ class Flat(Part):
 
 
 # Given by their waves; the others are closed forms at every point.
-Spectral = Rough | RoughSpectrum | Wave | HeightFile | Topography
+Spectral = Rough | RoughSpectrum | Wave | HeightFile | HeightArray | Topography
+OnOneMesh = HeightFile | HeightArray  # heights at the points of the grid, and nowhere else
 KINDS: dict[str, type[Part]] = {
     "rough": Rough,
     "sphere": Sphere,
     "cylinder": Cylinder,
     "wave": Wave,
     "file": HeightFile,
+    "array": HeightArray,
     "topography": Topography,
     "flat": Flat,
 }
@@ -138,5 +141,6 @@ def _shape(data: Any, info: ValidationInfo) -> Any:
 
 
 Shape = Annotated[
-    Rough | RoughSpectrum | Sphere | Cylinder | Wave | HeightFile | Topography | Flat, PlainValidator(_shape)
+    Rough | RoughSpectrum | Sphere | Cylinder | Wave | HeightFile | HeightArray | Topography | Flat,
+    PlainValidator(_shape),
 ]

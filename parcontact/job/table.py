@@ -7,12 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from .heights import HeightArray
 from .history import Ramp
 from .part import Part
 
 
 def plain(value: Any) -> Any:
     """A value of a job as the plain data it was written as; keys without a value are left out."""
+    if isinstance(value, HeightArray):
+        return value.stored()
     if isinstance(value, Part):
         return {key: plain(inner) for key, inner in items(value)}
     if isinstance(value, Ramp):

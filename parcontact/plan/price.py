@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..job import GeometricStep, HeightFile, Job, Rough, Stage
+from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
 from ..job.advice import STEPS_PER_WAVE, cells_per_wave
 from ..job.chosen import ChosenEnds
 from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
@@ -88,7 +88,7 @@ def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
 
 def _finer(job: Job, sample: Sample, accuracy: float) -> float:
     """How many times the points of the job; 1 where its surface has one mesh only, or the mesh makes no error."""
-    if any(isinstance(shape, HeightFile) for shape in job.surface):
+    if any(isinstance(shape, OnOneMesh) for shape in job.surface):
         return 1.0
     error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
     share = MESH_SHARE * accuracy

@@ -25,7 +25,14 @@ def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intra
     """The job of a file or mapping with some keys changed, on every rank of `comm`; collective. Raises JobError."""
     if isinstance(given, Job):
         return given
-    return on_root(comm or MPI.COMM_WORLD, lambda: jobs.load(given, changes or {}))
+    made: list[Job] = []
+
+    def load() -> Job:
+        made.append(jobs.load(given, changes or {}))
+        return made[0]
+
+    sent = on_root(comm or MPI.COMM_WORLD, load)
+    return made[0] if made else sent  # root's has the arrays of heights, which are not sent
 
 
 def of_parts(**parts: Any) -> Job:

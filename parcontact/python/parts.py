@@ -17,12 +17,14 @@ from ..scene import frame
 from .jobs import of_parts
 
 Array = NDArray[np.float64]
+Surface = Mapping[str, Any] | NDArray[Any] | Sequence[Mapping[str, Any] | NDArray[Any]]
 
 
-def surface(surface: Mapping[str, Any] | Sequence[Mapping[str, Any]], grid: Mapping[str, Any]) -> Array:
+def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
     """Heights [m] of the rigid surface that a job's `surface` means on its `grid`, shape (ny, nx), up into the body.
 
-    On this rank alone, whatever others do. Raises JobError for mistakes, InputError for files that do not fit.
+    An array is a surface, too. On this rank alone, whatever others do. Raises JobError for mistakes, InputError for
+    files that do not fit.
     """
     job = of_parts(surface=surface, grid=grid)
     base = frame(job, Slab(MPI.COMM_SELF, *job.grid.points))

@@ -20,7 +20,7 @@ from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics.entries import Entry
-from ..record import checkpoint, marker, wisdom
+from ..record import checkpoint, heights, marker, wisdom
 from ..record.checkpoint import Contents, Facts, Table
 from ..record.fields import UNITS
 from ..run import restart, runner
@@ -138,7 +138,7 @@ class Simulation:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a checkpoint, which `restore` and `parcontact --restart PATH` go on from, on any number of ranks.
 
-        Raises RunError where that cannot be.
+        Heights that are an array are written beside it. Raises RunError, InputError where that cannot be.
         """
         march, slab = self._march, self._slab
         plain = marker.plain_job(self.job) if slab.root else {}
@@ -146,6 +146,7 @@ class Simulation:
         provenance = runner.provenance_of(self.job, slab, self._saved)
         facts = Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last))
         entries = {**march.entries(), "plans/all": Entry(wisdom.gather(slab))}
+        heights.store(self.job, Path(path).parent, slab)
         checkpoint.write(Path(path), slab, facts, entries)
 
     @classmethod
@@ -162,7 +163,7 @@ class Simulation:
         """
         world, file = comm or MPI.COMM_WORLD, Path(path)
         text = on_root(world, lambda: checkpoint.inspect(file).chain[-1].job)
-        job = read(parse(text, str(file)).data, set, world)
+        job = read(heights.located(parse(text, str(file)).data, file), set, world)
         if not any(key.startswith("output") for key in set or {}):
             job = job.of(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)

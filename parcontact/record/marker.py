@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..job import Dma, HeightFile, Job, RoughSpectrum, Topography
+from ..job import Dma, HeightArray, HeightFile, Job, RoughSpectrum, Topography
 from ..job.table import plain
 from . import files
 
@@ -42,6 +42,9 @@ def plain_job(job: Job) -> dict[str, Any]:
         if isinstance(given, HeightFile | Dma | Topography):
             del part["path"]
             part["content"] = _checksum(given.path)
+        elif isinstance(given, HeightArray):
+            del part["path"]
+            part["content"] = given.heights.checksum
         elif isinstance(given, RoughSpectrum):
             del part["spectrum"]
             part["content"] = _checksum(given.spectrum)

@@ -14,7 +14,7 @@ from ..job.timeline import Timeline
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import header, marker, wisdom
+from ..record import header, heights, marker, wisdom
 from ..record.checkpoint import Contents, Facts, Table
 from ..record.console import Console, Silence, always
 from ..record.directory import Directory
@@ -183,6 +183,7 @@ def _begin(
     """Make the output directory ready, and its files; collective."""
     job = built.job
     directory.make(job.path, job.resolved(), claim)
+    heights.store(job, directory.path, built.slab)
     if origin and origin.own:
         directory.go_back(origin.contents.step)
     elif origin is None:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 
 from ..errors import InputError
-from ..job import AUTO, GeometricStep, HeightFile, Job, Stage, Study
+from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage, Study
 from ..job.limits import one_cell
 
 
@@ -112,7 +112,7 @@ def ladders(job: Job) -> Ladders:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
     if not job.history:
         raise InputError("a study compares histories: the job needs a history")
-    if len(study.mesh) > 0 and any(isinstance(shape, HeightFile) for shape in job.surface):
+    if len(study.mesh) > 0 and any(isinstance(shape, OnOneMesh) for shape in job.surface):
         raise InputError("study.mesh: the heights of a file are given on one mesh; leave this ladder out")
     for mesh in study.mesh:
         if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:

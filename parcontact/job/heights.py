@@ -1,0 +1,110 @@
+"""Heights that are given in Python instead of a file. In files that are written they are a height file beside these."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, PlainValidator
+
+from .fault import Fault, quote, refuse
+from .mapping import is_array
+from .part import Part
+from .sections import Grid
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+EXPECTED = "must be a numpy array of heights [m], real and finite, of shape (ny, nx)"
+
+
+class Heights:
+    """A map of heights [m], read only. Where a job is sent to other ranks, `values` stay behind: root deals them."""
+
+    def __init__(self, given: Any) -> None:
+        """Raises TypeError or ValueError for what is no map of finite real numbers."""
+        import numpy as np  # slow to import, and jobs in files do without
+
+        found = np.asanyarray(given)
+        if found.ndim != 2 or not np.can_cast(found.dtype, np.float64, "same_kind"):
+            raise TypeError(f"an array of shape {found.shape} of {found.dtype}")
+        values = np.ma.array(found, dtype=np.float64, copy=True, order="C").filled(np.nan)
+        if wrong := int(np.count_nonzero(~np.isfinite(values))):
+            raise ValueError(f"{wrong} of {values.size} that are not finite")
+        values.flags.writeable = False
+        self.values: NDArray[np.float64] | None = values
+        self.shape: tuple[int, int] = values.shape
+        self.largest = float(np.abs(values).max(initial=0.0))
+        check = _Checksum()
+        np.save(check, values)
+        self.checksum = f"{check.value:08x}"
+
+    @property
+    def name(self) -> str:
+        """Of the file in which they are stored: other heights have another one."""
+        return f"surface-{self.checksum}.npy"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Heights) and (self.shape, self.checksum) == (other.shape, other.checksum)
+
+    def __hash__(self) -> int:
+        return hash((self.shape, self.checksum))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "values": None}
+
+    def __repr__(self) -> str:
+        return f"an array of shape {self.shape}"
+
+
+class _Checksum:
+    """Of a file that is not written."""
+
+    value = 0
+
+    def write(self, data: bytes) -> None:
+        self.value = zlib.crc32(data, self.value)
+
+
+def _heights(given: Any) -> Heights:
+    if isinstance(given, Heights):
+        return given
+    if not hasattr(given, "__array__"):
+        refuse(Fault(f"{EXPECTED}, got {quote(given)}; a job file names a file instead, {{shape: file, path: ...}}"))
+    try:
+        return Heights(given)
+    except (TypeError, ValueError) as error:
+        refuse(Fault(f"{EXPECTED}, got {error}"))
+
+
+class HeightArray(Part):
+    """Heights given in Python, as a numpy array. A job that is stored names a file of them, which lies beside it."""
+
+    label: ClassVar[str] = "shape array"
+    shape: Literal["array"] = "array"
+    heights: Annotated[Heights, PlainValidator(_heights)] = Field(
+        description="a numpy array of heights [m] of shape (ny, nx)"
+    )
+
+    def stored(self) -> dict[str, Any]:
+        """As the file of heights that stands for it, as plain data."""
+        return {"shape": "file", "path": self.heights.name, "scale": 1.0, "dataset": "heights"}
+
+
+def with_shapes(surface: Any) -> Any:
+    """The `surface` of a job as a list of shapes; an array, alone or in a list, is one. Rows of numbers are meant as
+    one, and are refused as a whole."""
+    shapes = surface if isinstance(surface, list) else [surface]
+    if shapes and all(isinstance(shape, list | int | float) for shape in shapes):
+        return [{"shape": "array", "heights": surface}]
+    return [{"shape": "array", "heights": shape} if is_array(shape) else shape for shape in shapes]
+
+
+def fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
+    """Arrays have the shape of the grid."""
+    for index, shape in enumerate(surface):
+        if isinstance(shape, HeightArray) and shape.heights.shape != (grid.ny, grid.nx):
+            sentence = f"has shape {shape.heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}"
+            yield Fault(sentence, ("surface", index, "heights"))

@@ -1,0 +1,114 @@
+"""Heights as a numpy array in a job from Python: as good as a file, stored beside results, dealt out to the ranks."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import parcontact as pc
+from parcontact.__main__ import main
+
+WORLD = MPI.COMM_WORLD
+NX, NY = 16, 12
+PHASE = 2 * np.pi * (2 * np.arange(NX) / NX + np.arange(NY)[:, None] / NY)
+HEIGHTS = 1e-6 * np.cos(PHASE) + 4e-7 * np.sin(2 * PHASE)
+JOB: dict[str, Any] = {
+    "grid": {"points": [NX, NY], "size": [1e-3, 7.5e-4]},
+    "surface": HEIGHTS,
+    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [{"pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4, "cells_per_step": 1}],
+    "numerics": {"tolerance": 1e-8},
+}
+
+
+@pytest.fixture(autouse=True)
+def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Root's directory, on all ranks."""
+    place: Path = WORLD.bcast(tmp_path)
+    monkeypatch.chdir(place)
+    return place
+
+
+@pytest.mark.mpi
+def test_an_array_is_the_surface(nowhere: Path) -> None:
+    """It steps like the file of the same heights, whatever becomes of the array meanwhile; nothing is written."""
+    if WORLD.rank == 0:
+        np.save("heights.npy", HEIGHTS)
+    WORLD.barrier()
+    mine = HEIGHTS.copy()
+    run = pc.Simulation({**JOB, "surface": mine})
+    mine[:] = 0.0
+    of_file = pc.Simulation({**JOB, "surface": {"shape": "file", "path": "heights.npy"}})
+    assert [row.friction for row in run.steps()] == [row.friction for row in of_file.steps()]
+    assert [path.name for path in nowhere.iterdir()] == ["heights.npy"]
+
+
+def test_arrays_add_up_with_other_shapes() -> None:
+    """Alone, with its key, or in a list; to rounding."""
+    wave: dict[str, Any] = {"shape": "wave", "amplitude": 1e-6, "waves": [1, 0]}
+    both = pc.surface([{"shape": "array", "heights": HEIGHTS}, wave], JOB["grid"])
+    rounding = 1e-14 * 1e-6
+    assert both == pytest.approx(HEIGHTS + pc.surface(wave, JOB["grid"]), abs=100 * rounding)
+    assert pc.surface([HEIGHTS, wave], JOB["grid"]).tolist() == both.tolist()
+
+
+def frictions(directory: Path) -> list[str]:
+    with (directory / "measures.csv").open(newline="") as file:
+        return [row["friction"] for row in csv.DictReader(file)]
+
+
+def test_a_run_is_repeated_from_its_directory(nowhere: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Moved to another place; its command finds it finished, and runs it afresh to the same end."""
+    pc.Simulation(JOB, set={"output.directory": "out/run"}, comm=MPI.COMM_SELF).run()
+    (nowhere / "out").rename(nowhere / "moved")
+    first = frictions(nowhere / "moved/run")
+    assert main(["moved/run/job.yaml", "--out", "moved/run"]) == 0
+    assert "finished before" in capfd.readouterr().out
+    for name in ("job.yaml", "job.resolved.yaml"):
+        assert main([f"moved/run/{name}", "--quiet", "--out", "moved/run", "--restart", "never"]) == 0
+        assert frictions(nowhere / "moved/run") == first
+
+
+def test_other_heights_are_another_job() -> None:
+    pc.Simulation(JOB, set={"output.directory": "out"}, comm=MPI.COMM_SELF).run()
+    with pytest.raises(pc.InputError, match=r"another job.*content was"):
+        pc.Simulation({**JOB, "surface": 2 * HEIGHTS}, set={"output.directory": "out"}, comm=MPI.COMM_SELF).run()
+
+
+@pytest.mark.mpi
+def test_a_checkpoint_finds_its_heights(nowhere: Path) -> None:
+    """Beside a checkpoint that was saved by hand, also where both were moved; up to rounding by what is recomputed."""
+    run = pc.Simulation(JOB)
+    next(run.steps())
+    (nowhere / "there").mkdir(exist_ok=True)
+    WORLD.barrier()
+    run.save("there/state.h5")
+    if WORLD.rank == 0:
+        (nowhere / "there").rename(nowhere / "elsewhere")
+    WORLD.barrier()
+    assert pc.Simulation.restore("elsewhere/state.h5").run().friction == pytest.approx(run.run().friction, rel=1e-7)
+
+
+MISTAKES = [
+    (HEIGHTS.T, "has shape (16, 12), but the grid has (ny, nx) = (12, 16)"),
+    (HEIGHTS[0], "must be a numpy array of heights [m], real and finite, of shape (ny, nx), got"),
+    (HEIGHTS + 0j, "got an array of shape (12, 16) of complex128"),
+    (np.where(HEIGHTS > 0, HEIGHTS, np.nan), "got 96 of 192 that are not finite"),
+    (np.ma.masked_less(HEIGHTS, 0), "got 96 of 192 that are not finite"),
+    (HEIGHTS * 1e-305, "leads to heights of 1.21e-311 m, too small to compute with"),
+    (HEIGHTS.tolist(), "a job file names a file instead"),
+]
+
+
+@pytest.mark.parametrize(("heights", "says"), MISTAKES)
+def test_wrong_arrays_are_one_short_mistake(heights: Any, says: str) -> None:
+    for job, changes in ((JOB, {"surface": heights}), ({**JOB, "surface": heights}, {})):
+        with pytest.raises(pc.JobError) as found:
+            pc.Simulation(job, set=changes, comm=MPI.COMM_SELF)
+        (mistake,) = found.value.mistakes
+        assert len(mistake) < 300
+        assert "surface" in mistake
+        assert says in mistake
