@@ -47,15 +47,15 @@ SURFACES = {
     "surface: wave": "2:10: surface must be one shape, or a list of shapes, got 'wave'",
     "surface: []": "2:10: surface needs at least one shape; shape: flat is one",
     "surface: [3]": (
-        "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | topography | flat, "
-        "got 3"
+        "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | array | topography | "
+        "flat, got 3"
     ),
     "surface: {radius: 1}": (
-        "2:10: surface.shape is missing; it must be rough | sphere | cylinder | wave | file | topography | flat"
+        "2:10: surface.shape is missing; it must be rough | sphere | cylinder | wave | file | array | topography | flat"
     ),
     "surface: [{shape: spher}]": (
-        "2:19: surface.0.shape must be rough | sphere | cylinder | wave | file | topography | flat, got 'spher'; did "
-        "you mean sphere?"
+        "2:19: surface.0.shape must be rough | sphere | cylinder | wave | file | array | topography | flat, got "
+        "'spher'; did you mean sphere?"
     ),
     "surface: {shape: sphere}": "2:10: surface.radius is missing; it must be a positive length [m]",
     "surface: {shape: sphere, radius: 1, axis: y}": (

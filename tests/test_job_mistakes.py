@@ -129,7 +129,7 @@ def test_nyquist_ignores_a_direction_with_one_point() -> None:
 def test_checks_between_sections_run_beside_other_mistakes() -> None:
     text = SMALL.replace("surface: {", "surface:\n  - {shape: ball}\n  - {").replace("waves: [1, 0]", "waves: [99, 0]")
     assert mistakes_of(text, "numerics.kernel=spectral", "grid.boundary=free", "checkpoint.keep=-1") == [
-        "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | topography | flat, "
+        "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | array | topography | flat, "
         "got 'ball'",
         "job.yaml:4:44: surface.1.waves.0 must be within -32 and 32 waves for 64 points (Nyquist), got 99",
         "--set checkpoint.keep=-1: checkpoint.keep must be a whole number of checkpoints, zero or more, got -1",

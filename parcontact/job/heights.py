@@ -97,7 +97,7 @@ def with_shapes(surface: Any) -> Any:
     """The `surface` of a job as a list of shapes; an array, alone or in a list, is one. Rows of numbers are meant as
     one, and are refused as a whole."""
     shapes = surface if isinstance(surface, list) else [surface]
-    if shapes and all(isinstance(shape, list | int | float) for shape in shapes):
+    if len(shapes) > 1 and all(isinstance(shape, list | int | float) for shape in shapes):
         return [{"shape": "array", "heights": surface}]
     return [{"shape": "array", "heights": shape} if is_array(shape) else shape for shape in shapes]
 
