@@ -64,8 +64,12 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with rc_context(style.RC):
-        figure = _figure("", [_steady(table.parent, Options())])
+        figure = _figure(_wrapped(steady.title(table.parent)), [_steady(table.parent, Options())])
         return _save(figure, table.with_suffix(""), Options())
+
+
+def _wrapped(title: str) -> str:
+    return "\n".join(textwrap.wrap(title, LINE))
 
 
 def _movie(directory: Path, options: Options) -> Path:
@@ -95,14 +99,16 @@ def _picture(directory: Path, options: Options) -> Figure:
     if (directory / "measures.csv").is_file():
         run = Run(directory)
         title = run.job.title or title
-        title = "\n".join(textwrap.wrap(title, LINE)) + ("" if run.curves else f"\n{histories.numbers(run)}")
+        title = _wrapped(title) + ("" if run.curves else f"\n{histories.numbers(run)}")
         if options.over == "velocity" and not (directory / steady.TABLE).is_file():
             histories.refuse_one_velocity(run)
         found = _chosen(histories.charts(run, options.over), options)
         groups = [_panels(found, options), maps(run) if _wanted("maps", options) else []]
     if (directory / steady.TABLE).is_file() and _wanted("steady", options):
+        title = title if groups else _wrapped(steady.title(directory))
         groups.insert(1, _steady(directory, options))
     if (directory / sweep.TABLE).is_file():
+        title = title if groups else _wrapped(sweep.title(directory) or title)
         groups.append(_panels(_chosen(sweep.charts(directory), options), options))
     elif not groups:
         raise InputError(

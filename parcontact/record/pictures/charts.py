@@ -1,5 +1,6 @@
 """Charts: what is drawn over something, as numbers, and how it is drawn. Runs and friction curves both give charts."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,17 +19,19 @@ AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
 FRACTION = "contact area /\nnominal area"
 MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
+LEAST = 0.99  # of a value, which its bar of errors leaves at most
 LEVELS = 3  # of names above each other, before they are turned
 
 
 @dataclass(frozen=True)
 class Series:
-    """One line: its name, or '', and numbers in SI."""
+    """One line: its name, or '', and numbers in SI, with their errors as shares of them if these are known."""
 
     name: str
     x: Array
     y: Array
     look: dict[str, Any] = field(default_factory=lambda: style.line(0))
+    error: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -65,24 +68,42 @@ class Chart:
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     """Draw a chart; `log` names the axes of logarithmic scale."""
     log_x, log_y = chart.log_x or "x" in log, "y" in log
-    x_unit, xs = units.scaled(chart.x.unit, *(_shown(one.x, log_x) for one in chart.series))
-    y_unit, ys = units.scaled(chart.y.unit, *(_shown(one.y, log_y) for one in chart.series))
+    xs, ys = ([_shown(one.x, log_x) for one in chart.series], [_shown(one.y, log_y) for one in chart.series])
+    highest = max(map(_highest, ys))
+    top = _below_spike(xs, ys) if chart.spikes and not (chart.peak or log_x or log_y) else math.inf
+    x_unit, xs = (chart.x.unit, xs) if log_x else units.scaled(chart.x.unit, *xs)  # powers of ten need no prefix
+    y_unit = chart.y.unit if log_y else units.scaled(chart.y.unit, *(y[y <= top] for y in ys))[0]
+    size = units.size_of(y_unit, chart.y.unit) if y_unit else 1.0
+    ys, highest, top = [y / size for y in ys], highest / size, top / size
     lonely = all(np.isfinite(x * y).sum() < 2 for x, y in zip(xs, ys, strict=True))
     for one, x, y in zip(chart.series, xs, ys, strict=True):
         axes.plot(x, y, label=one.name or None, **{**one.look, **({"marker": "o"} if lonely else {})})
+        if one.error is not None:
+            _draw_errors(axes, x, y, one.error, one.look["color"])
     axes.set(xlabel=units.labelled(chart.x.name, x_unit), ylabel=units.labelled(chart.y.name, y_unit))
     _scale(axes, "x", xs, log_x)
     _scale(axes, "y", ys, log_y)
     if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        axes.set_ylim(0.0, chart.headroom * max(map(_highest, ys)) or 1.0)
-    if chart.spikes and not (chart.peak or log_x or log_y):
-        _cut_spike(axes, xs, ys, y_unit)
+        axes.set_ylim(0.0, chart.headroom * highest or 1.0)
+        if not highest:
+            axes.set_yticks([0.0])  # a scale would be made up
+    if top < math.inf:
+        axes.set_ylim(top=top)
+        told = f"↑ {highest:.3g} {y_unit}".rstrip()
+        axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
     if chart.peak and not log_y:
         _tell_peak(axes, xs[0], ys[0], x_unit)
-    size = units.size_of(x_unit, chart.x.unit) if x_unit else 1.0
-    _mark(axes, [(name, a / size, b / size) for name, a, b in chart.stages], chart.named)
+    width = units.size_of(x_unit, chart.x.unit) if x_unit else 1.0
+    _mark(axes, [(name, a / width, b / width) for name, a, b in chart.stages], chart.named)
     if any(one.name for one in chart.series):
         axes.legend(title=chart.legend_title or None, title_fontsize=9, ncols=1 + (len(chart.series) > 4))
+
+
+def _draw_errors(axes: Axes, x: Array, y: Array, share: Array, color: str) -> None:
+    """Bars of the errors that are known; of more than all of a value down to next to nothing, on any axis."""
+    size = np.where(np.isfinite(share), np.abs(share * y), 0.0)
+    below = np.minimum(size, LEAST * np.abs(y))
+    axes.errorbar(x, y, yerr=[below, size], fmt="none", ecolor=color, elinewidth=1.0, capsize=2.5, alpha=0.7)
 
 
 def _shown(values: Array, log: bool) -> Array:
@@ -108,16 +129,12 @@ def _scale(axes: Axes, which: str, series: Sequence[Array], log: bool) -> None:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
 
 
-def _cut_spike(axes: Axes, xs: Sequence[Array], ys: Sequence[Array], unit: str) -> None:
-    """Leave out of the picture what stands out in the first moments only, and tell how high it is."""
+def _below_spike(xs: Sequence[Array], ys: Sequence[Array]) -> float:
+    """Where a picture ends that leaves out what stands out in the first moments only; inf where nothing does."""
     start, end = min(np.nanmin(x) for x in xs), max(np.nanmax(x) for x in xs)
     early = [x <= start + SPIKE_SHARE * (end - start) for x in xs]
     rest = max(_highest(y[~first]) for y, first in zip(ys, early, strict=True))
-    highest = max(map(_highest, ys))
-    if end > start and rest > 0.0 and highest > SPIKE_HEIGHT * rest:
-        axes.set_ylim(top=1.25 * rest)
-        told = f"↑ {highest:.3g} {unit}".rstrip()
-        axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
+    return 1.25 * rest if end > start and rest > 0.0 and max(map(_highest, ys)) > SPIKE_HEIGHT * rest else math.inf
 
 
 def _highest(values: Array) -> float:

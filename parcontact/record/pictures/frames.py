@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 from ...parallel.slab import Array
 from . import maps, style, units
 
-UNITS = {"pressure": "Pa"}  # all other maps are lengths [m]
-
 
 class Frames:
     """Maps of shape (instant, y, x) in a file, of which those with the indices `chosen` are to be shown.
@@ -21,50 +19,55 @@ class Frames:
     """
 
     def __init__(self, file: h5py.File, name: str, chosen: Sequence[int], size: tuple[float, float] = (4.5, 4.0)):
-        self.file, self.name, unit = file, name, UNITS.get(name, "m")
+        self.file, self.name, look = file, name, maps.LOOKS[name]
         ranges = [maps.colour_range(self._map(index)) for index in chosen]
         low, high = min(lowest for lowest, _ in ranges), max(highest for _, highest in ranges)
-        label, _ = units.scaled(unit, np.array([low, high]))
+        high = high if high > low else low + 1.0  # of nothing, in some unit
+        label, _ = units.scaled(look.unit, np.array([low, high]))
         self.figure = Figure(figsize=size, layout="constrained")
-        self.axes, self.scale = self.figure.subplots(), units.size_of(label, unit) if label else 1.0
+        self.axes, self.scale = self.figure.subplots(), units.size_of(label, look.unit) if label else 1.0
         x, y, limits = file["x"][...], file["y"][...], (low / self.scale, high / self.scale)
         draw = _Line if min(x.size, y.size) <= maps.STRIP else _Image
-        self._frame = draw(self.axes, (x, y), limits, units.labelled(name, label), blank=name == "pressure")
+        self._frame = draw(self.axes, (x, y), limits, units.labelled(name, label), look)
+        self._is_laid_out = False
 
     def show(self, index: int, title: str) -> None:
         """Put the map of this index into the figure."""
         self._frame.show(self._map(index) / self.scale)
         self.axes.set_title(title)
+        if not self._is_laid_out:  # once: the first frame has the place of all others
+            self.figure.draw_without_rendering()
+            self.figure.set_layout_engine("none")
+            self._is_laid_out = True
 
     def _map(self, index: int) -> Array:
-        values: Array = self.file[self.name][index]
-        return values
+        pressure = self.file["pressure"][index] if self.name == "gap" and "pressure" in self.file else None
+        return maps.shown(self.name, self.file[self.name][index], pressure)
 
 
 class _Image:
     """A map in colours."""
 
     def __init__(
-        self, axes: Axes, points: tuple[Array, Array], limits: tuple[float, float], label: str, blank: bool
+        self, axes: Axes, points: tuple[Array, Array], limits: tuple[float, float], label: str, look: maps.Look
     ) -> None:
-        self.blank = blank
         length, (x, y) = units.scaled("m", *(maps.edges(values) for values in points))
-        axes.set_facecolor("0.92")
+        axes.set_facecolor(look.blank)
         axes.grid(False)
         empty = np.zeros((y.size - 1, x.size - 1))
-        self.mesh = axes.pcolormesh(x, y, empty, cmap="inferno" if blank else "viridis", norm=Normalize(*limits))
+        self.mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=Normalize(*limits))
         axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", aspect="equal")
         axes.figure.colorbar(self.mesh, ax=axes, label=label)
 
     def show(self, values: Array) -> None:
-        self.mesh.set_array(np.where(values > 0.0, values, np.nan) if self.blank else values)
+        self.mesh.set_array(values)
 
 
 class _Line:
     """A map so narrow that it is a line."""
 
     def __init__(
-        self, axes: Axes, points: tuple[Array, Array], limits: tuple[float, float], label: str, blank: bool
+        self, axes: Axes, points: tuple[Array, Array], limits: tuple[float, float], label: str, look: maps.Look
     ) -> None:
         x, y = points
         self.lies = x.size > y.size
@@ -74,4 +77,4 @@ class _Line:
         axes.set_ylim(limits[0], limits[0] + 1.05 * (limits[1] - limits[0]))
 
     def show(self, values: Array) -> None:
-        self.line.set_ydata(values[0] if self.lies else values[:, 0])
+        self.line.set_ydata(np.nan_to_num(values[0] if self.lies else values[:, 0]))

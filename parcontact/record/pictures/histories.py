@@ -14,6 +14,7 @@ from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 from .run import Run
 
+EARLY = 0.02  # of the time or distance: where half of the steps are made in it, the axis is logarithmic
 OVER = ("time", "distance", "velocity", "load")
 
 
@@ -26,6 +27,12 @@ class Abscissa:
     rows: NDArray[np.intp]
     stages: Sequence[tuple[str, float, float]] = ()
     marked: bool = False
+
+    @property
+    def grows(self) -> bool:
+        """Whether steps grow so much that a picture of even scale shows few of them."""
+        values = self.values[self.values > 0.0]
+        return not self.marked and values.size > 2 and bool(np.median(values) < EARLY * values.max())
 
     def series(self, values: Array, name: str = "", number: int = 0) -> Series:
         look = {
@@ -41,7 +48,7 @@ def charts(run: Run, over: str = "") -> list[Chart]:
     if not run.curves:
         return []
     along = _abscissa(run, over)
-    changes: dict[str, Any] = {"stages": along.stages, "spikes": not along.marked}
+    changes: dict[str, Any] = {"stages": along.stages, "spikes": not along.marked, "log_x": along.grows}
     found = [replace(chart, **changes, named=number == 0) for number, chart in enumerate(_charts(run, along))]
     return found if along.marked else [_beside_theory(chart, run) for chart in found]
 

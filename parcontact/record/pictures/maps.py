@@ -1,6 +1,7 @@
 """Maps of the last saved instant."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -13,6 +14,22 @@ from ...parallel.slab import Array
 from . import lines, units
 from .run import Fields, Panel, Run
 
+
+class Look(NamedTuple):
+    """How a map is drawn: its unit, its colours, and that of points which have no value."""
+
+    unit: str
+    colors: str
+    blank: str = "0.92"
+    note: str = ""
+
+
+LOOKS = {
+    "pressure": Look("Pa", "inferno"),
+    "gap": Look("m", "Blues_r", "k", "contact black"),
+    "displacement": Look("m", "viridis"),
+    "height": Look("m", "cividis", note="up is into the body"),
+}
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
 
 
@@ -40,15 +57,21 @@ def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
     time = float(fields.file["t"][fields.saved[-1]])
     when = f" at {units.text(time, 's', 4)}" if run.lasts else ""
     window = _window(pressure)
-    if pressure is not None:
-        yield _map(fields, np.where(pressure > 0.0, pressure, np.nan), "pressure", "Pa", when, window)
-    if gap is not None:
-        open_ = gap if pressure is None else np.where(pressure > 0.0, np.nan, gap)
-        yield _map(fields, open_, "gap", "m", f"{when}\n(contact black)", window, "Blues_r", "k")
-    elif displacement is not None:
-        yield _map(fields, displacement, "displacement", "m", when, window, "viridis")
-    if height is not None:
-        yield _map(fields, height, "height", "m", f"{when}\n(up is into the body)", window, "cividis")
+    beside = displacement if gap is None else None  # one of both says enough
+    found = {"pressure": pressure, "gap": gap, "displacement": beside, "height": height}
+    for name, values in found.items():
+        if values is not None:
+            yield _map(fields, shown(name, values, pressure), name, when, window)
+
+
+def shown(name: str, values: Array, pressure: Array | None) -> Array:
+    """A map as it is drawn: pressures where there are any, gaps where there is no contact, none of them negative."""
+    if name == "pressure":
+        return np.where(values > 0.0, values, np.nan)
+    if name == "gap":
+        closed = values <= 0.0 if pressure is None else pressure > 0.0
+        return np.where(closed, np.nan, np.maximum(values, 0.0))
+    return values
 
 
 def _window(pressure: Array | None) -> tuple[slice, slice]:
@@ -69,27 +92,27 @@ def _map(
     fields: Fields,
     values: Array,
     name: str,
-    unit: str,
     when: str,
     window: tuple[slice, slice],
-    colors: str = "inferno",
-    blank: str = "0.92",
 ) -> Panel:
-    x, y = fields.x, fields.y
-    label, (shown,) = units.scaled(unit, values)
+    x, y, look = fields.x, fields.y, LOOKS[name]
+    label, (scaled,) = units.scaled(look.unit, values)
+    title = f"{name}{when}" + (f"\n({look.note})" if look.note else "")
     length, (right, top) = units.scaled("m", edges(x), edges(y))
 
     def draw(axes: Axes) -> None:
-        axes.set_facecolor(blank)
+        axes.set_facecolor(look.blank)
         axes.grid(False)
-        part = shown[window]
+        part = scaled[window]
         columns, lines = slice(window[1].start, _edge(window[1])), slice(window[0].start, _edge(window[0]))
         lowest, highest = colour_range(part)
-        colored = Normalize(lowest, highest)
-        mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=colors, norm=colored, rasterized=True)
-        axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=name + when, aspect="equal")
+        colored = Normalize(lowest, highest if highest > lowest else lowest + 1.0)
+        mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=look.colors, norm=colored, rasterized=True)
+        axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=title, aspect="equal")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+        if not np.isfinite(part).any():  # a gap where all is contact: there are no numbers to give colours
+            return
         beyond = "max" if np.nanmax(part, initial=-np.inf) > highest else "neither"
         axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]", extend=beyond, shrink=0.9)
 
@@ -109,6 +132,6 @@ def colour_range(values: Array) -> tuple[float, float]:
     """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others."""
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return 0.0, 1.0
+        return 0.0, 0.0
     most, highest = float(np.percentile(finite, 99.5)), float(finite.max())
-    return min(float(finite.min()), 0.0), (highest if highest < 1.4 * most else most) or 1.0
+    return min(float(finite.min()), 0.0), highest if highest < 1.4 * most else most

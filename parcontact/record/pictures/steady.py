@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...parallel.slab import Array
+from ..resolved import STEADY_RESOLVED, shown_job
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 from .run import box, table
@@ -35,27 +36,40 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
         along, other = other, along
     if "temperature" in columns and len(distinct(columns["temperature"])) > 1:
         other = Axis("temperature", "°C"), columns["temperature"]
-    contact = columns["contact_area"] * (area or 1.0)
+    contact = columns.get("contact_area_corrected", columns["contact_area"]) * (area or 1.0)
     shown = (
         ("friction", Axis("friction coefficient"), columns["friction"]),
         ("area", Axis("contact area", "m²") if area else Axis(FRACTION), contact),
     )
     found = []
     for (key, axis, values), title in zip(shown, ("steady, at", ""), strict=True):
-        lines = [*_lines(along[1], other, values), *_theory(directory, key, along[0], other)]
+        lines = [*_lines(along[1], other, values, columns.get(f"error_{key}"))]
+        lines += _theory(directory, key, along[0], other)
         found.append(Chart(f"steady {key}", along[0], axis, lines, log_x=True, legend_title=title))
     if other[0].name == "temperature" and along[0].unit == "m/s":
         reduced = columns["shift_factor"] * columns["velocity"]
-        lines = [*_lines(reduced, other, columns["friction"]), *_theory(directory, "friction", REDUCED, None)]
+        error = columns.get("error_friction")
+        lines = [*_lines(reduced, other, columns["friction"], error), *_theory(directory, "friction", REDUCED, None)]
         found.append(Chart("steady master", REDUCED, shown[0][1], lines, log_x=True))
     return found
 
 
-def _lines(x: Array, other: tuple[Axis, Array], y: Array) -> list[Series]:
+def title(directory: Path) -> str:
+    """Of the job, with the pressure or force if there is one for all points."""
+    job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
+    columns, area = table(directory / TABLE, ("pressure",)), box(directory)
+    pressures = distinct(columns["pressure"])
+    load = units.text(pressures[0] * (area or 1.0), "N" if area else "Pa") if len(pressures) == 1 else ""
+    name = (job.title if job else "") or "steady sliding"
+    return f"{name}: {load}" if load else name
+
+
+def _lines(x: Array, other: tuple[Axis, Array], y: Array, error: Array | None) -> list[Series]:
     found = []
     for number, (value, rows) in enumerate(_groups(x, other)):
         look = {**style.line(number), "marker": "o"}
-        found.append(Series(_named(value, other[0].unit), x[rows], y[rows], look))
+        own = error[rows] if error is not None else None
+        found.append(Series(_named(value, other[0].unit), x[rows], y[rows], look, own))
     return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...parallel.slab import Array
 from .. import sweep_table
+from ..resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..sweep_table import SEED
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
@@ -42,6 +43,9 @@ def charts(directory: Path) -> list[Chart]:
         wanted = [(label, part, name) for label, part in _parts(rows, others) for name in names]
         series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.COLORS[k % MAX_COLORS])]
         if series:
+            dots = next((k for k, one in enumerate(series) if one.look.get("marker") == "."), None)
+            if dots is not None:
+                series[dots] = replace(series[dots], name="each case")
             values = np.concatenate([one.x for one in series])
             wide = values.min() > 0.0 and values.max() >= WIDE * values.min()
             word = key.split(".")[-1]
@@ -50,6 +54,12 @@ def charts(directory: Path) -> list[Chart]:
             chart = Chart(panel, x, Axis(title), series, log_x=wide)
             found.append(replace(chart, headroom=1.0 + PER_NAME * named) if named > FEW_NAMES else chart)
     return found
+
+
+def title(directory: Path) -> str:
+    """Of the job, as its cases have it; '' if there is none."""
+    jobs = sorted(directory.glob(f"cases/*/{RESOLVED}")) + sorted(directory.glob(f"cases/*/{STEADY_RESOLVED}"))
+    return shown_job(jobs[0]).title if jobs else ""
 
 
 def _keys(rows: Rows) -> list[str]:
@@ -86,7 +96,8 @@ def _lines(label: str, rows: Rows, name: str, key: str, color: str) -> Iterator[
         at, means = _means(x[there], y[there])
         yield Series(LABELS[name] + label, at, means, {"marker": "o", "linestyle": "-", "color": color})
         if at.size < there.sum():
-            yield Series("", x[there], y[there], {"marker": "_", "linestyle": "none", "color": color})
+            look = {"marker": ".", "linestyle": "none", "color": color, "alpha": 0.5, "markersize": 3}
+            yield Series("", x[there], y[there], look)
     if (there := np.isfinite(theory)).any():
         yield Series(THEORY + label, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
 
