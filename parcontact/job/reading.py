@@ -96,6 +96,7 @@ def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistak
 
 def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, list[Mistake], Sweep | None]:
     """A case, or its mistakes; and the sweep that it belongs to, if that is sound."""
+    _refuse_no_job(given, overrides)
     changes = tuple(overrides.items()) if isinstance(overrides, Mapping) else tuple(overrides)
     source, included, sweep = read_job(_path(given), changes, index, _data(given))
     if () not in source.broken:
@@ -109,6 +110,16 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
         except ValidationError as error:
             source.mistakes += _mistakes(source, error)
     return None, source.mistakes, sweep
+
+
+def _refuse_no_job(given: Any, overrides: Any) -> None:
+    """What Python gives may be anything."""
+    if not isinstance(given, str | os.PathLike | Mapping):
+        raise JobError([f"the job must be the path of a file or a mapping, got {shorten(repr(given), 60)}"])
+    if not isinstance(overrides, Sequence | Mapping) or isinstance(overrides, str):
+        raise JobError([f"set must be a mapping of keys and values, got {shorten(repr(overrides), 60)}"])
+    if wrong := [key for key in overrides if not isinstance(key, str)]:
+        raise JobError([f"set has a key that is no word, {shorten(repr(wrong[0]), 60)}; give words like 'grid.points'"])
 
 
 def _path(given: Given) -> Path:

@@ -1,11 +1,12 @@
-"""What root alone does, and every rank learns: its result, or what a user can put right."""
+"""What root alone does, and every rank learns: its result, or the exception that it ended with."""
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..errors import InputError, RunError
+from ..errors import RunError
 
 if TYPE_CHECKING:
     from .mpi import MPI
@@ -14,16 +15,35 @@ T = TypeVar("T")
 
 
 def on_root(comm: MPI.Intracomm, act: Callable[[], T]) -> T:
-    """What root's `act` gives or raises (InputError, RunError), on every rank; collective."""
+    """What root's `act` gives or raises, on every rank; collective.
+
+    Of an exception that no other process can be sent, the others get a RunError with its text.
+    """
     if comm.size == 1:
         return act()
-    found: tuple[T | None, Exception | None] = (None, None)
+    problem: Exception | None = None
+    sent = b""
     if comm.rank == 0:
         try:
-            found = act(), None
-        except (InputError, RunError) as error:
-            found = None, error
-    value, problem = comm.bcast(found)
+            value = act()
+            sent = pickle.dumps((value, None))
+        except Exception as error:
+            problem, sent = error, _packed(error)
+    sent = comm.bcast(sent)
+    if comm.rank > 0:
+        value, problem = pickle.loads(sent)
     if problem is not None:
         raise problem
     return value
+
+
+def _packed(error: Exception) -> bytes:
+    found: Any = None
+    try:
+        packed = pickle.dumps((None, error))
+        found = pickle.loads(packed)[1]
+    except Exception:  # whatever its class does
+        packed = b""
+    if isinstance(found, Exception):
+        return packed
+    return pickle.dumps((None, RunError(f"{type(error).__name__} on rank 0: {error}")))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, RunError
+from ..errors import JobError, RunError
 from ..job import log_range
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
@@ -19,7 +19,7 @@ from ..scene import frame
 from ..steady_sliding import curve
 from ..steady_sliding.missed import describe_missed
 from ..steady_sliding.sliding import Point, SteadySliding
-from .jobs import Given, read, warn_of
+from .jobs import Given, all_ranks, read, warn_of
 
 Array = NDArray[np.float64]
 Values = str | float | Sequence[float] | Array | None
@@ -80,13 +80,13 @@ def steady(
     Nothing is written.
     """
     asked = {
-        "velocities": _numbers(velocities),
-        "pressures": _numbers(pressures),
-        "temperatures": _degrees(temperatures),
+        "velocities": _numbers("velocities", velocities),
+        "pressures": _numbers("pressures", pressures),
+        "temperatures": _numbers("temperatures", temperatures, ranges=False),
     }
     keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # a job needs no history then
-    found = read(job, {**(set or {}), **keys}, comm)
-    slab = Slab(comm or MPI.COMM_WORLD, *found.grid.points)
+    found = read(job, {**set, **keys} if isinstance(set, Mapping) else set or keys, comm)
+    slab = Slab(all_ranks(comm), *found.grid.points)
     wanted = curve.request(found, *asked.values())
     base = frame(found, slab)
     warn_of(found, base)
@@ -132,15 +132,15 @@ def _curve(wanted: Sequence[curve.Wanted], points: Sequence[Point | None], failu
     )
 
 
-def _degrees(values: Values) -> tuple[float, ...]:
-    if isinstance(values, str):
-        raise InputError(f"temperatures [deg C] are a number or a list of numbers, got {values!r}")
-    return _numbers(values)
-
-
-def _numbers(values: Values) -> tuple[float, ...]:
+def _numbers(name: str, values: Values, ranges: bool = True) -> tuple[float, ...]:
     if values is None:
         return ()
-    if isinstance(values, str):
-        return log_range(values)
-    return tuple(float(value) for value in np.ravel(values))
+    try:
+        if isinstance(values, str) and ranges:
+            return log_range(values)
+        if not isinstance(values, str) and not np.iscomplexobj(values):
+            return tuple(float(value) for value in np.ravel(values))
+    except (TypeError, ValueError):
+        pass
+    also = " or a range first:last:count" if ranges else ""
+    raise JobError([f"{name} must be a number, a list of numbers{also}, got {values!r:.60}"])

@@ -1,16 +1,22 @@
-"""Jobs as they come from Python: a file or a mapping, found sound by root and known to every rank."""
+"""Jobs as they come from Python: a file or a mapping, found sound by root, the same on every rank."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from hashlib import blake2b
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .. import job as jobs
 from .. import sanity
 from ..effects.measured_range import describe_beyond
+from ..errors import InputError, JobError
 from ..job import Job
+from ..parallel.meeting import meet
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..scene import Frame
@@ -19,26 +25,86 @@ Given = str | os.PathLike[str] | Mapping[str, Any] | Job
 SOMEWHERE = {"points": 2, "size": 1.0}  # a grid for what needs none
 ANYTHING = {"model": "elastic", "shear_modulus": 1.0e6}
 A_TOUCH = [{"pressure": 1.0}]
+DEEPEST = 50  # mappings and lists in each other
+SHOWN = 60  # characters of a value in a message
 
 
 def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> Job:
-    """The job of a file or mapping with some keys changed, on every rank of `comm`; collective. Raises JobError."""
-    if isinstance(given, Job):
-        return given
+    """The job of a file or mapping with some keys changed, on every rank of `comm`; collective.
+
+    Raises JobError, also where ranks give different jobs, and InputError for a run that cannot begin here.
+    """
+    world = all_ranks(comm)
+    agree(world, given, changes)
     made: list[Job] = []
 
     def load() -> Job:
-        made.append(jobs.load(given, changes or {}))
+        made.append(_sound(given if isinstance(given, Job) else jobs.load(given, changes or {})))
         return made[0]
 
-    sent = on_root(comm or MPI.COMM_WORLD, load)
+    sent = on_root(world, load)
     return made[0] if made else sent  # root's has the arrays of heights, which are not sent
+
+
+def _sound(job: Job) -> Job:
+    sanity.refuse_impossible(job, job.timeline())
+    return job
+
+
+def all_ranks(comm: MPI.Intracomm | None) -> MPI.Intracomm:
+    """The communicator to work on. Raises InputError for what is none."""
+    if comm is not None and not isinstance(comm, MPI.Intracomm):
+        raise InputError(f"comm must be a communicator of mpi4py, got {comm!r:.60}")
+    return MPI.COMM_WORLD if comm is None else comm
+
+
+def agree(comm: MPI.Intracomm, given: object, changes: object = None) -> None:
+    """Raise JobError unless all ranks give the same; collective."""
+    if comm.size == 1:
+        return
+    meet(comm, "gives a job")
+    own = dict([*_flat(given, ""), *_flat(changes, "set")])
+    if len(set(comm.allgather(blake2b(repr(own).encode(errors="replace"), digest_size=16).digest()))) == 1:
+        return
+    everyone = comm.allgather(own)
+    for rank, other in enumerate(everyone):
+        for key in sorted({*everyone[0], *other}):
+            first, here = (values.get(key, "not there") for values in (everyone[0], other))
+            if first != here:
+                text = f"{key or 'the job'} is {first:.{SHOWN}} on rank 0 and {here:.{SHOWN}} on rank {rank}"
+                raise JobError([f"ranks give different jobs: {text}; give all of them the same"])
+
+
+def _flat(value: Any, key: str, depth: int = 0) -> Iterator[tuple[str, str]]:
+    """The values of a job by the keys that lead to them, as text."""
+    if isinstance(value, Job):
+        value = value.resolved()
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        digest = blake2b(np.ascontiguousarray(value).tobytes(), digest_size=8).hexdigest()
+        yield key, f"an array of shape {value.shape} and checksum {digest}"
+    elif isinstance(value, Mapping | list | tuple) and len(value) > 0 and depth < DEEPEST:
+        items = value.items() if isinstance(value, Mapping) else enumerate(value)
+        for name, item in items:
+            yield from _flat(item, f"{key}.{name}" if key else str(name), depth + 1)
+    elif isinstance(value, os.PathLike):
+        yield key, repr(os.fspath(value))
+    else:
+        value = value.item() if isinstance(value, np.generic) else value
+        known = isinstance(value, str | int | float | range | None)
+        yield key, repr(value) if known else f"of type {type(value).__name__}"
+
+
+def path_of(path: object) -> Path:
+    """Raises InputError for what is no path."""
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"a path must be a text or a pathlib.Path, got {path!r:.60}")
+    return Path(path)
 
 
 def of_parts(**parts: Any) -> Job:
     """A job of which some sections matter, on this rank alone. Raises JobError."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
-    return jobs.load(rest | parts)
+    return _sound(jobs.load(rest | parts))
 
 
 def warn_of(job: Job, frame: Frame) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..record import fields, hdf5, measures
+from .jobs import path_of
 
 if TYPE_CHECKING:
     import xarray
@@ -30,7 +31,7 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
         import xarray
     except ImportError as error:
         raise ImportError(NO_XARRAY) from error
-    path = Path(directory)
+    path = path_of(directory)
     if not (path / "measures.csv").is_file():
         raise InputError(f"{path} holds no measures.csv: it is no output directory of a run")
     columns = measures.read(path / "measures.csv")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..job import Job
 from ..job.yamltext import parse
 from ..march.rest import steps_to_make
 from ..march.step import March
+from ..parallel.meeting import meet
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
@@ -24,8 +25,9 @@ from ..record import checkpoint, heights, marker, wisdom
 from ..record.checkpoint import Contents, Facts, Table
 from ..record.fields import UNITS
 from ..run import restart, runner
+from ..run.errors_so_far import ErrorsSoFar
 from ..steady_sliding import start
-from .jobs import Given, read, warn_of
+from .jobs import Given, agree, all_ranks, path_of, read, warn_of
 from .row import Row
 
 
@@ -41,13 +43,14 @@ class Simulation:
     """
 
     def __init__(self, job: Given, set: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> None:
-        self.comm = comm or MPI.COMM_WORLD
+        self.comm = all_ranks(comm)
         self.job = read(job, set, self.comm)
         if not self.job.history:
             raise InputError("the job has no history to run; parcontact.steady solves its steady states")
         self._slab = Slab(self.comm, *self.job.grid.points)
         self._saved: Contents | None = None
         self._march_made: March | None = None
+        self._errors: ErrorsSoFar | None = None
         self._began = False  # whether the row of the initial state has been handed out
 
     # -- running ------------------------------------------------------------------------------------------------------
@@ -56,14 +59,22 @@ class Simulation:
         """The row of the initial state, then one after each step, made when it is asked for; in memory.
 
         Called again it goes on after the last step made. Raises RunError for a step that could not be made; the state
-        is then that before it.
+        is then that before it. All ranks make each step: one that leaves the loop, by `break` or an exception of its
+        own, makes the others raise RunError.
         """
-        march = self._march
+        march, errors = self._march, self._errors_so_far
+        timeline = march.timeline()
         if not self._began:
             self._began = True
+            errors.weigh(march.row, timeline)
             yield self.row
-        for step in steps_to_make(march, march.timeline()):
+        steps = steps_to_make(march, timeline)
+        while True:
+            self._meet(f"makes step {march.row.step + 1}")
+            if (step := next(steps, None)) is None:
+                return
             march.advance(step)
+            errors.weigh(march.row, timeline)
             yield self.row
 
     def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
@@ -80,12 +91,14 @@ class Simulation:
             return self.row
         if self._march_made is not None and self._began:
             raise InputError("run() writes the files of a whole run: it must come before the first of steps()")
-        at = str(self._saved.path if self._saved is not None else os.fspath(restart))
+        self._meet("runs")
+        at = str(self._saved.path if self._saved is not None else path_of(restart))
         with _in_a_file(self.job, self._slab) as job:
             ended = runner.run_to_end(job, self._slab, runner.Options(quiet, at))
         if ended.march is None and ended.contents is None:
             raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
         self._march_made, self._saved, self._began = ended.march, ended.contents, True
+        self._errors = ended.errors
         return self.row
 
     @property
@@ -117,6 +130,7 @@ class Simulation:
         """
         if name not in UNITS:
             raise InputError(f"there is no field {name!r}; there are {', '.join(UNITS)}")
+        self._meet(f"takes the map {name}")
         return self._march.field(name)
 
     def gather(self, name: str) -> Array | None:
@@ -138,16 +152,18 @@ class Simulation:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a checkpoint, which `restore` and `parcontact --restart PATH` go on from, on any number of ranks.
 
-        Heights that are an array are written beside it. Raises RunError, InputError where that cannot be.
+        Heights that are an array are written beside it. Raises RunError where that cannot be, InputError for what is no
+        path.
         """
-        march, slab = self._march, self._slab
-        plain = marker.plain_job(self.job) if slab.root else {}
+        file, march, slab = path_of(path), self._march, self._slab
+        self._meet(f"saves {file}")
+        plain = on_root(self.comm, lambda: marker.plain_job(self.job))
         last = ",".join("" if value != value else repr(value) for value in self.row.values())
         provenance = runner.provenance_of(self.job, slab, self._saved)
         facts = Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last))
-        entries = {**march.entries(), "plans/all": Entry(wisdom.gather(slab))}
-        heights.store(self.job, Path(path).parent, slab)
-        checkpoint.write(Path(path), slab, facts, entries)
+        entries = {**march.entries(), **self._errors_so_far.entries(), "plans/all": Entry(wisdom.gather(slab))}
+        heights.store(self.job, file.parent, slab)
+        checkpoint.write(file, slab, facts, entries)
 
     @classmethod
     def restore(
@@ -161,14 +177,15 @@ class Simulation:
         `set` may change what is to come (the stages ahead, tolerances), not what has been. Raises InputError for a
         file that is no sound checkpoint, or not of such a job.
         """
-        world, file = comm or MPI.COMM_WORLD, Path(path)
+        world, file = all_ranks(comm), path_of(path)
+        agree(world, file, set)
         text = on_root(world, lambda: checkpoint.inspect(file).chain[-1].job)
         job = read(heights.located(parse(text, str(file)).data, file), set, world)
-        if not any(key.startswith("output") for key in set or {}):
+        if not any(key.startswith("output") for key in set or {}):  # `read` has found its keys to be words
             job = job.of(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)
         slab = simulation._slab
-        plain = marker.plain_job(job) if slab.root else {}
+        plain = on_root(world, lambda: marker.plain_job(job))
         found = restart.sound(file, job, plain, slab)
         if isinstance(found, str):
             raise InputError(found)
@@ -179,11 +196,29 @@ class Simulation:
     def _march(self) -> March:
         """The march, made when it is first asked for."""
         if self._march_made is None:
+            self._meet("begins")
             saved = self._saved
             wisdom.recall(self.job, self._slab, saved.numbers.get("plans/all") if saved else None)
             self._march_made = start.first(self.job, self._slab, saved=saved)
             warn_of(self.job, self._march_made.scene.frame)
         return self._march_made
+
+    @property
+    def _errors_so_far(self) -> ErrorsSoFar:
+        """The error budget of all steps made, made when it is first asked for."""
+        if self._errors is None:
+            self._errors = ErrorsSoFar(self._march.row, self._saved.numbers if self._saved else None)
+        return self._errors
+
+    def _meet(self, what: str) -> None:
+        """Wait for all ranks to do `what`; collective. Raises RunError if one does something else or has ended."""
+        meet(self.comm, f"{what} of {self!r}")
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a Simulation cannot be pickled or copied: it belongs to the memory and the ranks of this process; "
+            "save(path) keeps it, and Simulation.restore(path) makes another one of that"
+        )
 
     def __repr__(self) -> str:
         grid = self.job.grid

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..job import Grid, Topography
+from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from . import files, treatment
 from .treatment import Treated
@@ -72,13 +73,7 @@ def _range(part: Topography, name: str, length: float, available: float, count: 
 
 def rows_of(part: Topography, grid: Grid, slab: Slab) -> tuple[Array, list[str]]:
     """This rank's rows of the heights [m], and on root what was done; collective. Raises InputError on every rank."""
-    prepared, problem = None, ""
-    if slab.root:
-        try:
-            prepared = prepare(part, grid)
-        except InputError as error:
-            problem = str(error)
-    if problem := slab.agree(problem):
-        raise InputError(problem)
-    rows = slab.from_root(prepared.heights if prepared else None)
-    return rows, prepared.told if prepared else []
+    found: list[Prepared] = []
+    on_root(slab.comm, lambda: found.append(prepare(part, grid)))
+    rows = slab.from_root(found[0].heights if found else None)
+    return rows, found[0].told if found else []

@@ -53,11 +53,13 @@ class Options:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run has ended: its exit code, and where it was left; or the checkpoint at which there was nothing to do."""
+    """How a run has ended: its exit code, and where it was left with which errors; or the checkpoint at which there was
+    nothing to do."""
 
     code: int
     march: March | None
     contents: Contents | None = None
+    errors: ErrorsSoFar | None = None
 
 
 def run(job: Job, slab: Slab, options: Options) -> int:
@@ -112,7 +114,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 contacts = sanity.ContactWatch(job, timeline, told)
                 parts = marching, timeline, directory, recorder, watching, facts
                 journey = Journey(*parts, options.until, errors, contacts, options.shows)
-                return Ended(journey.go(origin), marching)
+                return Ended(journey.go(origin), marching, errors=errors)
         finally:
             recorder.close()
 

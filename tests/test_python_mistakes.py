@@ -1,0 +1,97 @@
+"""What Python code may pass by mistake ends in a sentence, before anything is computed."""
+
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+import parcontact as pc
+
+JOB: dict[str, Any] = {
+    "grid": {"points": 8, "size": 1e-3},
+    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [1, 0]},
+    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [
+        {"pressure": 1e3, "duration": 1e-3, "time_step": 2.5e-4},
+        {"pressure": 1e3, "velocity": 0.1, "distance": 5e-4, "cells_per_step": 1},
+    ],
+}
+
+
+def simulation(job: Any = JOB, set: Any = None) -> pc.Simulation:
+    return pc.Simulation(job, set, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: simulation(None), "the job must be the path of a file or a mapping, got None"),
+        (lambda: simulation(JOB, {5: 1}), "set has a key that is no word, 5"),
+        (lambda: simulation(JOB, 5), "set must be a mapping of keys and values, got 5"),
+        (lambda: pc.steady(JOB, "abc"), "velocities must be a number, a list of numbers or a range .* got 'abc'"),
+        (lambda: pc.steady(JOB, [None]), r"velocities must be a number.* got \[None\]"),  # type: ignore[list-item]
+        (lambda: pc.steady(JOB, 1j), "velocities must be a number.* got 1j"),  # type: ignore[arg-type]
+        (lambda: pc.steady(JOB, 1.0, temperatures="20"), "temperatures must be a number, a list of numbers, got '20'"),
+        (lambda: pc.steady(JOB, 1.0, set=5), "set must be a mapping"),  # type: ignore[arg-type]
+    ],
+)
+def test_mistakes_of_jobs(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(pc.JobError, match=f"^{said}"):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: simulation().save(None), "a path must be a text or a pathlib.Path, got None"),  # type: ignore[arg-type]
+        (lambda: pc.Simulation.restore(5), "a path must be a text"),  # type: ignore[arg-type]
+        (lambda: pc.open(None), "a path must be a text"),  # type: ignore[arg-type]
+        (lambda: pc.Simulation(JOB, comm=5), "comm must be a communicator of mpi4py, got 5"),  # type: ignore[arg-type]
+    ],
+)
+def test_other_mistakes(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(pc.InputError, match=f"^{said}"):
+        call()
+
+
+def test_more_points_than_any_machine_holds() -> None:
+    """Refused when they are asked for, not when the first map is made."""
+    grid = {"points": 2_000_000, "size": 1.0}
+    calls: list[Callable[[], Any]] = [
+        lambda: simulation({**JOB, "grid": grid}),
+        lambda: pc.steady({**JOB, "grid": grid}, 1.0, comm=MPI.COMM_SELF),
+        lambda: pc.surface(JOB["surface"], grid),
+    ]
+    for call in calls:
+        with pytest.raises(pc.InputError, match=r"2000000 x 2000000 points need .* use fewer points"):
+            call()
+
+
+@pytest.mark.parametrize("act", [pickle.dumps, copy.copy, copy.deepcopy])
+def test_a_simulation_is_saved_not_pickled(act: Callable[[Any], Any]) -> None:
+    run = simulation()
+    next(run.steps())
+    with pytest.raises(TypeError, match=r"cannot be pickled or copied: .* save\(path\) keeps it"):
+        act(run)
+    assert pickle.loads(pickle.dumps(run.row)).step == 0
+
+
+@pytest.mark.mpi
+def test_a_saved_state_has_the_sums_of_the_budget(comm: MPI.Intracomm, shared_path: Any) -> None:
+    """The budget at the end is that of the whole slide, to the last digit, as without a stop; also of a saved one."""
+    whole = pc.Simulation(JOB, comm=comm)
+    whole.run()
+    run = pc.Simulation(JOB, comm=comm)
+    for row in run.steps():
+        if row.step == 5:
+            break
+    for _ in range(2):
+        run.save(shared_path / "state.h5")
+        run = pc.Simulation.restore(shared_path / "state.h5", comm=comm)
+    run.run()
+    sums = whole._errors_so_far.summary.numbers
+    assert run._errors_so_far.summary.numbers.tolist() == sums.tolist()
+    assert sums[5] == pytest.approx(5e-4, rel=1e-9)  # the way [m], added step by step
