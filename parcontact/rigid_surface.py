@@ -68,8 +68,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
     if isinstance(part, jobs.RoughSpectrum):
         return _of_spectrum(part, grid, fft, told)
     if isinstance(part, jobs.HeightFile):
-        rows = heightfile.read(part.path, part.dataset, fft.slab)
-        return _transform(part.scale * rows, fft)
+        return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)
     if isinstance(part, jobs.HeightArray):
         return _transform(fft.slab.from_root(part.heights.values), fft)
     return Roughness(

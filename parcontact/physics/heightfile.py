@@ -19,8 +19,8 @@ HEADER_BYTES = 1_000_000  # of a .npy file
 LOWEST, HIGHEST = 1e-70, 1e70  # of the largest height: its fourth power is a number of double precision
 
 
-def read(path: Path, dataset: str, slab: Slab) -> Array:
-    """This rank's rows of the map of shape (ny, nx) in a .npy, .h5 or text file; collective.
+def read(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
+    """This rank's rows of the map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
 
     Raises InputError on every rank when a rank cannot read its rows, the shape is another one, or a value is no finite
     real number.
@@ -32,11 +32,14 @@ def read(path: Path, dataset: str, slab: Slab) -> Array:
             [float(np.count_nonzero(~np.isfinite(rows)))], [float(np.abs(rows, dtype=np.float64).max(initial=0.0))]
         )
         problem = f"{path}: {wrong:.0f} of its {slab.points} heights are not finite numbers" if wrong else ""
+        largest *= abs(scale)
         if not problem and largest and not LOWEST <= largest <= HIGHEST:
-            problem = f"{path}: its largest height is {largest:.3g}, which cannot be computed with"
+            problem = f"{path}: its largest height is {largest:.3g} m, which cannot be computed with"
     if problem:
         raise InputError(problem)
-    return rows.astype(np.float64)
+    heights = rows.astype(np.float64)
+    heights *= scale
+    return heights
 
 
 def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
@@ -49,7 +52,7 @@ def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
         number = getattr(error, "errno", None)
         reason = os.strerror(number) if number else str(error).partition("\n")[0]
         return np.empty(0), f"{path} cannot be read: {reason}"
-    if not np.can_cast(rows.dtype, np.float64, "same_kind"):
+    if rows.dtype.kind not in "iuf":
         return np.empty(0), f"{path} holds values of type {rows.dtype}, which are no heights"
     return rows, ""
 

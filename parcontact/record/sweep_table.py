@@ -10,6 +10,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
+from ..errors import InputError
 from ..job import Case, Steady
 from . import curve_points, files, measures, slide
 
@@ -35,9 +36,21 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
 
 
 def read(path: Path) -> list[dict[str, Any]]:
-    """The rows of a table, numbers as such, an empty field as nan."""
-    with path.open(newline="") as file:
-        return [{key: _number(text) for key, text in row.items()} for row in csv.DictReader(file)]
+    """The rows of a table, numbers as such, an empty field as nan. Raises InputError for what is no such table."""
+    try:
+        with path.open(newline="") as file:
+            names, *rows = list(csv.reader(file)) or [[]]
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if names[:1] != ["case"] or "state" not in names:
+        raise InputError(f"{path} is damaged: its first line must name the columns of a sweep, from case to state on")
+    for number, cells in enumerate(rows, 2):
+        if len(cells) != len(names) or not (cells[0].isdecimal() and len(cells[0]) < 10):
+            raise InputError(
+                f"{path}, line {number}: the number of a case and {len(names) - 1} values more were expected, got "
+                f"{','.join(cells)[:60]!r}"
+            )
+    return [dict(zip(names, map(_number, cells), strict=True)) for cells in rows]
 
 
 def fail(case: Case, reason: str) -> None:

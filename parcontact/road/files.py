@@ -5,6 +5,7 @@ Heights point up, out of the road: what sticks out touches first.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ PLAIN = (".npy", ".txt", ".xyz")  # formats without units
 LARGEST_FILE = 4_000_000_000  # bytes
 IRREGULAR = 1e-3  # of a step: positions of a .xyz file further from a grid than this are on none
 FEWEST = 4  # points along a direction
+MOST_POSITIONS = 10**6  # along a direction
+MOST_MISSING = 2  # times as many points of the grid as of the file
+LOWEST, HIGHEST = 1e-70, 1e70  # of the largest height: its fourth power is a number of double precision
 
 
 @dataclass(frozen=True)
@@ -39,13 +43,25 @@ def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel
         headed = path.suffix == ".txt" and unit is None and size is None  # its header may say both
         plain = path.suffix in PLAIN and not headed
         found = _plain(path, unit, size) if plain else _of_instrument(path, unit, size, channel)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {str(error).partition(chr(10))[0]}") from error
+    except InputError:
+        raise
+    except Exception as error:  # readers of damaged files raise anything
+        said = str(error).partition("\n")[0] or type(error).__name__
+        raise InputError(f"{path} cannot be read: {said}") from error
+    _refuse_odd_numbers(path, found)
     if min(found.heights.shape) < FEWEST:
         raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} each way were expected")
     if np.isfinite(found.heights).sum() < found.heights.size / 2:
         raise InputError(f"{path}: more than half of its points are missing")
     return found
+
+
+def _refuse_odd_numbers(path: Path, found: Map) -> None:
+    if not all(0.0 < length < np.inf for length in found.size):
+        raise InputError(f"{path}: its map would be {found.size[0]:g} x {found.size[1]:g} m, which is no size")
+    largest = float(np.abs(found.heights, where=np.isfinite(found.heights), out=np.zeros_like(found.heights)).max())
+    if largest and not LOWEST <= largest <= HIGHEST:
+        raise InputError(f"{path}: its largest height is {largest:.3g} m, which cannot be computed with")
 
 
 def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Map:
@@ -57,18 +73,35 @@ def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Ma
         return _positions(path, np.loadtxt(path, ndmin=2, dtype=np.float64), UNITS[unit])
     if size is None:
         raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
-    values = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
+    values = _numpy(path) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
     masked = np.ma.masked_invalid(np.asarray(values, dtype=np.float64))
     if masked.ndim != 2:
         raise InputError(f"{path} has {masked.ndim} dimensions; a map of two was expected")
     return Map(masked.filled(np.nan) * UNITS[unit], size)
 
 
+def _numpy(path: Path) -> NDArray[Any]:
+    """Opened, not read: what a header claims may be more than the file has, or than the memory holds."""
+    values = np.lib.format.open_memmap(path, mode="r")
+    if values.dtype.kind not in "iuf":
+        raise InputError(f"{path} holds values of type {values.dtype}, which are no heights; save it as float64")
+    return values
+
+
 def _positions(path: Path, table: Array, unit: float) -> Map:
     """A map from rows of x, y and z in any order; points that are not there are missing."""
     if table.shape[1] != 3:
         raise InputError(f"{path} has {table.shape[1]} columns; x, y and z were expected")
+    if (wrong := np.flatnonzero(~np.isfinite(table[:, :2]).all(axis=1))).size:
+        x, y = table[wrong[0], :2]
+        raise InputError(f"{path}: its point {wrong[0] + 1} is at x = {x:g}, y = {y:g}, which is no position")
     (x, nx, dx), (y, ny, dy) = (_steps(path, name, values) for name, values in zip("xy", table.T[:2], strict=True))
+    if nx * ny > MOST_MISSING * len(table):
+        far = max((np.abs(values - np.median(values)).argmax() for values in table.T[:2]), key=lambda n: x[n] * y[n])
+        raise InputError(
+            f"{path}: its {len(table)} points reach over a grid of {nx} x {ny}, of which more than half would be "
+            f"missing; is point {far + 1}, at x = {table[far, 0]:g}, y = {table[far, 1]:g}, one of them?"
+        )
     heights = np.full((ny, nx), np.nan)
     heights[y, x] = table[:, 2]
     return Map(heights * unit, (nx * dx * unit, ny * dy * unit))
@@ -81,6 +114,11 @@ def _steps(path: Path, name: str, values: Array) -> tuple[NDArray[np.intp], int,
         raise InputError(f"{path} has {distinct.size} positions along {name}; at least {FEWEST} were expected")
     step = float(np.median(np.diff(distinct)))
     index = (values - distinct[0]) / step
+    if not index.max() < MOST_POSITIONS:
+        raise InputError(
+            f"{path}: its positions along {name} reach from {distinct[0]:g} to {distinct[-1]:g} in steps of {step:g}, "
+            f"which is more than {MOST_POSITIONS:.0e} of them"
+        )
     if np.abs(index - np.round(index)).max() > IRREGULAR:
         raise InputError(f"{path}: its positions along {name} are not equally spaced")
     whole = np.round(index).astype(np.intp)

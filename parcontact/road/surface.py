@@ -45,9 +45,9 @@ def prepare(part: Topography, grid: Grid) -> Prepared:
     periodic = part.periodic or ("smooth" if grid.boundary == "periodic" else "none")
     copies = 2 if periodic == "mirror" else 1
     rows, columns = (
-        _range(part, name, length / copies, available, count)
-        for name, length, available, count in zip(
-            "yx", grid.size[::-1], found.size[::-1], found.heights.shape, strict=True
+        _range(part, name, length / copies, available, count, points)
+        for name, length, available, count, points in zip(
+            "yx", grid.size[::-1], found.size[::-1], found.heights.shape, grid.points[::-1], strict=True
         )
     )
     cut = found.heights[rows, columns]
@@ -59,14 +59,19 @@ def prepare(part: Topography, grid: Grid) -> Prepared:
     return Prepared(heights - heights.mean(), cut, done, (grid.lx / copies, grid.ly / copies))
 
 
-def _range(part: Topography, name: str, length: float, available: float, count: int) -> slice:
-    """The points in the middle of the map that are as long as the box."""
+def _range(part: Topography, name: str, length: float, available: float, count: int, points: int) -> slice:
+    """The points in the middle of the map that are as long as the box, which has so many `points` of its own."""
     if length > available * (1.0 + SLACK):
         raise InputError(
             f"{part.path}: the box is {length:.6g} m along {name}, the map only {available:.6g} m; make the box "
             "smaller, or give periodic: mirror, which needs half of it"
         )
     wanted = min(count, max(1, round(count * length / available)))
+    if wanted < 2 <= points:
+        raise InputError(
+            f"{part.path}: the box is {length:.3g} m along {name}, and points of the map are {available / count:.3g} m "
+            "apart: it would be flat; make the box larger (grid.size), or take a finer map"
+        )
     first = (count - wanted) // 2
     return slice(first, first + wanted)
 

@@ -127,4 +127,4 @@ def test_a_sparse_file_is_not_read_as_one_line(comm: MPI.Intracomm, shared_path:
 @pytest.mark.parametrize("value", [1e300, -1e100, 5e-324])
 def test_heights_beyond_computing(comm: MPI.Intracomm, shared_path: Path, value: float) -> None:
     path = made(comm, shared_path / "map.npy", lambda path: write(path, np.full((NY, NX), value)))
-    assert f"its largest height is {abs(value):.3g}, which cannot be computed with" in complaint(comm, path)
+    assert f"its largest height is {abs(value):.3g} m, which cannot be computed with" in complaint(comm, path)

@@ -1,5 +1,8 @@
 """Maps from files: all formats give the same map, and what will not do is one sentence."""
 
+import math
+import re
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -58,12 +61,29 @@ def save(path: Path, values: object) -> None:
     np.save(path, np.asarray(values), allow_pickle=True)
 
 
+SQUARE = "".join(f"{x} {y} 0\n" for x in range(6) for y in range(6))
 BAD = {
     "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "says no unit of its heights"),
     "no size": ("road.npy", HEIGHTS, ("m", None, None), "does not say how large its map is"),
     "a line": ("road.npy", HEIGHTS[0], ("m", SIZE, None), "has 1 dimensions; a map of two"),
     "a block": ("road.npy", HEIGHTS[None], ("m", SIZE, None), "has 3 dimensions; a map of two"),
-    "words": ("road.npy", [["a", "b"]], ("m", SIZE, None), "cannot be read"),
+    "words": ("road.npy", [["a", "b"]], ("m", SIZE, None), "holds values of type <U1, which are no heights"),
+    "complex": ("road.npy", HEIGHTS * 1j, ("m", SIZE, None), "holds values of type complex128, which are no heights"),
+    "dates": ("road.npy", HEIGHTS.astype("M8[s]"), ("m", SIZE, None), "holds values of type datetime64[s]"),
+    "yes and no": ("road.npy", HEIGHTS > 0.0, ("m", SIZE, None), "holds values of type bool, which are no heights"),
+    "a structure": ("road.npy", HEIGHTS.view([("z", "f8")]), ("m", SIZE, None), "holds values of type [('z', '<f8')]"),
+    "too low": ("road.npy", HEIGHTS * 1e-302, ("m", SIZE, None), "which cannot be computed with"),
+    "too high": ("road.npy", HEIGHTS * 1e306, ("m", SIZE, None), "which cannot be computed with"),
+    "too wide": ("road.npy", HEIGHTS, ("m", (math.inf, 1.0), None), "would be inf x 1 m, which is no size"),
+    "nowhere": ("road.xyz", "0 0 0\n1 inf 0\n", ("m", None, None), "its point 2 is at x = 1, y = inf, which is no"),
+    "a stray point": (
+        "road.xyz",
+        SQUARE + "100000 90000 0\n",
+        ("m", None, None),
+        "its 37 points reach over a grid of 100001 x 90001, of which more than half would be missing; is point 37, "
+        "at x = 100000, y = 90000, one of them?",
+    ),
+    "a point far away": ("road.xyz", SQUARE + "1e300 0 0\n", ("m", None, None), "from 0 to 1e+300 in steps of 1, whi"),
     "objects": ("road.npy", [[None, {}]], ("m", SIZE, None), "cannot be read"),
     "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
@@ -99,6 +119,38 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
         files.read(path, *given)
     assert sentence in str(failure.value)
     assert "\n" not in str(failure.value)
+
+
+@pytest.mark.parametrize("ending", ["x3p", "gwy", "nc"])
+def test_half_a_file(tmp_path: Path, ending: str) -> None:
+    """Whatever its reader raises."""
+    path = write(tmp_path)[f"road.{ending}"][0]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(InputError, match=r"road\.\w+ (cannot be read|is damaged)"):
+        files.read(path, None, None, None)
+
+
+def test_an_increment_that_is_no_number(tmp_path: Path) -> None:
+    """Of a .x3p, whose description is XML within a ZIP file."""
+    path = write(tmp_path)["road.x3p"][0]
+    with zipfile.ZipFile(path) as old:
+        parts = {name: old.read(name) for name in old.namelist()}
+    parts["main.xml"], count = re.subn(rb"<Increment>[^<]*<", b"<Increment>nan<", parts["main.xml"])
+    assert count >= 2
+    with zipfile.ZipFile(path, "w") as new:
+        for name, data in parts.items():
+            new.writestr(name, data)
+    with pytest.raises(InputError, match=r"its map would be nan x nan m, which is no size"):
+        files.read(path, None, None, None)
+
+
+def test_a_header_that_claims_too_much(tmp_path: Path) -> None:
+    """8 TB in a file of 128 bytes: nothing is read, nothing is asked of the memory."""
+    path = tmp_path / "road.npy"
+    with path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)})
+    with pytest.raises(InputError, match="cannot be read: "):
+        files.read(path, "m", SIZE, None)
 
 
 def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
