@@ -1,6 +1,7 @@
 """The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,9 +114,19 @@ def _transform(heights: Array, fft: FFT) -> Spectrum:
     return spectrum
 
 
-def height_of(surface: Surface) -> float:
-    """From the lowest to the highest point [m], Sz of the standards on roughness; 0 if that is rounding."""
+class Heights(NamedTuple):
+    """From the lowest to the highest point, Sz of the standards on roughness, 0 if that is rounding; the highest point
+    and the mean, over the surface's datum. All in m."""
+
+    span: float
+    highest: float
+    mean: float
+
+
+def heights_of(surface: Surface) -> Heights:
+    """What a surface reaches; collective."""
     heights = surface.heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
     extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
-    top, bottom = surface.slab.reduce((), extremes)
-    return top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
+    total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)
+    span = top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
+    return Heights(span, top, total / surface.slab.points)

@@ -30,7 +30,7 @@ from .physics.prony import Prony
 from .physics.roughness import Moments, moments
 from .physics.surface import Surface
 from .physics.units import Units
-from .rigid_surface import height_of, make_surface
+from .rigid_surface import Heights, heights_of, make_surface
 from .solve.contact import ContactSolver
 from .solve.surround import grids_for
 
@@ -39,9 +39,9 @@ from .solve.surround import grids_for
 class Frame:
     """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
 
-    `height` [m] is that of the surface from its lowest to its highest point (the shorter side of a cell if it is flat);
-    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `told` says, on root,
-    what was done to measured maps.
+    `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
+    of a cell if it is flat); `size` and `prony` are the box and the relaxation function in the run's units (and
+    seconds); `told` says, on root, what was done to measured maps.
     """
 
     job: Job
@@ -49,10 +49,14 @@ class Frame:
     fft: FFT
     surface: Surface
     roughness: Moments | None
-    height: float
+    heights: Heights
     units: Units
     prony: Prony
     told: list[str]
+
+    @property
+    def height(self) -> float:
+        return self.heights.span or min(self.job.grid.dx, self.job.grid.dy)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -128,11 +132,11 @@ def frame(job: Job, slab: Slab) -> Frame:
     surface, told = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     prony = relaxation_of(job)
-    height = height_of(surface)
-    units = Units.near(height, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
+    heights = heights_of(surface)
+    units = Units.near(heights.span, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
     surface.rescale(units.height)
     scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    return Frame(job, slab, fft, surface, roughness, height or min(job.grid.dx, job.grid.dy), units, scaled, told)
+    return Frame(job, slab, fft, surface, roughness, heights, units, scaled, told)
 
 
 def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -> Scene:

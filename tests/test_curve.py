@@ -145,6 +145,15 @@ def test_curve_without_velocities_or_pressure(tmp_path: Path) -> None:
         request(jobs.load(path, ["history.0.pressure=null", "history.0.approach=-1e-6"]), [0.1])
 
 
+@pytest.mark.parametrize("added", [[], ["steady.velocities=[0.1]"]])
+def test_a_force_is_a_pressure_over_the_box(tmp_path: Path, added: list[str]) -> None:
+    """1e-4 N on 2.5e-4 m x 1.5625e-5 m are 25.6 kPa."""
+    path = tmp_path / "wave.yaml"
+    path.write_text(WAVE)
+    job = jobs.load(path, ["history.0.pressure=null", "history.0.force=1e-4", *added])
+    assert request(job, [0.1]).pressures == pytest.approx((25.6e3,), rel=1e-12)
+
+
 def test_one_point_is_a_flat_surface(main: Main, tmp_path: Path) -> None:
     """Which is in full contact, without friction."""
     material = "{model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0e-3}]}"

@@ -144,7 +144,7 @@ def test_steady_needs_pressures_and_a_solid_at_rest() -> None:
     assert mistakes_of(SMALL.replace("pressure: 1e5", "force: 1"), "steady.velocities=1") == [
         (
             "--set steady.velocities=1: steady.pressures is missing; "
-            "it must be positive pressures [Pa] when no stage of the history has one"
+            "it must be positive pressures [Pa] when no stage of the history has a pressure or force"
         )
     ]
     fluid = with_material("{model: zener, branches: [{modulus: 1, relaxation_time: 1}]}")

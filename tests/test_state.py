@@ -117,3 +117,21 @@ def test_a_failed_step_is_none(material: dict[str, Any], history: list[dict[str,
     run(march, [], [second])
     run(smooth, [], [second])
     assert all(np.array_equal(march.field(name), smooth.field(name)) for name in FIELDS)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_without_load_the_surface_just_touches(boundary: str) -> None:
+    """Before the first step as after one that takes the load away: no gap is negative, the smallest is 0.
+
+    To the rounding of heights in double precision.
+    """
+    unloads = [{"pressure": 5e3}, {"pressure": 0.0}]
+    grid = {"points": 32, "size": 1e-3, "boundary": boundary}
+    march = begun(job(ELASTIC, unloads, grid=grid, output={}))
+    before, gaps, height = march.row.measures, march.field("gap"), np.ptp(march.field("height"))
+    assert abs(gaps.min()) <= 1e-12 * height
+    assert before.mean_gap == pytest.approx(gaps.mean(), rel=1e-12)
+    run(march, ())
+    after = march.row.measures
+    assert np.allclose(march.field("gap"), gaps, rtol=0.0, atol=1e-9 * height)
+    assert (before.approach, before.mean_gap) == pytest.approx((after.approach, after.mean_gap), rel=1e-9)

@@ -134,3 +134,19 @@ def test_temperatures_that_the_material_does_not_know(tmp_path: Path, changes: l
     (tmp_path / "job.yaml").write_text(WAVE)
     with pytest.raises(InputError, match=told):
         request(jobs.load(tmp_path / "job.yaml", changes))
+
+
+@pytest.mark.parametrize(
+    ("law", "temperature", "told"),
+    [
+        ("{law: arrhenius, energy: 1.0e5, reference: 20.0}", -270.0, r"relaxation times would be 10\^1.64e\+03"),
+        ("{law: wlf, C1: 17.4, C2: 51.6, reference: 20.0}", -31.59, r"relaxation times would be 10\^8.98e\+04"),
+        ("{law: wlf, C1: 17.4, C2: 51.6, reference: 20.0}", 1e9, r"\[deg C\], up to 5000: a list, got 1000000000.0"),
+    ],
+)
+def test_temperatures_beyond_computing(tmp_path: Path, law: str, temperature: float, told: str) -> None:
+    """Told in a sentence, with the limit."""
+    (tmp_path / "job.yaml").write_text(WAVE)
+    changes = [f"material.shift={law}", f"steady.temperatures=[{temperature}]"]
+    with pytest.raises(InputError, match=told):
+        request(jobs.load(tmp_path / "job.yaml", changes))

@@ -208,7 +208,7 @@ class Steady(Part):
         default=None, description="positive pressures [Pa]: a list, or first:last:count"
     )
     temperatures: Annotated[tuple[Celsius, ...] | None, BeforeValidator(listed)] = Field(
-        default=None, description="temperatures [deg C]: a list"
+        default=None, description="temperatures [deg C], up to 5000: a list"
     )  # default: that of the material
     direction: tuple[Real, Real] = Field(default=(1.0, 0.0), description="a direction [x, y] [-]")
     waves: Flag = Field(default=False, description="true or false")

@@ -137,7 +137,7 @@ class Zener(Part):
     modulus_inf: Modulus = 0.0
     branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
     shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
-    temperature: Celsius | None = Field(default=None, description="a temperature [deg C]")  # that of the reference
+    temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
     band: Band = None
     temperatures: Measured = None
 
@@ -170,7 +170,7 @@ class Dma(Part):
     poisson: Poisson = 0.5
     reference: Celsius | None = None  # default: the middle one of the measured temperatures
     shift: Literal["wlf", "arrhenius", "free"] = "wlf"
-    temperature: Celsius | None = Field(default=None, description="a temperature [deg C]")  # that of the reference
+    temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
     error: Positive = Field(default=0.02, description="a positive rms error of the logarithms of the moduli [-]")
     weight: Literal["both", "storage", "loss"] = "both"
 

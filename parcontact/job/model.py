@@ -75,8 +75,8 @@ def _some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[F
     if not history and steady is None:
         yield Fault("needs at least one stage, unless there is a steady section", ("history",))
     known = steady is None or steady.pressures is not None or None in history
-    if not known and not any(stage.pressure for stage in history):
-        sentence = "is missing; it must be positive pressures [Pa] when no stage of the history has one"
+    if not known and not any(stage.control != "approach" and stage.load.end > 0.0 for stage in history):
+        sentence = "is missing; it must be positive pressures [Pa] when no stage of the history has a pressure or force"
         yield Fault(sentence, ("steady", "pressures"))
 
 

@@ -15,8 +15,12 @@ from .fault import Fault
 from .part import Part, Rule, chosen
 from .values import Positive, Real
 
-LOWEST = -273.15  # deg C
-Celsius = Annotated[float, Field(gt=LOWEST, strict=True, allow_inf_nan=False, description="a temperature [deg C]")]
+LOWEST, HIGHEST = -273.15, 5000.0  # deg C
+LARGEST_SHIFT = 60.0  # log10 of a_T, either way: relaxation times remain numbers that can be computed with
+Celsius = Annotated[
+    float,
+    Field(gt=LOWEST, le=HIGHEST, strict=True, allow_inf_nan=False, description="a temperature [deg C], up to 5000"),
+]
 
 
 class WlfShift(Part):
@@ -87,6 +91,10 @@ def shifted(shift: WlfShift | ArrheniusShift | FactorsShift | None, temperature:
         yield Fault(sentence, ("temperature",))
         return
     try:
-        shift.made.log_factor(temperature)
+        log = shift.made.log_factor(temperature)
     except InputError as error:
         yield Fault(f"is beyond what the shift allows: {error}", ("temperature",))
+        return
+    if not abs(log) <= LARGEST_SHIFT:
+        sentence = f"is beyond what can be computed with: relaxation times would be 10^{log:.3g} of those at the "
+        yield Fault(f"{sentence}reference, and at most 10^{LARGEST_SHIFT:g} either way is allowed", ("temperature",))

@@ -42,7 +42,10 @@ class March:
         slab, dtype = scene.slab, scene.solver.dtype
         earlier = slab.zeros(dtype) if scene.lasts else None
         further = tuple(Past(slab.zeros(dtype)) for _ in range(FURTHER * scene.keeps_further))
-        self.state = State(self._complete(Row()), slab.zeros(dtype), earlier, further=further)
+        frame, highest = scene.frame, scene.frame.heights.highest  # at no load the surface just touches the body
+        touching = Measures(approach=0.0 - highest - frame.surface.datum, mean_gap=highest - frame.heights.mean)
+        row, d = self._complete(Row(measures=touching)), -highest / scene.units.height
+        self.state = State(row, slab.zeros(dtype), earlier, approach=d, further=further)
         self._next_pressure = slab.zeros(dtype)
         self._errors = Errors(scene)
         self.starts = Starts(scene)
