@@ -193,15 +193,21 @@ def surface(options: argparse.Namespace) -> int:
     from ..parallel.fft import FFT
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..record import surfaces
+    from ..record import measured_maps, surfaces
 
-    picture, options.out = Path(options.out or f"{Path(options.job).stem}-surface.png"), None
-    job = _load(options, world)
+    given = Path(options.job)
+    picture, options.out = Path(options.out or f"{given.stem}-surface.png"), None
+    alone = measured_maps.is_map(given)
+    if options.start and not alone:
+        raise InputError(f"--job writes a job for a measured map; {given} is a job")
 
     def act() -> list[str]:
+        measured_maps.refuse_taken(options.start)
+        job = measured_maps.load(given, options.set) if alone else _load(options, MPI.COMM_SELF)
         slab = Slab(MPI.COMM_SELF, *job.grid.points)
         made, told = rigid_surface.make_surface(job, FFT(slab))
-        return list(surfaces.describe(job, made.heights((0.0, 0.0), slab.empty()), told, picture))
+        lines = list(surfaces.describe(job, made.heights((0.0, 0.0), slab.empty()), told, picture))
+        return [*lines, *measured_maps.start(job, given, options.start)] if alone else lines
 
     lines = on_root(world, act)
     if world.rank == 0:

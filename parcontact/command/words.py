@@ -150,8 +150,10 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     study.set_defaults(act=verbs.study)
 
-    surface = found.add_parser("surface", help="say what the surface of a job is like, and draw it")
-    _job_arguments(surface)
+    text = "say what the surface of a job, or a measured map, is like, and draw it"
+    surface = found.add_parser("surface", help=text)
+    _job_arguments(surface, "job file (YAML), or a measured map; of one without unit: --set surface.unit=um ...")
+    surface.add_argument("--job", dest="start", metavar="FILE", type=Path, help="write a job to start from (of a map)")
     surface.set_defaults(act=verbs.surface)
 
     info = found.add_parser("info", help="say what checkpoints, files of fields and directories hold, and if sound")
@@ -175,8 +177,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _job_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("job", help="job file (YAML)")
+def _job_arguments(parser: argparse.ArgumentParser, text: str = "job file (YAML)") -> None:
+    parser.add_argument("job", help=text)
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
     parser.add_argument("--out", metavar="DIR", type=values.directory, help="output directory")
     text = "one case of the job's sweep, from 0 (default: all)"

@@ -13,6 +13,7 @@ from ..errors import InputError, JobError
 from .fault import faults_of
 from .loading import read_job
 from .mapping import NOWHERE, numbers_for_texts, source_of
+from .measured import take_grid
 from .model import Job, Origin
 from .part import Context
 from .source import Key, Mistake, Place, Source, shorten
@@ -101,7 +102,9 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
     source, included, sweep = read_job(_path(given), changes, index, _data(given))
     if () not in source.broken:
         try:
-            job = _validated(source, Context(_path(given).absolute(), included))
+            context = Context(_path(given).absolute(), included)
+            take_grid(source, context)
+            job = _validated(source, context)
             if job.numerics.strict:
                 source.mistakes += [Mistake(_place(given), f"{text} ({STRICT})") for text in job.warnings]
             if not source.mistakes:

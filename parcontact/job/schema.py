@@ -106,7 +106,8 @@ def _value(annotation: Any, metadata: Sequence[Any] = ()) -> Schema:
                 found[word] = bound
     read = {one.func for one in metadata if isinstance(one, BeforeValidator)}
     if read & {*SINGLE, numbers}:
-        return {"anyOf": [found["items"], found, *([RANGE] if numbers in read else [])]}
+        words = [{"const": one} for one in metadata if isinstance(one, str)]
+        return {"anyOf": [found["items"], found, *([RANGE] if numbers in read else []), *words]}
     return found
 
 

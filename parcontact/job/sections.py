@@ -10,16 +10,18 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from .fault import Fault
 from .part import Context, Part, Rule
-from .values import Count, Flag, Positive, both, from_home, listed
+from .values import FROM_SURFACE, Count, Flag, Positive, both, from_home, listed
 
 
 class Grid(Part):
     """The box and its cells; x comes first in `points` and `size`."""
 
-    points: Annotated[tuple[Count, Count], BeforeValidator(both)] = Field(
+    points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE] = Field(
         description="a positive whole number of points"
     )
-    size: Annotated[tuple[Positive, Positive], BeforeValidator(both)] = Field(description="a positive length [m]")
+    size: Annotated[tuple[Positive, Positive], BeforeValidator(both), FROM_SURFACE] = Field(
+        description="a positive length [m]"
+    )
     boundary: Literal["periodic", "free"] = "periodic"
 
     @property

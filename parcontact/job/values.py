@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from .fault import Fault, quote, refuse
 from .source import shorten
 
+FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
 MOST_SEED = 2**128 - 1
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import InputError, RunError
 from ..job import Job, Topography
 from ..parallel.slab import Array
@@ -21,29 +23,47 @@ def describe(job: Job, heights: Array, told: list[str], picture: Path) -> Iterat
         raise InputError(f"--out must end in {', '.join(PICTURES)}, got {str(picture)!r}")
     from .pictures import surface as pictures  # slow to import
 
-    found = statistics.describe(heights, job.grid.size)
-    sketch = pictures.Sketch(heights, job.grid.size, found, _measured(job))
+    found, prepared = statistics.describe(heights, job.grid.size), _prepared(job)
+    sketch = pictures.Sketch(heights, job.grid.size, found, _measured(job, prepared))
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
         with files.replaced(picture, files.is_marked) as file:
             pictures.draw(sketch, file, picture.suffix[1:])
     except OSError as error:
         raise RunError(f"{picture} cannot be written: {error}") from error
+    if prepared:
+        yield from _map_lines(prepared)
     yield from told
     yield f"rms height     {found.rms_height:.5g} m"
     yield f"rms slope      {found.rms_slope:.5g}"
     yield f"rms curvature  {found.rms_curvature:.5g} 1/m"
     yield f"Nayak          {found.nayak:.4g}"
+    longest, shortest = max(job.grid.size), 2.0 * max(job.grid.dx, job.grid.dy)
+    yield f"spectrum       waves of {longest:.4g} to {shortest:.4g} m"
     known = found.hurst == found.hurst
     yield f"Hurst          {found.hurst:.3g}" if known else "Hurst          no self-affine range was found"
     yield f"picture: {picture}"
 
 
-def _measured(job: Job) -> statistics.Statistics | None:
+def _map_lines(prepared: surface.Prepared) -> Iterator[str]:
+    """What the part of a measured map that is used was like."""
+    (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
+    yield f"size           {lx:.5g} x {ly:.5g} m"
+    yield f"points         {nx} x {ny}"
+    yield f"pixel          {lx / nx:.4g} x {ly / ny:.4g} m"
+    yield f"missing        {float(np.isnan(prepared.cut).mean()):.2%} of its points"
+
+
+def _prepared(job: Job) -> surface.Prepared | None:
+    """The measured map, where that is the whole surface."""
+    part = job.surface[0]
+    return surface.prepare(part, job.grid) if isinstance(part, Topography) and len(job.surface) == 1 else None
+
+
+def _measured(job: Job, prepared: surface.Prepared | None) -> statistics.Statistics | None:
     """The spectrum of a measured map at its own points, levelled and filled, its edges joined smoothly."""
-    parts = [part for part in job.surface if isinstance(part, Topography)]
-    if len(parts) != 1 or len(job.surface) != 1:
+    part = job.surface[0]
+    if prepared is None or not isinstance(part, Topography):
         return None
-    prepared = surface.prepare(parts[0], job.grid)
-    level = treatment.treat(prepared.cut, parts[0].detrend, "smooth")
+    level = treatment.treat(prepared.cut, part.detrend, "smooth")
     return statistics.describe(level.heights, prepared.size)

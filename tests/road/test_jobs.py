@@ -133,3 +133,79 @@ def test_the_verb_surface(road: Path, run_parcontact: "RunParcontact") -> None:
     refused = run_parcontact(["surface", "job.yaml", "--out", "road.doc"], ranks=0, cwd=road)
     assert refused.returncode == 2
     assert refused.stderr.startswith("parcontact: --out must end in .png, .pdf, .svg")
+
+
+# -- the grid of the map, and a map without a job ---------------------------------------------------------------------
+
+
+def grid_of(road: Path, grid: str, surface: str = "") -> jobs.Grid:
+    surface = surface or "{shape: topography, path: road.npy, unit: um, size: [1.0e-3, 2.0e-3]}"
+    text = f"grid: {grid}\nsurface: {surface}\n" + "".join(JOB.splitlines(True)[3:]).replace("{{", "{")
+    (road / "job.yaml").write_text(text.replace("}}", "}"))
+    return jobs.load(road / "job.yaml").grid
+
+
+@pytest.mark.parametrize(
+    ("grid", "points", "size"),
+    [
+        ("{points: from surface, size: from surface}", (POINTS, POINTS), (1e-3, 2e-3)),
+        ("{points: 64, size: from surface}", (64, 64), (1e-3, 2e-3)),
+        ("{points: from surface, size: [1.0e-3, 1.0e-3]}", (POINTS, POINTS // 2), (1e-3, 1e-3)),
+    ],
+)
+def test_the_grid_is_that_of_the_map(road: Path, grid: str, points: tuple[int, int], size: tuple[float, float]) -> None:
+    """All of it, or the points that the map has in the box that is given."""
+    found = grid_of(road, grid)
+    assert (found.points, found.size) == (points, size)
+
+
+def test_the_grid_of_a_mirrored_map_is_twice_as_long(road: Path) -> None:
+    surface = "{shape: topography, path: road.npy, unit: um, size: [1.0e-3, 1.0e-3], periodic: mirror}"
+    found = grid_of(road, "{points: from surface, size: from surface}", surface)
+    assert (found.points, found.size) == ((2 * POINTS, 2 * POINTS), (2e-3, 2e-3))
+
+
+@pytest.mark.parametrize(
+    ("surface", "sentence"),
+    [
+        ("{shape: flat}", "one measured map, shape: topography, is needed, and the surface has none"),
+        (
+            "{shape: topography, path: road.npy, size: [1, 1]}",
+            "road.npy says no unit of its heights: give unit: m | mm",
+        ),
+    ],
+)
+def test_a_grid_of_no_map_is_one_sentence(road: Path, surface: str, sentence: str) -> None:
+    """At the first key that asks for it."""
+    with pytest.raises(jobs.JobError) as failure:
+        grid_of(road, "{points: from surface, size: from surface}", surface)
+    (mistake,) = failure.value.mistakes
+    assert "job.yaml:1:16: grid.points and grid.size: from surface: " in mistake
+    assert sentence in mistake
+
+
+def test_an_array_has_points_but_no_size(road: Path) -> None:
+    job = {"surface": np.zeros((4, 6)), "material": {"model": "elastic", "shear_modulus": 1e6}, "history": []}
+    job |= {"history": [{"pressure": 1.0}], "grid": {"points": "from surface", "size": 1e-3}}
+    assert jobs.load(job).grid.points == (6, 4)
+    with pytest.raises(jobs.JobError, match="an array has points, but no size"):
+        jobs.load(job, {"grid.size": "from surface"})
+
+
+def test_a_map_without_a_job(road: Path, run_parcontact: "RunParcontact") -> None:
+    """What it is like, a picture, and a job to start from that loads, with the whole map; nothing is replaced."""
+    words = ["surface", "road.npy", "--set", "surface.unit=um", "--set", "surface.size=[1e-3, 1e-3]"]
+    done = run_parcontact([*words, "--job", "start/job.yaml"], ranks=2, cwd=road)
+    assert done.returncode == 0, done.stderr
+    for line in (r"size +0.001 x 0.001 m", r"points +192 x 192", r"pixel +5.208e-06 x 5.208e-06 m"):
+        assert re.search(f"^{line}$", done.stdout, re.MULTILINE)
+    for line in (r"missing +(2.\d+|1.9\d)%", r"rms slope +0.0", r"spectrum +waves of 0.001 to 1.042e-05 m"):
+        assert re.search(f"^{line}", done.stdout, re.MULTILINE)
+    assert matplotlib.image.imread(road / "road-surface.png").ndim == 3
+    found = jobs.load(road / "start/job.yaml")
+    assert (found.grid.points, found.grid.size) == ((POINTS, POINTS), (LENGTH, LENGTH))
+    assert run_parcontact([*words, "--job", "start/job.yaml"], cwd=road).returncode == 2
+    bare = run_parcontact(["surface", "road.npy"], cwd=road)
+    assert bare.returncode == 2
+    assert "says no unit of its heights" in bare.stderr
+    assert "--set surface.unit=um" in bare.stderr

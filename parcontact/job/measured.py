@@ -1,0 +1,61 @@
+"""`grid: {points: from surface, size: from surface}`: those of the measured map that is the surface."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import InputError
+from .mapping import is_array
+from .part import Context
+from .source import Mistake, Source
+from .topography import Topography
+from .values import FROM_SURFACE
+
+KEYS = ("points", "size")
+READER = EntryPoint("extent", "parcontact.road.extent:of", "")  # what reads maps; jobs that name none do without
+Extent = tuple[tuple[int, int], tuple[float, float] | None]
+
+
+def take_grid(source: Source, context: Context) -> None:
+    """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
+    grid = source.data.get("grid") if isinstance(source.data, dict) else None
+    wanted = [key for key in KEYS if isinstance(grid, dict) and grid.get(key) == FROM_SURFACE]
+    if not isinstance(grid, dict) or not wanted:
+        return
+    try:
+        points, size = _extent(source.data.get("surface"), None if "size" in wanted else grid.get("size"), context)
+        if size is None and "size" in wanted:
+            raise InputError("a measured map is needed; an array has points, but no size")
+        found = {"points": points, "size": size}
+        grid.update({key: list(found[key] or ()) for key in wanted})
+    except InputError as error:
+        names = " and ".join(f"grid.{key}" for key in wanted)
+        source.mistakes.append(Mistake(source.place(("grid", wanted[0])), f"{names}: {FROM_SURFACE}: {error}"))
+        source.broken.update(("grid", key) for key in wanted)
+
+
+def _extent(surface: Any, box: Any, context: Context) -> Extent:
+    """Points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
+    InputError."""
+    shapes = surface if isinstance(surface, list) else [surface]
+    arrays = [shape for shape in (_heights(shape) for shape in shapes) if is_array(shape)]
+    maps = [shape for shape in shapes if isinstance(shape, dict) and shape.get("shape") == "topography"]
+    if len(maps) + len(arrays) != 1:
+        raise InputError(f"one measured map, shape: topography, is needed, and the surface has {len(maps) or 'none'}")
+    if arrays:
+        if arrays[0].ndim != 2:
+            raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
+        return tuple(arrays[0].shape[::-1]), None
+    try:
+        part = Topography.model_validate(maps[0], context=context)
+    except ValidationError:
+        raise InputError("the surface has mistakes") from None
+    found: Extent = READER.load()(part, box)
+    return found
+
+
+def _heights(shape: Any) -> Any:
+    return shape.get("heights") if isinstance(shape, dict) else shape
