@@ -76,11 +76,24 @@ def test_the_table_of_contents_has_every_page() -> None:
 def test_pages_refer_to_pages(name: str) -> None:
     assert set(re.findall(r"\{doc\}`(\w+)`", texts.page(name, WRITERS))) <= set(PAGES)
     assert "{doc}" not in texts.plain(name, WRITERS)
+    assert ".. auto" not in texts.plain(name, WRITERS)
 
 
 def test_only_languages_that_are_run_or_output() -> None:
     known = {"python", "yaml", "sh", "toml", "text", "{eval-rst}"}
     assert {word for name in PAGES for word in re.findall(r"^```(\S+)$", texts.page(name, WRITERS), re.M)} <= known
+
+
+def test_the_page_on_python_is_text() -> None:
+    """Calls and docstrings of what it names, with all methods of a simulation, and only some of a material."""
+    text = texts.plain("python", WRITERS)
+    assert "## parcontact.Simulation(job, set=None, comm=None)\n\nA job, run from Python" in text
+    for method in ("steps()", "run(restart='auto', quiet=True)", "row", "restore(path, set=None, comm=None)"):
+        assert f"\n### {method}\n\n" in text
+    assert re.findall(r"^### (.*)", text.partition("python.parts.Material")[2], re.MULTILINE) == [
+        *("complex_modulus(omega)", "relaxation(t)", "creep(t)"),
+    ]
+    assert "{eval-rst}" not in text
 
 
 # -- keys ------------------------------------------------------------------------------------------------------------

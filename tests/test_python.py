@@ -207,6 +207,18 @@ def test_a_failed_step_is_a_run_error() -> None:
     assert run.row.step == 0
 
 
+def test_xarray_opens_the_maps(nowhere: Path) -> None:
+    """As the README says, with what scripts/setup installs: coordinates, units and values."""
+    xarray = pytest.importorskip("xarray")
+    run = pc.Simulation(JOB, {"output": {"directory": "out", "fields": ["pressure"], "every": 4}}, MPI.COMM_SELF)
+    run.run()
+    with xarray.open_dataset("out/fields.h5") as found:
+        assert found.pressure.dims == ("t", "y", "x")
+        assert found.pressure.attrs["units"] == "Pa"
+        assert np.array_equal(found.pressure[-1], run.field("pressure"))
+        assert found.x.values.tolist() == [1e-3 / 16 * i for i in range(16)]
+
+
 def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Measures and maps with units; no map is read before it is used, and the file is not kept open."""
     xarray = pytest.importorskip("xarray")

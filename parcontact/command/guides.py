@@ -34,10 +34,13 @@ def add_verbs(found: Verbs, parser: argparse.ArgumentParser) -> None:
 
 
 def manual(options: argparse.Namespace) -> int:
-    """Root alone, without MPI."""
+    """Root alone; without MPI but for the page on Python, which imports all that it tells of."""
+    from ..manual import texts
+
+    if texts.imports(options.page):
+        ranks.start()
     if not ranks.is_root():
         return DONE
-    from ..manual import texts
     from .completion import reference
 
     if options.open:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..errors import InputError
-from . import reference
+from . import docstrings, reference
 
 PAGES = Path(__file__).parent / "pages"
 SITE = Path(__file__).parents[2] / "out" / "manual" / "html"  # of a clone, by scripts/manual
@@ -20,6 +20,7 @@ MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
 FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
 Writers = Mapping[str, Callable[[], str]]
 OURS: Writers = {"keys": reference.keys}
+NOTHING: Writers = {"keys": str, "verbs": str}
 
 
 def names() -> list[str]:
@@ -45,9 +46,14 @@ def page(name: str, writers: Writers | None = None) -> str:
     return MARK.sub(lambda found: known[found.group(1)](), text)
 
 
+def imports(name: str) -> bool:
+    """Whether a page, to be read in a terminal, needs the functions that it tells of."""
+    return name in names() and docstrings.BLOCK.search(page(name, NOTHING)) is not None
+
+
 def plain(name: str, writers: Writers | None = None) -> str:
     """A page to be read in a terminal: without the marks of the web site."""
-    text = FENCE.sub("", page(name, writers))
+    text = FENCE.sub("", docstrings.written(page(name, writers)))
     text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
     text = re.sub(r"^\(.+\)=\n", "", text, flags=re.MULTILINE)
     return re.sub(r"\n{3,}", "\n\n", re.sub(r"^```\{(\w+)\}", r"```\1", text, flags=re.MULTILINE))
