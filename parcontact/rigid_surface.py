@@ -1,18 +1,19 @@
 """The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from . import job as jobs
-from .job import Grid, Job
+from .job import Grid, Job, meaning
 from .parallel.fft import FFT, Spectrum
 from .parallel.root import on_root
 from .parallel.slab import Array
 from .physics import heightfile
 from .physics.lowest import lowest
-from .physics.roughness import Roughness
+from .physics.roughness import Roughness, shortest_wave
 from .physics.shapes import Round, Shape
 from .physics.surface import Surface, single_wave
 
@@ -42,6 +43,32 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, list[str]]:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))
         slab.tally.hold(surface.waves)
     return surface, told
+
+
+def shortest_measured(job: Job, surface: Surface) -> float | None:
+    """Return the shortest wave [m] of a surface that is measured, by its spectrum on the grid; None of one whose waves
+    the job gives, or without slopes. Collective.
+
+    A map that does not go on across its edges is looked at through a window, as a jump or a crease has waves of any
+    length. The window adds up to a wave to the shortest, of which half is taken off again.
+    """
+    if surface.waves is None or not any(isinstance(part, meaning.READ) for part in job.surface):
+        return None
+    spectrum = surface.waves
+    maps = [part for part in job.surface if isinstance(part, jobs.Topography)]
+    windows = 2 if any(part.periodic == "mirror" for part in maps) else 1  # side by side
+    windowed = job.grid.boundary == "free" or bool(maps)
+    if windowed:
+        heights = replace(surface, shapes=()).heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
+        rows, columns = (
+            np.sin(np.pi * windows * (np.arange(n) + 0.5) / n) ** 2 if n > 1 else np.ones(1)
+            for n in (surface.slab.ny, surface.slab.nx)
+        )
+        heights *= rows[surface.slab.rows, None] * columns
+        spectrum = surface.fft.forward(heights)
+    found = shortest_wave(spectrum, surface.fft, job.grid.size)
+    waves = max(job.grid.size) / found - (0.5 * windows if windowed else 0.0)
+    return max(job.grid.size) / waves if waves >= 1.0 else None
 
 
 def highest_waves(job: Job) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .errors import InputError, RunError
-from .job import Job, OnOneMesh, meaning, size
+from .job import Job, OnOneMesh, advice, meaning, size
 from .job.timeline import Timeline
 from .parallel import rows
 from .parallel.slab import Array, Slab
@@ -20,7 +20,6 @@ from .scene import Frame
 SEAM = (
     2.0  # the jump across the edge of the box over the largest increment of neighbours inside: 1 if nothing is special
 )
-ROUGH = 0.5  # of the curvature over one cell that is gone over two: half of it, as in a wave of four cells
 ODD_CONTACTS = ("edge", "cells")  # at the edge of the box; a few cells wide
 FEW_CELLS = (
     0.15  # of the area of contact that counting cells takes too large: contacts of three cells, a circle of four
@@ -59,10 +58,13 @@ def of_surface(frame: Frame) -> list[str]:
 def _of_surface(frame: Frame) -> Iterator[str]:
     if frame.roughness and (text := meaning.steep(frame.roughness.rms_slope)) and text not in frame.job.warnings:
         yield text
+    seams: list[str] = []
     if any(isinstance(shape, OnOneMesh) for shape in frame.job.surface):
         heights = frame.surface.heights((0.0, 0.0), np.empty(frame.slab.shape, frame.dtype)).astype(np.float64)
         seams = list(_seams(frame, heights)) if frame.job.grid.boundary == "periodic" else []
-        yield from seams or _resolution(frame, heights)  # a seam has a curvature of its own
+        yield from seams
+    if frame.shortest is not None and not seams:  # a seam has waves of its own
+        yield from advice.measured(frame.job.grid, frame.shortest, frame.job.numerics.accuracy)
 
 
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------
@@ -78,13 +80,13 @@ def _seams(frame: Frame, heights: Array) -> Iterator[str]:
         if jump <= SEAM * inside:
             continue
         tilt = rise / length
-        advice = "cut it where it fits, or let it fade to its mean towards the edge"
+        remedy = "cut it where it fits, or let it fade to its mean towards the edge"
         if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside:
-            advice = f"it is tilted by {abs(tilt) * unit:.3g}: subtract its mean plane"
+            remedy = f"it is tilted by {abs(tilt) * unit:.3g}: subtract its mean plane"
         yield (
             f"surface: along {name} the heights jump by {jump * unit:.3g} m (rms) across the edge of the periodic box, "
             f"{_times(jump, inside)} the most between neighbours inside, and such a wall makes friction of its own; "
-            f"{advice}"
+            f"{remedy}"
         )
 
 
@@ -115,40 +117,6 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
     inside = float(rms[1 if first else 0 :].max(initial=0.0))
     rise, jump, most = slab.reduce([-float(steps[0].mean()) if first else 0.0], [at_edge, inside])
     return jump, most, rise
-
-
-# -- resolution of a file ---------------------------------------------------------------------------------------------
-
-
-def _resolution(frame: Frame, heights: Array) -> Iterator[str]:
-    """Second differences over one cell and over two are alike where a surface is resolved; only the upper half counts,
-    which comes into contact."""
-    slab = frame.slab
-    lost, all_of_it = 0.0, 0.0
-    mean = slab.sum(float(heights.sum()))[0] / slab.points
-    upper = heights > mean
-    for count, shifted in ((slab.nx, _shifted_x), (slab.ny, _shifted_y)):
-        if count < 8:
-            continue
-        fine = shifted(slab, heights, 1) - 2 * heights + shifted(slab, heights, -1)
-        coarse = (shifted(slab, heights, 2) - 2 * heights + shifted(slab, heights, -2)) / 4
-        lost += float(((fine - coarse)[upper] ** 2).sum())
-        all_of_it += float((fine[upper] ** 2).sum())
-    lost, all_of_it = slab.sum(lost, all_of_it)
-    if all_of_it and math.sqrt(lost / all_of_it) > ROUGH:
-        yield (
-            f"surface: {math.sqrt(lost / all_of_it):.0%} of the curvature of its upper half is in waves of less than 4 "
-            f"cells, the limit is {ROUGH:.0%}: contacts of single points carry the load; smooth the heights, or "
-            "interpolate them to a finer grid"
-        )
-
-
-def _shifted_x(slab: Slab, heights: Array, count: int) -> Array:
-    return np.roll(heights, count, axis=1)
-
-
-def _shifted_y(slab: Slab, heights: Array, count: int) -> Array:
-    return rows.roll(slab, heights, count, np.empty_like(heights))
 
 
 # -- contacts ---------------------------------------------------------------------------------------------------------

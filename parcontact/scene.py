@@ -30,7 +30,7 @@ from .physics.prony import Prony
 from .physics.roughness import Moments, moments
 from .physics.surface import Surface
 from .physics.units import Units
-from .rigid_surface import Heights, heights_of, make_surface
+from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
 from .solve.contact import ContactSolver
 from .solve.surround import grids_for
 
@@ -40,8 +40,9 @@ class Frame:
     """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
 
     `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
-    of a cell if it is flat); `size` and `prony` are the box and the relaxation function in the run's units (and
-    seconds); `told` says, on root, what was done to measured maps.
+    of a cell if it is flat); `shortest` [m] is the shortest wave of what is measured of it, None where nothing is;
+    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `told` says, on root,
+    what was done to measured maps.
     """
 
     job: Job
@@ -49,6 +50,7 @@ class Frame:
     fft: FFT
     surface: Surface
     roughness: Moments | None
+    shortest: float | None
     heights: Heights
     units: Units
     prony: Prony
@@ -131,12 +133,13 @@ def frame(job: Job, slab: Slab) -> Frame:
     fft = FFT(slab, dtype=job.numerics.map_type)
     surface, told = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
+    shortest = shortest_measured(job, surface)
     prony = relaxation_of(job)
     heights = heights_of(surface)
     units = Units.near(heights.span, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
     surface.rescale(units.height)
     scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    return Frame(job, slab, fft, surface, roughness, heights, units, scaled, told)
+    return Frame(job, slab, fft, surface, roughness, shortest, heights, units, scaled, told)
 
 
 def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -> Scene:

@@ -15,6 +15,7 @@ from parcontact import sanity, scene
 from parcontact.errors import InputError, RunError
 from parcontact.job import Job, JobError, load
 from parcontact.job import size as size_advice
+from parcontact.job.advice import cells_per_wave
 from parcontact.parallel.slab import Slab
 
 SMALL = """\
@@ -115,23 +116,22 @@ def test_a_tilt(tmp_path: Path) -> None:
 
 
 def test_a_file_that_does_not_resolve_itself(tmp_path: Path) -> None:
-    """White noise: the second difference is 1, -2, 1, what is left of it over two cells 1/4, 0, -1/2, 0, 1/4."""
+    """White noise has waves down to the diagonal of two cells: the shortest is that one, but for 1 % of the mean square
+    slope in the corners."""
     noise = 1e-7 * np.random.default_rng(1).standard_normal((256, 256))
     (text,) = of_file(tmp_path / "road.npy", noise)
-    assert "less than 4 cells, the limit is 50%" in text
-    found = re.search(r"([0-9]+)% of the curvature", text)
+    found = re.search(r"only ([0-9.]+) cells per shortest wave along x", text)
     assert found
-    share = math.sqrt((2 * 0.25**2 + 2 + 1.5**2) / 6)
-    assert float(found.group(1)) / 100 == pytest.approx(share, abs=0.03)
+    assert math.sqrt(2.0) < float(found.group(1)) < 1.1 * math.sqrt(2.0)
 
 
-@pytest.mark.parametrize("cells", [3.0, 3.9, 4.1, 6.0])
-def test_the_limit_of_resolution_is_four_cells(tmp_path: Path, cells: float) -> None:
-    """A single wave loses half of its second difference over two cells where it is four cells long."""
+@pytest.mark.parametrize(("cells", "accuracy"), [(4.0, 0.01), (7.8, 0.01), (8.2, 0.01), (4.0, 0.06), (4.4, 0.05)])
+def test_the_limit_of_resolution_is_that_of_rough_surfaces(tmp_path: Path, cells: float, accuracy: float) -> None:
+    """A single wave of so many cells, its length known to 0.5 %."""
     x = np.arange(400)
-    wave = np.cos(2 * np.pi * round(400 / cells) / 400 * x) * np.ones((8, 1))
-    found = [text for text in of_file(tmp_path / "road.npy", 1e-8 * wave) if "curvature" in text]
-    assert bool(found) == (cells < 4.0)
+    wave = 1e-8 * np.cos(2 * np.pi * round(400 / cells) / 400 * x) * np.ones((400, 1))
+    found = of_file(tmp_path / "road.npy", wave, numerics={"accuracy": accuracy})
+    assert bool(found) == (cells < cells_per_wave(accuracy))
 
 
 def test_a_contact_that_reaches_the_edge_of_the_box() -> None:
@@ -157,7 +157,7 @@ def test_contacts_of_a_few_cells() -> None:
 @pytest.mark.mpi
 def test_every_rank_says_the_same(comm: MPI.Intracomm, communicators: list[MPI.Intracomm], shared_path: Path) -> None:
     noise = 1e-8 * np.random.default_rng(1).standard_normal((48, 30))
-    for heights, words in ((rough_heights(48, 16.0)[:, :30], "jump"), (noise, "curvature")):
+    for heights, words in ((rough_heights(48, 16.0)[:, :30], "jump"), (noise, "per shortest wave")):
         if comm.rank == 0:
             np.save(shared_path / "road.npy", heights)
         comm.Barrier()

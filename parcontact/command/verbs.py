@@ -189,8 +189,7 @@ def surface(options: argparse.Namespace) -> int:
     world = ranks.start()
     from pathlib import Path
 
-    from .. import rigid_surface
-    from ..parallel.fft import FFT
+    from .. import sanity, scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..record import measured_maps, surfaces
@@ -204,9 +203,12 @@ def surface(options: argparse.Namespace) -> int:
     def act() -> list[str]:
         measured_maps.refuse_taken(options.start)
         job = measured_maps.load(given, options.set) if alone else _load(options, MPI.COMM_SELF)
-        slab = Slab(MPI.COMM_SELF, *job.grid.points)
-        made, told = rigid_surface.make_surface(job, FFT(slab))
-        lines = list(surfaces.describe(job, made.heights((0.0, 0.0), slab.empty()), told, picture))
+        base = scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))
+        doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
+        base.surface.rescale(1.0)
+        heights = base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype))
+        lines = list(surfaces.describe(job, heights, base.told, base.shortest, picture))
+        lines += [f"warning: {text}" for text in doubts]
         return [*lines, *measured_maps.start(job, given, options.start)] if alone else lines
 
     lines = on_root(world, act)

@@ -69,6 +69,19 @@ def _surface(grid: Grid, surface: tuple[Any, ...], accuracy: float) -> Iterator[
             )
 
 
+def measured(grid: Grid, wave: float, accuracy: float) -> Iterator[str]:
+    """Yield what to say of the shortest wave [m] of a measured surface."""
+    name, length, cell = max(_directions(grid), key=lambda direction: direction[2], default=("", 0.0, 0.0))
+    needed = cells_per_wave(accuracy)
+    if wave < needed * cell * (1 - SAME_LENGTH):
+        yield (
+            f"surface: only {wave / cell:.3g} cells per shortest wave along {name}, of {wave:.3g} m by the spectrum of "
+            f"the heights; for a resolved contact use at least {needed}: "
+            f"{math.ceil((1 - SAME_LENGTH) * needed * length / wave)} points{_price(grid, needed * cell / wave)}, to "
+            f"which a map is interpolated, or heights without waves below {needed * cell:.4g} m"
+        )
+
+
 def _price(grid: Grid, finer: float) -> str:
     """What so many times the points along each direction cost, when steps of a slide are as many times shorter."""
     more = finer ** sum(n > 1 for n in grid.points)

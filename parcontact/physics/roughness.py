@@ -18,6 +18,8 @@ from ..parallel.slab import Array
 from .convolution import wavenumbers
 from .lowest import rows_of
 
+BEYOND = 0.01  # of the mean square slope, to which friction is in proportion: waves that are shorter do not count
+BIN = 0.01  # of the logarithm of a wavenumber: a shortest wave is known to half of that
 EDGE = 1.0 - 1e-9  # wavenumbers equal to a limit up to round-off are taken as equal to it
 
 
@@ -127,10 +129,35 @@ class Moments:
 def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
     """m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = (3/8) <(laplace h)^2> of a map given by its transform, or by the lowest
     waves of it if there are no others; collective."""
-    rows, columns = rows_of(len(spectrum), fft.my), slice(spectrum.shape[1])
-    qx, qy = wavenumbers(fft, size)
-    q2 = np.hypot(qx[:, columns], qy[rows]) ** 2
-    power = fft.multiplicity[:, columns] * np.abs(spectrum) ** 2 / (fft.mx * fft.my) ** 2
-    power[q2 == 0.0] = 0.0
+    q, power = _powers(spectrum, fft, size)
+    q2 = q**2
     m0, m2, m4 = fft.slab.sum(*(float(np.sum(power * weight)) for weight in (1.0, q2 / 2, 3 * q2**2 / 8)))
     return Moments(m0, m2, m4)
+
+
+def shortest_wave(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> float:
+    """Return the length [m] of which waves that are shorter make BEYOND of the mean square slope at most, of a map that
+    is given as for `moments`; infinite of a flat one. Collective.
+
+    Of a rough surface it is the shortest wavelength or 3 % more, as the outermost ring of its waves has more than that.
+    """
+    q, power = _powers(spectrum, fft, size)
+    low = 2 * np.pi / max(size)
+    highest = np.pi * np.hypot(fft.mx / size[0], fft.my / size[1])
+    count = int(np.log(highest / low) / BIN) + 2
+    place = (np.log(np.maximum(q / low, 1.0)) / BIN).astype(np.intp)
+    slopes = np.array(fft.slab.sum(*np.bincount(place.ravel(), (power * q**2).ravel(), count).tolist()))
+    shorter = np.cumsum(slopes[::-1])[::-1]
+    if shorter[0] == 0.0:
+        return float("inf")
+    return float(2 * np.pi / low * np.exp(-BIN * (0.5 + np.flatnonzero(shorter > BEYOND * shorter[0])[-1])))
+
+
+def _powers(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> tuple[Array, Array]:
+    """Return this rank's wavenumbers, and the mean square height of each wave; that of the mean is 0."""
+    rows, columns = rows_of(len(spectrum), fft.my), slice(spectrum.shape[1])
+    qx, qy = wavenumbers(fft, size)
+    q = np.hypot(qx[:, columns], qy[rows])
+    power = fft.multiplicity[:, columns] * np.abs(spectrum) ** 2 / (fft.mx * fft.my) ** 2
+    power[q == 0.0] = 0.0
+    return q, power

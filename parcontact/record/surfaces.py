@@ -14,8 +14,10 @@ from . import files
 PICTURES = (".png", ".pdf", ".svg")
 
 
-def describe(job: Job, heights: Array, told: list[str], picture: Path) -> Iterator[str]:
+def describe(job: Job, heights: Array, told: list[str], shortest: float | None, picture: Path) -> Iterator[str]:
     """Draw the picture and say what the heights [m], shape (ny, nx), are like, line by line; root only.
+
+    `shortest` [m] is the shortest wave of a measured surface, None of others.
 
     Raises InputError and RunError.
     """
@@ -42,6 +44,9 @@ def describe(job: Job, heights: Array, told: list[str], picture: Path) -> Iterat
     yield f"spectrum       waves of {longest:.4g} to {shortest:.4g} m"
     known = found.hurst == found.hurst
     yield f"Hurst          {found.hurst:.3g}" if known else "Hurst          no self-affine range was found"
+    if shortest is not None:
+        cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
+        yield f"shortest wave  {shortest:.4g} m, {cells:.3g} cells"
     yield f"picture: {picture}"
 
 

@@ -88,7 +88,7 @@ class SteadySliding:
         finest, *coarser = nested.levels_of(base.slab, heights)
         self.levels = [Level(base.slab, base.fft, finest.heights)]
         self.levels += [Level(level.slab, FFT(level.slab, dtype=base.fft.dtype), level.heights) for level in coarser]
-        self._known = known_of(base.job, 0.0, True, None)
+        self._known = known_of(base, 0.0, True, None)
         self.contact: SteadyContact | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
         self.temperature, self._slow = math.nan, time_factor_of(base.job)
