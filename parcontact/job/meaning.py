@@ -16,9 +16,11 @@ from .sections import Grid
 from .surface import OnOneMesh, Rough, Sphere, Wave
 from .topography import RoughSpectrum, Topography
 
-STEEPEST = 1.0  # rms slope, and radius of a contact over that of its sphere: beyond, slopes are not small
+STEEP = 0.5  # rms slope: some tenths are small
+STEEPEST = 1.0  # radius of a contact over that of its sphere: beyond, slopes are not small
 SOFTEST, HARDEST = 1e3, 1e12  # Pa; shear moduli go from 1e3 (gels) to 5e11 (diamond)
 STRAIN = 1.0  # mean pressure over 2 G/(1 - nu): beyond, strains are not small
+LEAST = 1e-12  # of the modulus at once: a fluid keeps so much, for a quotient
 BEYOND = 100.0  # times slower or faster than all branches: nothing relaxes
 MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6, or unit: um in a topography"
 
@@ -42,10 +44,10 @@ def warnings(
 
 def steep(slope: float) -> str:
     """What to say of an rms slope, if it is too large."""
-    if slope <= STEEPEST:
+    if slope <= STEEP:
         return ""
     return (
-        f"surface: its rms slope is {slope:.3g}, and the theory is one of small slopes, well below {STEEPEST:g}: "
+        f"surface: its rms slope is {slope:.3g}, and the theory is one of small slopes, {STEEP:g} at most: "
         + MANY_UNITS
     )
 
@@ -99,22 +101,35 @@ def _mean(stage: Stage, load: float, grid: Grid) -> float:
 def _pressures(
     grid: Grid, material: Elastic | Zener, history: tuple[Stage, ...], initial: Initial, steady: Steady | None
 ) -> Iterator[str]:
-    modulus = contact_modulus(material)
-    loads = [
-        (
-            f"history.{index}.{stage.control}",
-            max(_mean(stage, load, grid) for load in (stage.load.start, stage.load.end)),
-        )
-        for index, stage in enumerate(history)
-    ]
-    loads.append(("initial.pressure", initial.pressure or 0.0))
-    loads.append(("steady.pressures", max((steady.pressures if steady else None) or (0.0,))))
-    key, pressure = max(loads, key=lambda load: load[1])
-    if pressure > STRAIN * modulus:
+    loads = [("initial.pressure", initial.pressure or 0.0, 0.0)]
+    loads.append(("steady.pressures", max((steady.pressures if steady else None) or (0.0,)), 0.0))
+    least, held = 0.0, 0.0
+    for index, stage in enumerate(history):
+        ends = [_mean(stage, load, grid) for load in (stage.load.start, stage.load.end)]
+        least, held = (least, held + stage.seconds) if min(ends) == least else (min(ends), stage.seconds)
+        loads += [(f"history.{index}.{stage.control}", *load) for load in ((max(ends), 0.0), (least, held))]
+    found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
+    strain, key, pressure, seconds = max(found)
+    if strain > STRAIN:
+        when = f" after {seconds:.3g} s under it" if seconds else ""
         yield (
-            f"{key}: a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are "
-            "far beyond linear theory; pressures and moduli are both in Pa"
+            f"{key}: a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {pressure / strain:.3g} Pa{when}, "
+            "where strains are far beyond linear theory; pressures and moduli are both in Pa"
         )
+
+
+def modulus_after(material: Elastic | Zener, seconds: float) -> float:
+    """Return a bound from above of a constant pressure over the strain that it has made after so long, as E* [Pa].
+
+    It is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t and the creep compliance J rises, so J(t) >= t/int_0^t E*.
+    """
+    body = getattr(material, "fitted", material)
+    modulus, slower = body.instant_modulus, getattr(body, "time_factor", 1.0)
+    for branch in getattr(body, "branches", ()):
+        ratio = seconds / (slower * branch.relaxation_time) if branch.relaxation_time else math.inf
+        kept = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
+        modulus -= (branch.instant_modulus - branch.long_modulus) * (1.0 - kept)
+    return 2.0 * max(modulus, body.long_modulus, LEAST * body.instant_modulus) / (1.0 - body.poisson)
 
 
 # -- relaxation -------------------------------------------------------------------------------------------------------
