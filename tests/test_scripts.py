@@ -33,6 +33,9 @@ SMALL = {
         r"(?s)double: operator calls +\d\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
         r"curve: the most of them +\d{2,3}[. ].*info.*in all.*planned.*each branch.*solve: speed of 2 ranks",
     ),
+    "coverage": Small(
+        ["--scenes", "3", "--from", "13"], r"(?s)3 of 3 scenes.*first half: 3 \| both .*written: ", (0, 1)
+    ),
     "check_plan": Small(
         ["--coarser", "4", "twelve branches, press and slide"], r"(?s)( [+-]0%.*){2}memory within", TIMED
     ),
