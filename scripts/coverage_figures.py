@@ -11,10 +11,11 @@ Line = dict[str, str]
 PARTS = ("solver", "time", "folded", "mesh")
 GOAL = 0.95  # of the scenes
 HALF = 0.5 * (1.0 - 1e-6)  # of the true error is what an estimate has to be at least, up to rounding
+ROUNDING = 1e-12  # of friction and of area: errors below it are none
 SECOND_RANGE = 200  # from this number on scenes were not looked at before
 QUANTITIES = {"friction": "friction", "area": "corrected area"}
 CLASSES = ("body", "surface", "boundary", "history", "cells")
-HEAD = "kept or told | told | estimate >= half of the error | median of estimate/error | 5 to 95 %"
+HEAD = "kept or told | told | of the others kept | estimate >= half of the error | estimate/error: median | 5 to 95 %"
 CELLS = (3.0, 4.0, 6.0, 8.0, 16.0)
 
 
@@ -57,7 +58,7 @@ def is_covered(line: Line, name: str) -> bool:
 
 def is_resolved(line: Line, name: str) -> bool:
     """Whether the true error is more than what the reference says of its own."""
-    return value(line, f"{name}_error") > max(value(line, f"{name}_resolution"), 1e-12 * value(line, f"{name}_true"))
+    return value(line, f"{name}_error") > max(value(line, f"{name}_resolution"), ROUNDING)
 
 
 def ratio(line: Line, name: str) -> float:
@@ -93,7 +94,7 @@ def _all(lines: list[Line], ran: list[Line]) -> Iterator[str]:
     seconds = sum(value(line, key) for line in ran for key in ("seconds", "reference_seconds"))
     yield f"{len(lines)} scenes, {len(lines) - len(ran)} without a result, {seconds / 60:.1f} CPU minutes\n"
     yield f"| scenes | of | {HEAD} |"
-    yield "|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|"
     first = [line for line in ran if _number(line) < SECOND_RANGE]
     second = [line for line in ran if _number(line) >= SECOND_RANGE]
     for title, some in (("first half", first), ("second half", second), ("all", ran)):
@@ -109,17 +110,23 @@ def _row(lines: list[Line], names: list[str]) -> str:
     def every(holds: Callable[[Line, str], bool]) -> float:
         return 100 * _share(lines, lambda line: all(holds(line, n) for n in names if n in known(line)))
 
-    told = 100 * _share(lines, lambda line: any(is_told(line, n) for n in names if n in known(line)))
+    silent = [line for line in lines if not any(is_told(line, n) for n in names if n in known(line))]
+    told = 100 * (1.0 - len(silent) / len(lines))
+    others = f"{100 * _share(silent, lambda line: all(is_kept(line, n) for n in names if n in known(line))):.1f} %"
     ratios = [ratio(line, n) for line in lines for n in names if n in known(line) and is_resolved(line, n)]
     low, middle, high = np.percentile(ratios, [5, 50, 95]) if ratios else [math.nan] * 3
-    return f"{every(is_kept):.1f} % | {told:.0f} % | {every(is_covered):.1f} % | {middle:.2g} | {low:.2g} to {high:.2g}"
+    kept, covered = every(is_kept), every(is_covered)
+    return (
+        f"{kept:.1f} % | {told:.0f} % | {others if silent else '-'} | {covered:.1f} % | {middle:.2g} "
+        f"| {low:.2g} to {high:.2g}"
+    )
 
 
 def _by_class(ran: list[Line], name: str) -> Iterator[str]:
     """Quantiles of each class."""
     yield f"\n## {QUANTITIES[name].capitalize()}, by class\n"
     yield f"| class | scenes | {HEAD} |"
-    yield "|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|"
     for key in CLASSES:
         groups: dict[str, list[Line]] = {}
         for line in ran:

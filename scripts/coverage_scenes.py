@@ -94,7 +94,7 @@ class _Draw:
         dice = self.dice
         self.history = dice.choices(list(HISTORIES), list(HISTORIES.values()))[0]
         self.surface = dice.choices(list(SURFACES), list(SURFACES.values()))[0]
-        free = {"sphere": 0.6, "cylinder": 0.2, "rough": 0.2, "measured": 0.15, "wave": 0.0}[self.surface]
+        free = {"sphere": 0.6, "cylinder": 0.0, "rough": 0.2, "measured": 0.15, "wave": 0.0}[self.surface]
         self.free = self.history != "steady start" and dice.random() < free
         self.points = self._points()
         self.size = decades(dice, -4, -2)
@@ -106,7 +106,7 @@ class _Draw:
 
     def sketch(self) -> Sketch:
         shapes, length, slope, radius = self._shapes()
-        speed = length / SECOND * decades(self.dice, *((-2, 2) if self.dice.random() < 0.8 else (-5, 5)))
+        speed = self._speed(length)
         area = self._area()
         stiffness = self._stiffness(speed / length if self.history in SLIDES else 1.0 / SECOND)
         pressure = stiffness * (
@@ -142,9 +142,9 @@ class _Draw:
     def _points(self) -> list[int]:
         dice = self.dice
         if self.surface in ("cylinder", "wave") and not self.free and dice.random() < 0.5:
-            return [dice.choice([48, 64, 96, 128]), 1]
+            return [dice.choice([64, 96, 128, 128]), 1]
         few = self.history in ("static", "steady", "rest")
-        n = dice.choice([32, 48, 64, 80, 96] if few else [32, 32, 40, 48, 64, 64])
+        n = dice.choice([32, 48, 64, 96, 96] if few else [32, 48, 64, 80, 96])
         return [n, n // 2] if dice.random() < 0.2 and self.surface in ("rough", "measured") else [n, n]
 
     def _elastic(self) -> Json:
@@ -157,7 +157,15 @@ class _Draw:
             for _ in range(dice.choice([1, 1, 2, 3, 5, 8, 12]))
         ]
         total = sum(branch["modulus"] for branch in branches)
-        return {"model": "zener", "modulus_inf": total * decades(dice, -3, 1), "branches": branches}
+        return {"model": "zener", "modulus_inf": total * decades(dice, -3, 0.5), "branches": branches}
+
+    def _speed(self, length: float) -> float:
+        """At which about a relaxation time passes while it slides so far; in every fourth scene anything."""
+        if self.body["model"] == "elastic" or self.dice.random() < 0.25:
+            return length / SECOND * decades(self.dice, -5, 5)
+        branches = self.body["branches"]
+        branch = self.dice.choices(branches, [b["modulus"] for b in branches])[0]
+        return float(length / branch["relaxation_time"] * decades(self.dice, -1.5, 1.0))
 
     def _stiffness(self, frequency: float) -> float:
         """|G| of a motion that is so fast [1/s]."""
@@ -220,7 +228,7 @@ class _Draw:
     def _area(self) -> float:
         dice = self.dice
         if self.surface in ("sphere", "cylinder") or self.free:
-            return decades(dice, -3, math.log10(0.1))
+            return decades(dice, -3 if dice.random() < 0.3 else -2, math.log10(0.1))
         return dice.uniform(0.5, 1.1) if dice.random() < 0.25 else decades(dice, -3, -0.3)
 
     def _radius(self, area: float) -> float:

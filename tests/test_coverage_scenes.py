@@ -1,20 +1,17 @@
 """Scenes of `scripts/coverage.py`: a reference on a finer grid is of the same surface."""
 
-import sys
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+from marching import load_script
 from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
 from parcontact.parallel.slab import Slab
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-
-coverage_scenes = import_module("coverage_scenes")
+coverage_scenes = load_script("coverage_scenes")
 
 
 def sampled(number: int, finer: int, directory: Path) -> np.ndarray:
