@@ -84,8 +84,22 @@ def test_friction_of_an_elastic_slide_is_0_within_its_error(velocity: Any) -> No
             assert row.errors.friction is not None
             assert row.errors.friction.mesh >= 1.0
     mean = np.mean([row.measures.friction for row in rows if row.errors])
-    assert summary.friction_within == pytest.approx(mean, rel=1e-3)  # and what the solver adds
+    assert summary.friction_within == pytest.approx(mean, rel=0.02)  # and what spots and waves add
     assert any(line.startswith("friction is 0 +- ") for line in summary.lines(0.01))
+
+
+def test_friction_across_the_slide_has_an_error() -> None:
+    """Ridges that slide along themselves have no friction; what the mesh makes is across, where the views differ."""
+    ridges = {"shape": "wave", "amplitude": 1e-6, "waves": [5, 0], "phase": 0.4}
+    slide = {"pressure": 2e4, "velocity": [0.0, 0.1], "distance": 1.25e-4, "cells_per_step": 1}
+    data = {**scene(8, ONE), "grid": {"points": [32, 8], "size": [1e-3, 2.5e-4]}, "surface": ridges, "history": [slide]}
+    _, rows = marched(Job.model_validate({**data, "numerics": {"tolerance": 1e-6}}))
+    judged = [row for row in rows if row.errors is not None and row.measures.friction > 1e-7]
+    assert judged
+    for row in judged:
+        assert row.errors is not None
+        assert row.errors.friction is not None
+        assert row.errors.friction.mesh > 0.9
 
 
 def test_small_friction_of_a_march() -> None:

@@ -12,9 +12,11 @@ solver: from the `complementarity` C of the certificate (see `solve.contact.Cert
 time: from how far the spots of contact, or the waves of the surface, pass in a step, and from the embedded pair (see
     `time_error`).
 folded: the bound of the branches without a map.
-mesh: of friction from the cells per shortest wave of a rough surface, or per radius of a contact spot, and at least
-    by how much the two views of friction differ, by the slopes of the rigid surface and of the body (`slopes`); of the
-    corrected area from the correction itself. Where there is a run on half the mesh, both from their difference to it.
+mesh: of friction by how much its two views differ, by the slopes of the rigid surface and of the body (`slopes`), and
+    what both have in common: from the cells per shortest wave of a rough surface, and per radius of the spots of
+    contact, which are small under small loads whatever the waves, less where many of them average it out, and where
+    little is open. Of the corrected area from the correction itself. Where there is a run on half the mesh, both from
+    their difference to it.
 
 Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
 wrong with pressures then counts more, by about the root of the ratio. Pressures that are wrong by the complementarity
@@ -23,11 +25,11 @@ was 0.05 to 0.7 of that. So small a friction may be wrong by more than all of it
 
 Friction of steady sliding is the dissipated power over load and velocity, a sum of squares: it does not vanish by
 cancellation. It is wrong in the same proportion as the pressures are, of which three numbers tell: the difference of
-the two views over the slope of the surface, the cells per shortest wave, and where spots of contact are a few cells
-wide, the correction of the area. Of 40 steady states on rough surfaces, with 2 to 8 cells per shortest wave and
-friction of 5e-4 to 0.5 of the slope, 96 % are wrong by at most twice the estimate, which is 3.8 times the error in the
-median. With less than 4 cells, and with maps on grids that do not have their shortest waves, both views may be wrong by
-the same amount: 5 to 50 % at 2 to 3 cells. What cells per wave make of marches is then added in full.
+the two views over the slope of the surface, cells per shortest wave, and cells per radius of a spot. Of 40 steady states
+on rough surfaces, with 2 to 8 cells per shortest wave and friction of 5e-4 to 0.5 of the slope, 95 % are wrong by at
+most twice the estimate, which is 5 times the error in the median. With less than 4 cells, and with maps on grids that do
+not have their shortest waves, both views may be wrong by the same amount: 5 to 50 % at 2 to 3 cells. What cells per wave
+make of marches is then added in full.
 """
 
 import math
@@ -50,10 +52,8 @@ CORRECTED_ORDER = 1.0  # of the corrected area
 EDGES, STRAIGHT_EDGES = 0.25, 3.0  # of the correction of the area; along edges that follow the grid
 SMALL_SPOTS = 0.6  # of the square of the correction, which is large where spots of contact are a few cells wide
 NOISE = 0.4  # of the slope of the surface, times the complementarity: tangential force where there is no friction
-WHOLE_CELLS, PARTS_OF_CELLS = 1.0, 0.5  # of the difference of the views; between cells much of it is averaged out
-SAME_PLACE = 1e-6  # relative: steps this near whole cells are such
-BY_ENERGY, BY_ENERGY_WAVES = 0.5, 0.2  # of the difference of the views, and of the mesh error of marches
-PRESSURES = 0.5  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
+BY_ENERGY, BY_ENERGY_WAVES = 0.5, 0.2  # of the difference of the views, and of what waves make, in steady sliding
+PRESSURES = 0.3  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
 FEW_WAVES = 6.0  # power of 4 cells over those of the shortest wave, with which that share rises to all of it
 ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
 AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
@@ -104,7 +104,7 @@ def estimate_steady(known: Known, seen: Seen, points: int) -> ErrorBudget:
     if seen.friction > 0.0:
         share = min(max(1.0, 4.0 / (known.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
         mesh = BY_ENERGY * seen.views_apart / max(seen.friction, PRESSURES * seen.slope)
-        mesh += share * _mesh_by_cells(known, seen, points) + seen.correction**3
+        mesh += share * _by_waves(known) + _by_spots(known, seen, points)
         solver = SOLVER_FRICTION * seen.complementarity / count_spots(known, seen, points) ** SPOTS_POWER
         friction = Parts(solver, 0.0, known.folded, mesh)
     return ErrorBudget(friction, replace(_area(known, seen, points), time=0.0))
@@ -114,17 +114,20 @@ def _friction(known: Known, seen: Seen, points: int) -> Parts:
     spots, steep = count_spots(known, seen, points), max(1.0, seen.slope / seen.friction)
     solver = SOLVER_FRICTION * seen.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
     noise = NOISE * max(seen.complementarity, ROUNDING) * seen.slope / seen.friction / math.sqrt(spots)
-    share = WHOLE_CELLS if abs(seen.slid - round(seen.slid)) <= SAME_PLACE * seen.slid else PARTS_OF_CELLS
-    mesh = max(_mesh_by_cells(known, seen, points), share * seen.views_apart / seen.friction)
+    mesh = seen.views_apart / seen.friction + _by_waves(known) + _by_spots(known, seen, points)
     return Parts(max(solver, noise), time_error(known, seen, points), known.folded, mesh)
 
 
-def _mesh_by_cells(known: Known, seen: Seen, points: int) -> float:
-    """Return the error of friction that cells per shortest wave make, or per radius of a contact spot."""
-    if known.cells_per_wave is not None:
-        return WAVES_FRICTION * (4.0 / known.cells_per_wave) ** WAVES_ORDER
+def _by_waves(known: Known) -> float:
+    """Return the error of friction that the cells per shortest wave make."""
+    return WAVES_FRICTION * (4.0 / known.cells_per_wave) ** WAVES_ORDER if known.cells_per_wave is not None else 0.0
+
+
+def _by_spots(known: Known, seen: Seen, points: int) -> float:
+    """Return the error of friction that the cells per radius of the spots of contact make."""
     radius = spot_radius(seen, points)
-    return min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
+    one = min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
+    return (1.0 - seen.area) * one / count_spots(known, seen, points) ** SPOTS_POWER
 
 
 def compared_with_half_mesh(

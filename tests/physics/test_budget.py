@@ -22,6 +22,12 @@ def spots(seen: Seen, points: int) -> float:
     return max(1.0, seen.area * points / (math.pi * min(spot_radius(seen, points), 4.0) ** 2))
 
 
+def by_spots(seen: Seen, points: int) -> float:
+    """What the cells per radius of the spots make, of the share that is open, averaged over the spots."""
+    one = 0.13 / spot_radius(seen, points) ** 2.3
+    return (1.0 - seen.area) * one / spots(seen, points) ** 0.25
+
+
 def test_parts_add_up() -> None:
     """A surface whose slope is its friction: the numbers of the module, at 8 cells per shortest wave."""
     budget = estimate(KNOWN, SEEN, 10_000)
@@ -31,7 +37,7 @@ def test_parts_add_up() -> None:
             1.1e-3 / spots(SEEN, 10_000) ** 0.25,
             1.7 * 4e-4 * (4e-4 / 7.2e-3) ** 0.25 * (1 - 0.9 * 0.1**2),
             1e-4,
-            0.05 * 2**-2.5,
+            0.05 * 2**-2.5 + by_spots(SEEN, 10_000),
         )
     )
     solver, time = 0.1 * 1e-3**0.7, 0.21 * 0.9 ** (1 / 3) * budget.friction.time
@@ -225,25 +231,42 @@ def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
     assert summary.lines(0.01)[-1].startswith(f"friction is 0 +- {budget.total * friction:.2g}: ")
 
 
-@pytest.mark.parametrize(("slid", "share"), [(2.0, 1.0), (2.5, 0.5)])
-def test_the_two_views_bound_the_mesh(slid: float, share: float) -> None:
-    """Friction by slopes and by energy that are 0.004 apart; half as much counts between cells, where it averages out.
-    Less than the cells per wave say does not count."""
-    seen = replace(SEEN, slid=slid, seconds=1e-3, views_apart=4e-3)
-    budgets = (estimate(KNOWN, each, 10_000).friction for each in (seen, replace(seen, views_apart=1e-6)))
+def test_the_two_views_bound_the_mesh() -> None:
+    """Friction by slopes and by energy that are 0.004 apart, beside what both have in common: cells per wave, and per
+    radius of the spots."""
+    seen = replace(SEEN, slid=2.5, seconds=1e-3, views_apart=4e-3)
+    budgets = (estimate(KNOWN, each, 10_000).friction for each in (seen, replace(seen, views_apart=0.0)))
     apart, alike = (budget.mesh for budget in budgets if budget)
-    assert apart == pytest.approx(share * 4e-3 / 0.02)
-    assert alike == pytest.approx(0.05 * 2**-2.5)
+    assert alike == pytest.approx(0.05 * 2**-2.5 + by_spots(SEEN, 10_000))
+    assert apart - alike == pytest.approx(4e-3 / 0.02)
+
+
+def test_small_spots_of_long_waves_have_an_error() -> None:
+    """Spots of a radius of 1.5 cells on waves of 16 cells: it was 6 % where cells per wave alone said 0.2 %. Many of
+    them average it out, and a contact without edges has none."""
+    few = replace(SEEN, area=0.0035, corrected=0.0035 * (1.0 - 0.118 * 8.0 / math.pi / 1.5))
+    known = replace(KNOWN, cells_per_wave=16.0)
+    one, many, full = (
+        estimate(known, seen, points).friction
+        for seen, points in ((few, 2_000), (few, 200_000), (replace(SEEN, area=1.0, corrected=1.0), 2_000))
+    )
+    assert one is not None
+    assert many is not None
+    assert full is not None
+    assert one.mesh > 0.03
+    assert full.mesh == pytest.approx(0.05 * 4**-2.5)
+    assert many.mesh - full.mesh == pytest.approx((one.mesh - full.mesh) / 100**0.25, rel=0.01)
 
 
 def test_steady_friction_is_by_energy() -> None:
-    """Half of the difference of the views over half the slope, where friction is less, a fifth of what cells make in a
-    march, the cube of the correction of the area; no error of time, no cancellation."""
+    """Half of the difference of the views over a third of the slope, where friction is less, a fifth of what waves make
+    in a march, and what spots do; no error of time, no cancellation."""
     seen = replace(SEEN, slope=0.2, views_apart=4e-3)
     budget = estimate_steady(replace(KNOWN, folded=0.0), seen, 10_000)
     assert budget.friction is not None
-    solver, edges = 1.1e-3 / spots(seen, 10_000) ** 0.25, (0.005 / 0.095) ** 3
-    assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, 0.5 * 0.04 + 0.2 * 0.05 * 2**-2.5 + edges))
+    solver = 1.1e-3 / spots(seen, 10_000) ** 0.25
+    mesh = 0.5 * 4e-3 / (0.3 * 0.2) + 0.2 * 0.05 * 2**-2.5 + by_spots(seen, 10_000)
+    assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, mesh))
     assert (budget.area.time, budget.area.mesh) == pytest.approx((0.0, MESH))
     assert estimate_steady(KNOWN, replace(seen, friction=0.0), 10_000).friction is None
 
