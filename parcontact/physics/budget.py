@@ -25,11 +25,11 @@ was 0.05 to 0.7 of that. So small a friction may be wrong by more than all of it
 
 Friction of steady sliding is the dissipated power over load and velocity, a sum of squares: it does not vanish by
 cancellation. It is wrong in the same proportion as the pressures are, of which three numbers tell: the difference of
-the two views over the slope of the surface, cells per shortest wave, and cells per radius of a spot. Of 40 steady states
-on rough surfaces, with 2 to 8 cells per shortest wave and friction of 5e-4 to 0.5 of the slope, 95 % are wrong by at
-most twice the estimate, which is 5 times the error in the median. With less than 4 cells, and with maps on grids that do
-not have their shortest waves, both views may be wrong by the same amount: 5 to 50 % at 2 to 3 cells. What cells per wave
-make of marches is then added in full.
+the two views over the slope of the surface, cells per shortest wave, and cells per radius of a spot. Of 40 steady
+states on rough surfaces, with 2 to 8 cells per shortest wave and friction of 5e-4 to 0.5 of the slope, 95 % are wrong
+by at most twice the estimate, which is 5 times the error in the median. With less than 4 cells, and with maps on grids
+that do not have their shortest waves, both views may be wrong by the same amount: 5 to 50 % at 2 to 3 cells. What cells
+per wave make of marches is then added in full.
 """
 
 import math
