@@ -3,13 +3,14 @@
 
     .venv/bin/python scripts/fuzz_jobs.py [--jobs 2000] [--seed 0] [--from 0] [--processes 60]
 
-A third of the jobs are texts with characters changed, cut, doubled or put in; a third sound jobs with some values
-changed to extreme ones or to values of another kind; a third sound jobs with a surface or a job file that is damaged,
-no regular file, or leads elsewhere. All are driven in this process: read, described, planned, built, and marched a few
-steps. Some are run as whole processes too, on one rank and on two. Counted as faults: exceptions other than those that
-say a sentence, more than 3 s of CPU time to refuse, files left after a refusal, results that are not finite, and more
-than 1 GB. Each is printed with its number; `--from NUMBER --jobs 1` with the same seed makes it again. Ends with 0 if
-there are none. Crashes inside the HDF5 library, which no caller can catch, are counted apart.
+A quarter of the jobs are texts with characters changed, cut, doubled or put in; a quarter sound jobs with some values
+changed to extreme ones or to values of another kind; a quarter sound jobs with a surface or a job file that is damaged,
+no regular file, or leads elsewhere; a quarter measured maps that are damaged, of other types, or of odd lengths. All
+are driven in this process: read, described, planned, built, and marched a few steps. Some are run as whole processes
+too, on one rank and on two. Counted as faults: exceptions other than those that say a sentence, more than 3 s of CPU
+time to refuse, files left after a refusal, results that are not finite, and more than 1 GB. Each is printed with its
+number; `--from NUMBER --jobs 1` with the same seed makes it again. Ends with 0 if there are none. Crashes inside the
+HDF5 library, which no caller can catch, are counted apart.
 """
 
 import argparse

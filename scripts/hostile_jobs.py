@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 import yaml
+from SurfaceTopography import Topography
 
 from parcontact.job import yamltext
 
@@ -63,7 +64,7 @@ BOMB = "\n".join(["b0: &b0 [x]", *(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 9)
 
 def write_job(dice: Random, directory: Path) -> Path:
     """A job file somewhere in a directory, and what it needs."""
-    make = dice.choice([changed_text, changed_values, changed_file])
+    make = dice.choice([changed_text, changed_values, changed_file, changed_map])
     return make(dice, directory)
 
 
@@ -160,6 +161,37 @@ def changed_file(dice: Random, directory: Path) -> Path:
     if dice.random() < 0.5:
         damage(dice, path)
     return job
+
+
+def changed_map(dice: Random, directory: Path) -> Path:
+    """A measured map that is damaged, of another type, with odd positions or lengths, or much larger than the box."""
+    kind = dice.choice(["npy", "xyz", "x3p", "gwy"])
+    path, step = directory / f"road.{kind}", 1e-4
+    part: dict[str, Any] = {"shape": "topography", "path": path.name}
+    heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((16, 16))
+    if kind == "npy":
+        part |= {"unit": "m", "size": [16 * step, 16 * step]}
+        types = (heights * 1j, heights > 0.0, heights.astype("M8[s]"), heights.view([("z", "f8")]), heights * 1e-302)
+        if dice.random() < 0.2:  # more than any memory holds
+            with path.open("wb") as file:
+                shape = (10 ** dice.choice([6, 9, 18]), 10**6)
+                np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        else:
+            np.save(path, dice.choice([heights, *types]))
+    elif kind == "xyz":
+        part |= {"unit": "m"}
+        y, x = np.indices(heights.shape)
+        table = np.stack([x.ravel() * step, y.ravel() * step, heights.ravel()], axis=1)
+        table[dice.randrange(len(table)), dice.randrange(3)] = dice.choice([np.inf, np.nan, 10.0, -1e9, 1e300, 1e-300])
+        np.savetxt(path, table)
+    else:
+        size = dice.choice([16 * step, 16 * step, 0.0, np.nan, np.inf, 1e-300])
+        made = Topography(heights, (16 * step, size), unit="m")
+        (made.to_x3p if kind == "x3p" else made.to_gwy)(str(path))
+    if dice.random() < 0.3:
+        damage(dice, path)
+    size = dice.choice([1e-3, 1e-3, 1e-6, 1e-300, [1e-3, 1e-6]])
+    return _write(directory, yamltext.dump({**BASES[0], "surface": part, "grid": {"points": 16, "size": size}}))
 
 
 def write_heights(path: Path, heights: Any) -> None:
