@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import npyfile
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
@@ -15,7 +16,6 @@ Values = NDArray[Any]  # as they stand in the file
 LINE_PER_NUMBER, LINE_MORE = 64, 100_000  # characters of a line of text, at most, and of its comments
 MANY_TIMES = 4  # as many rows as the grid has: then no more are counted
 MAX_LINKS = 30  # from a name in an HDF5 file to what it means
-HEADER_BYTES = 1_000_000  # of a .npy file
 LOWEST, HIGHEST = 1e-70, 1e70  # of the largest height: its fourth power is a number of double precision
 
 
@@ -46,21 +46,19 @@ def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
     """This rank's rows, and what is wrong with them."""
     try:
         rows = _rows(path, dataset, slab)
+        npyfile.refuse_no_numbers(path, rows.dtype)
     except InputError as error:
         return np.empty(0), str(error)
     except Exception as error:  # numpy reads a header as Python; every rank must learn of it, whatever it is
         number = getattr(error, "errno", None)
         reason = os.strerror(number) if number else str(error).partition("\n")[0]
         return np.empty(0), f"{path} cannot be read: {reason}"
-    if rows.dtype.kind not in "iuf":
-        return np.empty(0), f"{path} holds values of type {rows.dtype}, which are no heights"
     return rows, ""
 
 
 def _rows(path: Path, dataset: str, slab: Slab) -> Values:
     if path.suffix == ".npy":
-        _refuse_long_header(path)
-        whole = np.lib.format.open_memmap(path, mode="r")
+        whole = npyfile.open_numbers(path)
         _check(path, whole.shape, slab)
         return whole[slab.rows]
     if path.suffix == ".h5":
@@ -74,14 +72,6 @@ def _rows(path: Path, dataset: str, slab: Slab) -> Values:
             _check(path, found.shape, slab)
             return np.asarray(found[slab.rows])
     return _text(path, slab)
-
-
-def _refuse_long_header(path: Path) -> None:
-    """numpy reads as much of a header as the file claims to have."""
-    with path.open("rb") as file:
-        start = file.read(12)
-    if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:
-        raise InputError(f"{path} cannot be read: its header claims to be larger than {HEADER_BYTES / 1e6:g} MB")
 
 
 def _refuse_elsewhere(path: Path, file: h5py.File, name: str) -> None:

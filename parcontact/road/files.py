@@ -5,11 +5,11 @@ Heights point up, out of the road: what sticks out touches first.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import npyfile
 from ..errors import InputError
 from ..parallel.slab import Array
 
@@ -73,19 +73,11 @@ def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Ma
         return _positions(path, np.loadtxt(path, ndmin=2, dtype=np.float64), UNITS[unit])
     if size is None:
         raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
-    values = _numpy(path) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
+    values = npyfile.open_numbers(path) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
     masked = np.ma.masked_invalid(np.asarray(values, dtype=np.float64))
     if masked.ndim != 2:
         raise InputError(f"{path} has {masked.ndim} dimensions; a map of two was expected")
     return Map(masked.filled(np.nan) * UNITS[unit], size)
-
-
-def _numpy(path: Path) -> NDArray[Any]:
-    """Opened, not read: what a header claims may be more than the file has, or than the memory holds."""
-    values = np.lib.format.open_memmap(path, mode="r")
-    if values.dtype.kind not in "iuf":
-        raise InputError(f"{path} holds values of type {values.dtype}, which are no heights; save it as float64")
-    return values
 
 
 def _positions(path: Path, table: Array, unit: float) -> Map:

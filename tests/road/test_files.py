@@ -121,6 +121,15 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
     assert "\n" not in str(failure.value)
 
 
+def test_a_header_of_gigabytes(tmp_path: Path) -> None:
+    """In a file without so many bytes on the disk: it is not read."""
+    with (tmp_path / "road.npy").open("wb") as file:
+        file.write(b"\x93NUMPY\x02\x00\xff\xff\xff\xe0")
+        file.truncate(3_900_000_000)
+    with pytest.raises(InputError, match="its header claims to be larger than 1 MB"):
+        files.read(tmp_path / "road.npy", "m", SIZE, None)
+
+
 @pytest.mark.parametrize("ending", ["x3p", "gwy", "nc"])
 def test_half_a_file(tmp_path: Path, ending: str) -> None:
     """Whatever its reader raises."""
