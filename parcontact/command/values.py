@@ -34,6 +34,14 @@ def counts(text: str) -> tuple[int, ...]:
     return tuple(count(part) for part in text.split(","))
 
 
+def instant(text: str) -> str:
+    """A step, as digits, or a time as the text of a number."""
+    with suppress(ValueError):
+        if 0.0 <= float(text) < float("inf"):
+            return text.strip()
+    raise argparse.ArgumentTypeError(f"must be a step, as a whole number, or a time [s], got {text!r}")
+
+
 def names(text: str) -> tuple[str, ...]:
     return tuple(filter(None, (part.strip() for part in text.split(","))))
 

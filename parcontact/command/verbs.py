@@ -231,7 +231,7 @@ def plot(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..record import plots
 
-    names = ("format", "panels", "over", "log", "compare", "movie", "out")
+    names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
     wanted = plots.Options(**{name: getattr(options, name) for name in names})
     pictures = on_root(world, lambda: plots.plot(options.directories, wanted))
     if world.rank == 0:

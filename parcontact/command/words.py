@@ -192,8 +192,12 @@ def _plot_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--panels", metavar="NAME,...", type=values.names, default=(), help=text)
     text = "what is along the x axis (default: as the job suggests)"
     parser.add_argument("--over", choices=("time", "distance", "velocity", "load"), default="", help=text)
-    parser.add_argument("--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y or x,y")
+    parser.add_argument(
+        "--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y, x,y or none"
+    )
     parser.add_argument("--compare", action="store_true", help="several directories in one picture, comparison.png")
     text = "a movie of this map over its saved instants instead (GIF): pressure, displacement, gap or height"
     parser.add_argument("--movie", metavar="FIELD", default="", help=text)
+    text = "draw the maps saved after this step (a whole number), or nearest to this time [s]; default: the last ones"
+    parser.add_argument("--at", metavar="TIME|STEP", type=values.instant, help=text)
     parser.add_argument("--out", metavar="FILE", type=Path, help="the picture (default: picture.png in the directory)")

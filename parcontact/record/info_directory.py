@@ -91,7 +91,9 @@ def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
         errors = {name: slide.largest(columns[name]) for name in slide.ERRORS if name in columns}
         if errors:
             told = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
-            yield f"  largest estimated errors of the curve: {told}"
+            numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
+            asked = f"; asked for: {100 * numerics['accuracy']:.3g} %" if "accuracy" in numerics else ""
+            yield f"  largest estimated errors of the curve: {told}{asked}"
         yield from (f"  warning: {text}" for text in warnings_of(directory / curve_points.LOG))
 
 

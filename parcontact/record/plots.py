@@ -31,7 +31,8 @@ LINE = 68  # letters of a title
 
 @dataclass(frozen=True)
 class Options:
-    """What is asked for beyond the directories; '' and () leave it to what they hold. `out` is a file."""
+    """What is asked for beyond the directories; '' and () leave it to what they hold. `out` is a file, `at` a step
+    or a time [s], whose maps are drawn."""
 
     format: str = ""
     panels: Sequence[str] = ()
@@ -39,6 +40,7 @@ class Options:
     log: Sequence[str] = ()
     compare: bool = False
     movie: str = ""
+    at: str | None = None
     out: Path | None = None
 
 
@@ -51,8 +53,10 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
         raise InputError("--out names one picture: give one directory, or --compare several in one")
     if unknown := [name for name in options.panels if name not in PANELS]:
         raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(PANELS)}")
-    if unknown := [name for name in options.log if name not in ("x", "y")]:
-        raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y or x,y")
+    if unknown := [name for name in options.log if name not in ("x", "y", "none")]:
+        raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y, x,y or none")
+    if options.at and (options.movie or options.compare):
+        raise InputError("--at chooses the maps of one picture, and goes with neither --movie nor --compare")
     with rc_context(style.RC):
         if options.movie:
             return [_movie(directory, options) for directory in directories]
@@ -103,7 +107,9 @@ def _picture(directory: Path, options: Options) -> Figure:
         if options.over == "velocity" and not (directory / steady.TABLE).is_file():
             histories.refuse_one_velocity(run)
         found = _chosen(histories.charts(run, options.over), options)
-        groups = [_panels(found, options), maps(run) if _wanted("maps", options) else []]
+        groups = [_panels(found, options), maps(run, options.at or "") if _wanted("maps", options) else []]
+    elif options.at:
+        raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
     if (directory / steady.TABLE).is_file() and _wanted("steady", options):
         title = title if groups else _wrapped(steady.title(directory))
         groups.insert(1, _steady(directory, options))

@@ -67,8 +67,10 @@ class Chart:
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     """Draw a chart; `log` names the axes of logarithmic scale."""
-    log_x, log_y = chart.log_x or "x" in log, "y" in log
-    xs, ys = ([_shown(one.x, log_x) for one in chart.series], [_shown(one.y, log_y) for one in chart.series])
+    log_x, log_y = "none" not in log and (chart.log_x or "x" in log), "y" in log
+    xs = [_shown(one.x, log_x) for one in chart.series]
+    there = [np.where(np.isfinite(x), one.y, np.nan) for x, one in zip(xs, chart.series, strict=True)]
+    ys = [_shown(y, log_y) for y in there]
     highest = max(map(_highest, ys))
     top = _below_spike(xs, ys) if chart.spikes and not (chart.peak or log_x or log_y) else math.inf
     x_unit, xs = (chart.x.unit, xs) if log_x else units.scaled(chart.x.unit, *xs)  # powers of ten need no prefix
@@ -234,7 +236,8 @@ def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
             ]
             key = chart.key, chart.x, chart.y
             known = found.get(key, replace(chart, series=(), stages=(), peak=False, legend_title=""))
-            found[key] = replace(known, series=(*known.series, *lines), spikes=known.spikes and chart.spikes)
+            spikes, log_x = known.spikes and chart.spikes, known.log_x and chart.log_x
+            found[key] = replace(known, series=(*known.series, *lines), spikes=spikes, log_x=log_x)
     return list(found.values())
 
 

@@ -14,7 +14,8 @@ from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 from .run import Run
 
-EARLY = 0.02  # of the time or distance: where half of the steps are made in it, the axis is logarithmic
+EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
+FEW_ROWS = 8
 OVER = ("time", "distance", "velocity", "load")
 
 
@@ -27,12 +28,6 @@ class Abscissa:
     rows: NDArray[np.intp]
     stages: Sequence[tuple[str, float, float]] = ()
     marked: bool = False
-
-    @property
-    def grows(self) -> bool:
-        """Whether steps grow so much that a picture of even scale shows few of them."""
-        values = self.values[self.values > 0.0]
-        return not self.marked and values.size > 2 and bool(np.median(values) < EARLY * values.max())
 
     def series(self, values: Array, name: str = "", number: int = 0) -> Series:
         look = {
@@ -48,9 +43,16 @@ def charts(run: Run, over: str = "") -> list[Chart]:
     if not run.curves:
         return []
     along = _abscissa(run, over)
-    changes: dict[str, Any] = {"stages": along.stages, "spikes": not along.marked, "log_x": along.grows}
+    log = along.axis.unit == "s" and _steps_grow(along.values)
+    changes: dict[str, Any] = {"stages": along.stages, "spikes": not along.marked, "log_x": log}
     found = [replace(chart, **changes, named=number == 0) for number, chart in enumerate(_charts(run, along))]
     return found if along.marked else [_beside_theory(chart, run) for chart in found]
+
+
+def _steps_grow(times: Array) -> bool:
+    """Whether most rows are so early that only a logarithmic axis tells them apart."""
+    later = times[times > 0.0]
+    return later.size > FEW_ROWS and bool(np.median(later) < EARLY * later[-1]) and bool(later[0] < EARLY * later[-1])
 
 
 def _beside_theory(chart: Chart, run: Run) -> Chart:

@@ -28,7 +28,7 @@ class Curve:
 def _chosen(run: Run, fields: Fields) -> list[tuple[int, str]]:
     """Some of the saved instants, evenly, and what tells them apart."""
     found = []
-    for index in sorted({fields.saved[int(k)] for k in np.linspace(0, len(fields.saved) - 1, INSTANTS)}):
+    for index in sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)}):
         _, unit, load = run.load
         time = fields.file["t"][index]
         at = np.flatnonzero(run.column("step") == fields.steps[index])

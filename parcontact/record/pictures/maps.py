@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 
+from ...errors import InputError
 from ...job import Cylinder, Sphere
 from ...parallel.slab import Array
 from . import lines, units
@@ -33,12 +34,17 @@ LOOKS = {
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
 
 
-def maps(run: Run) -> list[Panel]:
-    """Panels of the last saved instant; none if nothing was saved."""
+def maps(run: Run, at: str = "") -> list[Panel]:
+    """Panels of the last saved instant, or of the one that is asked for; none if nothing was saved. Raises InputError
+    where nothing is saved at the instant that is asked for."""
     try:
         with h5py.File(run.directory / "fields.h5", "r", locking=False) as file:
-            return list(_panels(run, Fields(file)))
+            return list(_panels(run, Fields(file, at)))
     except (OSError, KeyError):
+        if at:
+            raise InputError(
+                f"--at {at}: {run.directory} holds no maps; output: {{fields: [...]}} saves them"
+            ) from None
         return []
 
 
@@ -54,7 +60,7 @@ def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
     rounds = [shape for shape in run.job.surface if isinstance(shape, Sphere | Cylinder)]
     if pressure is not None and len(run.job.surface) == 1 and rounds:
         yield lines.profiles(run, fields, rounds[0])
-    time = float(fields.file["t"][fields.saved[-1]])
+    time = float(fields.times[fields.shown[-1]])
     when = f" at {units.text(time, 's', 4)}" if run.lasts else ""
     window = _window(pressure)
     beside = displacement if gap is None else None  # one of both says enough

@@ -21,6 +21,7 @@ MEASURED = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
     *("mean_gap", "max_pressure", "work", "stored", "dissipated"),
 )
+NEAREST = 3  # steps with maps that a message names
 VISCOUS = "friction_viscous"  # what an interface is not part of; in the table of a run with one
 
 
@@ -102,18 +103,37 @@ class Run:
 
 
 class Fields:
-    """The saved maps of a run."""
+    """The saved maps of a run. `shown` are the instants to draw: the one that was asked for, else all.
 
-    def __init__(self, file: h5py.File) -> None:
+    `at` is a step, as a whole number, or a time [s]: of a step the maps must be saved, of a time they are the nearest.
+    """
+
+    def __init__(self, file: h5py.File, at: str = "") -> None:
         self.file = file
         self.steps: NDArray[np.int64] = file["step"][...]
         self.x, self.y = file["x"][...], file["y"][...]
-        self.saved = [k for k, t in enumerate(file["t"][...]) if not np.isnan(t)]
+        self.times: Array = file["t"][...]
+        self.saved = [k for k, t in enumerate(self.times) if not np.isnan(t)]
+        self.shown = [self._index(at)] if at else self.saved
 
     def last(self, name: str) -> Array | None:
-        """The newest map of a name, if it was saved."""
-        field = self.file[name][self.saved[-1]] if name in self.file and self.saved else None
+        """The newest map of a name among those that are shown, if it was saved."""
+        field = self.file[name][self.shown[-1]] if name in self.file and self.shown else None
         return field if field is not None and np.isfinite(field).all() else None
+
+    def _index(self, at: str) -> int:
+        """Raises InputError where no map is saved then."""
+        if not self.saved:
+            raise InputError(f"--at {at}: no map is saved yet")
+        steps, times = self.steps[self.saved], self.times[self.saved]
+        if at.isdecimal():
+            if int(at) in steps:
+                return self.saved[int(np.flatnonzero(steps == int(at))[0])]
+            near = ", ".join(map(str, sorted(steps[np.argsort(np.abs(steps - int(at)))[:NEAREST]])))
+            raise InputError(f"--at {at}: no map is saved after step {at}; the nearest steps with maps are {near}")
+        if not times[0] <= float(at) <= times[-1]:
+            raise InputError(f"--at {at}: maps are saved from {times[0]:g} to {times[-1]:g} s")
+        return self.saved[int(np.argmin(np.abs(times - float(at))))]
 
 
 def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
