@@ -5,11 +5,12 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from .. import progress
 from ..job import Job
 from .sample import Sample, StageCost
 
@@ -18,14 +19,14 @@ MARKS = ("OMPI_", "PMIX_", "PRTE_", "PMI_")  # what MPI has left in the environm
 MAX_SECONDS_LATE = 60.0  # beyond three times those that a trial is given
 
 
-def samples(job: Job, words: Sequence[str], ranks: Iterable[int], seconds: float) -> Iterator[Sample]:
+def samples(job: Job, words: Sequence[str], ranks: Sequence[int], seconds: float) -> Iterator[Sample]:
     """Samples of the job that was tried here on some numbers of ranks, as far as they can be had.
 
     `words` name the whole job and change it; all try it on the grid on which it was tried here: only so can times be
     compared.
     """
     words = [*words, "--seconds", repr(seconds), "--sample-points", ",".join(map(str, job.grid.points))]
-    for count in ranks:
+    for count in progress.shown(ranks, "trying the job on more ranks", "number of ranks"):
         with TemporaryDirectory() as directory:
             found = _attempt(job, words, count, Path(directory, "sample"), seconds)
         if found:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from .. import progress
 from ..job import Job
 from ..parallel.slab import Slab
 from ..record import wisdom
@@ -60,7 +61,11 @@ def only_steady_states(job: Job) -> tuple[Job, list[str]]:
 
 def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float, found: list[Costs]) -> Iterator[str]:
     """What the steps, or the steady states, of a job cost; collective."""
-    seen = try_job(job, slab, wanted.seconds, started)
+    bar = progress.Bar(1, f"trying the job for some {wanted.seconds:g} s", "trial", slab.root)
+    try:
+        seen = try_job(job, slab, wanted.seconds, started)
+    finally:
+        bar.close()
     if seen is None:
         yield "too large to be tried here: its time is unknown"
         return

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from PIL import Image
 
+from .. import progress
 from ..record import hdf5
 from ..record.pictures import units
 from ..record.pictures.frames import Frames
@@ -52,7 +53,7 @@ def _browser(file: h5py.File, name: str, labels: Labels) -> Browser:
     with rc_context(RC):
         frames = Frames(file, name, list(labels), SIZE)
         uris = []
-        for index, label in labels.items():
+        for index, label in progress.shown(list(labels.items()), f"maps of {name}", "map"):
             frames.show(index, f"{name}, {label}")
             image = io.BytesIO()
             frames.figure.savefig(image, format="png", dpi=DPI)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from .. import progress
 from ..errors import InputError
 from ..record import files, hdf5
 from ..record.provenance import PROGRAM
@@ -39,7 +40,8 @@ def write(directories: Sequence[Path], out: Path | None = None) -> Path:
 
 def render(directories: Sequence[Path]) -> str:
     """The text of the page."""
-    chapters = [*together(directories), *(chapter(directory) for directory in directories)]
+    each = [chapter(directory) for directory in progress.shown(directories, "chapters", "chapter")]
+    chapters = [*together(directories), *each]
     loader = PackageLoader("parcontact", "report")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
+from .. import progress
 from ..errors import InputError
 from .sane import scatter
 from .shift import WLF, Arrhenius, Factors, Shift
@@ -72,7 +73,7 @@ def fit(
     weigh = weigh if kind == "frequency" else "both"
     dense = _solve(at, data, kind, _dense(*band), weigh)
     goal = math.hypot(error, dense.error)
-    for count in range(1, MOST + 1):
+    for count in progress.shown(range(1, MOST + 1), "number of branches", "branch"):
         tried = [_solve(at, data, kind, _grid(band, count, spare), weigh) for spare in ENDS]
         found = min(tried, key=lambda series: series.error)
         if found.error <= goal:
@@ -215,7 +216,8 @@ def _fitted(
         return _solve(at, data, measured.kind, _dense(float(rates.min()), float(rates.max())), weigh).error
 
     grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
-    start = min(grid, key=error)
+    errors = [error(point) for point in progress.shown(grid, "shift with temperature", "law")]
+    start = grid[int(np.argmin(errors))]
     if not math.isfinite(error(start)):
         raise InputError(f"{measured.path}: no law of the shift joins the sets at {reference:g} C")
     simplex = np.vstack([start, start + 0.05 * np.eye(start.size)])

@@ -188,6 +188,8 @@ class _Curve:
                 self._say(f"stopped with {len(lacking) - count} points to go; run again to go on")
                 return AGAIN
             self._solve(index)
+            if self.table:
+                self.table.pass_on()
         if self.table:
             self.table.conclude(self.failures)
         return FAILED if self.failures else DONE

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from .. import progress
 from ..effects.interface import InterfaceColumns, interface_of
 from ..job.sample import describe_sample
 from ..record import curve_points, files, measures
@@ -39,6 +40,7 @@ class CurveTable:
         self._file = GrowingTable(self.path, self._names)
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
         self._points: list[Point] = []
+        self._bar = progress.Bar(0, "")
         self.say(HEAD)
 
     def _read(self) -> list[curve_points.Point]:
@@ -60,11 +62,16 @@ class CurveTable:
         found = curve_points.lacking(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
+        self._bar = progress.Bar(len(found), "steady states", "point", not self.quiet)
         return found
+
+    def pass_on(self) -> None:
+        """A point is done, solved or not."""
+        self._bar.step()
 
     def say(self, text: str) -> None:
         if not self.quiet or text.startswith("parcontact"):
-            print(text, flush=True)
+            self._bar.print(text)
         self._console.log(text)
 
     def warn(self, texts: list[str], shown: Callable[[str], bool] = always) -> None:
@@ -94,6 +101,7 @@ class CurveTable:
 
     def conclude(self, failures: int) -> None:
         """Put a curve that was solved in parts into order, draw it, and say how it went; raises OSError."""
+        self._bar.close()
         lost, mended = self._file.sync()
         self.warn([*mended, *([lost] if lost else [])])
         if self.known:
@@ -117,6 +125,7 @@ class CurveTable:
         files.write(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
 
     def close(self) -> None:
+        self._bar.close()
         self._console.close()
         self._file.close()
         if self._waves:

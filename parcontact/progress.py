@@ -1,0 +1,46 @@
+"""How far long work has come: a bar on a terminal, with how much is done and the time left; nothing elsewhere."""
+
+import sys
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+class Bar:
+    """A bar below what is printed, if errors go to a terminal. It stands at once, before the first step is done."""
+
+    def __init__(self, total: int, what: str, unit: str = "step", wanted: bool = True) -> None:
+        self._bar = None
+        if wanted and total and sys.stderr.isatty():
+            from tqdm import tqdm  # slow to import
+
+            self._bar = tqdm(total=total, desc=what, unit=unit, leave=False)
+
+    def step(self) -> None:
+        """One more is done."""
+        if self._bar is not None:
+            self._bar.update()
+
+    def print(self, text: str) -> None:
+        """A line above the bar."""
+        if self._bar is not None:
+            self._bar.write(text, file=sys.stdout)
+        else:
+            print(text, flush=True)
+
+    def close(self) -> None:
+        """Remove the bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+def shown(items: Sequence[T], what: str, unit: str = "step") -> Iterator[T]:
+    """The items, with a bar that counts those that were dealt with."""
+    bar = Bar(len(items), what, unit)
+    try:
+        for item in items:
+            yield item
+            bar.step()
+    finally:
+        bar.close()

@@ -1,0 +1,69 @@
+"""How far long work has come: told on a terminal, and nowhere else."""
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
+
+from parcontact import progress
+from parcontact.__main__ import main
+from parcontact.report import browse
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(WAVE + ZENER + SLIDE + "steady: {velocities: [0.01, 0.1, 1.0]}\n")
+    return tmp_path / "job.yaml"
+
+
+def told(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, *words: str) -> str:
+    """What a verb writes beside its results, to a terminal or not."""
+    monkeypatch.setattr(sys, "stderr", terminal)
+    assert main(list(words)) == 0
+    return terminal.getvalue()
+
+
+def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    items = progress.shown([1, 2, 3], "maps", "map")
+    assert next(items) == 1
+    assert "maps:   0%" in terminal.getvalue()
+    assert "0/3" in terminal.getvalue()
+    assert list(items) == [2, 3]
+
+
+def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """How many of how many, below the lines of the table; nothing where errors go to a file."""
+    text = told(monkeypatch, Terminal(), "steady", "job.yaml")
+    assert "steady states:   0%" in text
+    assert "0/3" in text
+    assert len([line for line in capsys.readouterr().out.splitlines() if "e-" in line]) >= 3
+    assert "0/3" not in told(monkeypatch, io.StringIO(), "steady", "job.yaml", "--restart", "never")
+    assert "steady states" not in (job.parent / "out/job/steady.log").read_text()
+
+
+def test_the_maps_of_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = ran(tmp_path, WAVE + ELASTIC + LOADS + MAPS)
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    assert [len(browser.labels) for browser in browse.of_run(out)] == [2, 2]
+    assert "maps of pressure:   0%" in terminal.getvalue()
+    assert "0/2" in terminal.getvalue()
+
+
+def test_a_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [f"{f:g} {1 + f / (f + 10):g} {f / (f * f + 100):g}\n" for f in (0.1, 1, 10, 100)]
+    (tmp_path / "rubber.csv").write_text("f[Hz] E'[MPa] E''[MPa]\n" + "".join(rows))
+    assert "number of branches:" in told(monkeypatch, Terminal(), "fit", str(tmp_path / "rubber.csv"))
+
+
+def test_a_plan(job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = told(monkeypatch, Terminal(), "plan", "job.yaml", "--ranks", "1", "--seconds", "0.1")
+    assert "trying the job for some 0.1 s:   0%" in text
