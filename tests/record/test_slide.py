@@ -118,7 +118,7 @@ def test_mu_max_on_a_ripple() -> None:
 def test_a_steady_start_that_does_not_last() -> None:
     """The slide that goes on from it has the same friction; a difference beyond the errors of both is told, one within
     them is not, nor one to a slide under another load."""
-    start = {"initial": {"state": "steady", "velocity": 2.0, "pressure": 1.0}}
+    start: Any = {"initial": {"state": "steady", "velocity": 2.0, "pressure": 1.0}}
     table = rows((0, 0, 3), (0.25, 0.5, 4), (0.5, 1, 4))
     table["error_friction"] = [0.1, 0.1, 0.1]  # of 3, and of the slide's 3.92
     text = "friction left the 3 of the steady start by 0.92, more than the errors of both, 0.69: "
