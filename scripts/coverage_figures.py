@@ -46,8 +46,9 @@ def is_told(line: Line, name: str) -> bool:
 
 
 def is_kept(line: Line, name: str) -> bool:
-    """Whether it is as wrong as asked for at most, or says that it is not."""
-    return is_told(line, name) or value(line, f"{name}_error") <= value(line, "asked") * value(line, f"{name}_true")
+    """Whether it is as wrong as asked for at most, up to rounding, or says that it is not."""
+    allowed = max(value(line, "asked") * value(line, f"{name}_true"), ROUNDING)
+    return is_told(line, name) or value(line, f"{name}_error") <= allowed
 
 
 def is_covered(line: Line, name: str) -> bool:

@@ -86,6 +86,12 @@ def test_radius_of_a_spot() -> None:
     assert spot_radius(Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
 
 
+def test_area_is_not_known_to_less_than_a_cell() -> None:
+    """In full contact nothing is corrected, and what is open may be smaller than a cell."""
+    full = replace(SEEN, area=1.0, corrected=1.0)
+    assert estimate(KNOWN, full, 10_000).area.mesh == pytest.approx(1e-4)
+
+
 def test_points_that_penetrate_are_missing_in_the_area() -> None:
     """Eight of ten of them, of the points in contact; friction does not change."""
     one, other = (estimate(KNOWN, replace(SEEN, penetrating=share), 10_000) for share in (0.0, 0.02))
@@ -259,13 +265,13 @@ def test_small_spots_of_long_waves_have_an_error() -> None:
 
 
 def test_steady_friction_is_by_energy() -> None:
-    """Half of the difference of the views over a third of the slope, where friction is less, a fifth of what waves make
+    """The difference of the views over a third of the slope, where friction is less, a fifth of what waves make
     in a march, and what spots do; no error of time, no cancellation."""
     seen = replace(SEEN, slope=0.2, views_apart=4e-3)
     budget = estimate_steady(replace(KNOWN, folded=0.0), seen, 10_000)
     assert budget.friction is not None
     solver = 1.1e-3 / spots(seen, 10_000) ** 0.25
-    mesh = 0.5 * 4e-3 / (0.3 * 0.2) + 0.2 * 0.05 * 2**-2.5 + by_spots(seen, 10_000)
+    mesh = 4e-3 / (0.3 * 0.2) + 0.2 * 0.05 * 2**-2.5 + by_spots(seen, 10_000)
     assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, mesh))
     assert (budget.area.time, budget.area.mesh) == pytest.approx((0.0, MESH))
     assert estimate_steady(KNOWN, replace(seen, friction=0.0), 10_000).friction is None
