@@ -93,8 +93,6 @@ def _finer(job: Job, sample: Sample, accuracy: float) -> float:
     error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
     share = MESH_SHARE * accuracy
     of_waves = cells_per_wave(share) * max(job.grid.dx, job.grid.dy) / waves if waves else 0.0
-    if waves and error is not None:
-        return of_waves
     if error is None:
         error, order = mesh_error(sample, "area") or 0.0, EDGE_ORDER
     factor = (error / share) ** (1.0 / order) * sample.job.grid.nx / job.grid.nx
