@@ -196,7 +196,7 @@ def picture(lines: list[Line], path: Path) -> None:
 
 def _panel(axis, lines, name, key):
     for index, group in enumerate(sorted({line[key] for line in lines})):
-        some = [line for line in lines if line[key] == group and value(line, f"{name}_error") > 0.0]
+        some = [line for line in lines if line[key] == group and value(line, f"{name}_error") > ROUNDING]
         relative = [value(line, f"{name}_true") or value(line, name) for line in some]
         x = [value(line, f"{name}_error") / size for line, size in zip(some, relative, strict=True)]
         y = [value(line, f"{name}_estimate") / size for line, size in zip(some, relative, strict=True)]
