@@ -16,6 +16,7 @@ from ..record.pictures.charts import Chart, draw
 from ..record.pictures.run import Panel
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
+PHONE_COLUMNS = 2  # of a table that is shown as one on a phone
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
 
 
@@ -26,6 +27,11 @@ class Table:
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str = ""
+
+    @property
+    def folds(self) -> bool:
+        """Whether it is too wide for a phone, which shows each row as a list of names and values."""
+        return len(self.head) > PHONE_COLUMNS
 
 
 @dataclass(frozen=True)
