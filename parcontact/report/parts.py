@@ -36,11 +36,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as a data: URI, and what it shows; a `wide` one stands alone."""
+    """A picture as a data: URI, and what it shows."""
 
     uri: str
     caption: str
-    wide: bool = False
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def of_study(directory: Path) -> Section:
 def _study_pictures(directory: Path) -> Iterator[Picture]:
     for name, caption in STUDY_PICTURES.items():
         if (directory / name).is_file():
-            yield Picture(uri_of(files.contents(directory / name), "image/png"), caption, wide=True)
+            yield Picture(uri_of(files.contents(directory / name), "image/png"), caption)
 
 
 def shortened(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
