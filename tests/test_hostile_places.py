@@ -1,15 +1,19 @@
 """Where the program runs may be hostile: outputs that are full, limits, directories that vanish, settings of others."""
 
+import errno
+import os
 import resource
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 import yaml
 from conftest import WORLD, Main
+
+from parcontact.command import verbs
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 
@@ -65,3 +69,48 @@ def test_limit_of_file_sizes(here: Path, main: Main, fields: str) -> None:
     assert len(said.splitlines()) == 1
     assert not list((here / "out").rglob("*.part"))
     assert main(*words)[0] == DONE
+
+
+@pytest.mark.parametrize(
+    ("what", "soft", "said"),
+    [
+        (resource.RLIMIT_NOFILE, 12, "only 12 files may be open: set a limit of 32 or more, by ulimit -n"),
+        (resource.RLIMIT_AS, 300 << 20, "only 300 MB of memory may be used: set a limit of 1 GB or more, by ulimit -v"),
+    ],
+)
+def test_limits_too_narrow_to_start(
+    here: Path, main: Main, monkeypatch: pytest.MonkeyPatch, what: int, soft: int, said: str
+) -> None:
+    """Said before MPI and other libraries end the process in their own ways."""
+    found = resource.getrlimit
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (soft, soft) if kind == what else found(kind))
+    assert main("job.yaml", "--out", "out") == (BAD_INPUT, "", f"parcontact: {said}\n")
+    assert not (here / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MemoryError(), "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"),
+        (OSError(errno.EMFILE, "Too many open files"), "parcontact: out of open files; allow more by ulimit -n: "),
+    ],
+)
+def test_what_the_machine_lacks(main: Main, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str) -> None:
+    def fail(*_: object) -> NoReturn:
+        raise error
+
+    monkeypatch.setattr(verbs, "info", fail)
+    code, _, errors = main("info", "out")
+    assert code == FAILED
+    assert errors.startswith(said)
+    assert len(errors.splitlines()) == 1
+
+
+@pytest.mark.parametrize("verb", ["run", "check", "plot", "report"])
+def test_working_directory_that_was_removed(here: Path, main: Main, verb: str) -> None:
+    (here / "gone").mkdir()
+    os.chdir(here / "gone")
+    (here / "gone").rmdir()
+    code, _, said = main(verb, here / "job.yaml")
+    assert code == BAD_INPUT
+    assert said.startswith("parcontact: the working directory cannot be found (No such file or directory): change to")
