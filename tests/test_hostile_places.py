@@ -9,9 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
+import matplotlib as mpl
 import pytest
 import yaml
 from conftest import WORLD, Main
+from matplotlib.figure import Figure
 
 from parcontact.command import verbs
 
@@ -114,3 +116,21 @@ def test_working_directory_that_was_removed(here: Path, main: Main, verb: str) -
     code, _, said = main(verb, here / "job.yaml")
     assert code == BAD_INPUT
     assert said.startswith("parcontact: the working directory cannot be found (No such file or directory): change to")
+
+
+def test_pictures_are_as_without_the_settings_of_others(
+    here: Path, main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A matplotlibrc beside the job that asks for LaTeX."""
+    drawn: list[object] = []
+    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: drawn.append(mpl.rcParams["text.usetex"]))
+    table = "".join(f"{f:g},{1e6 + 1e5 * f:g},{2e5 + 1e4 * f:g}\n" for f in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0))
+    (here / "moduli.csv").write_text(f"f[Hz],G'[Pa],G''[Pa]\n{table}")
+    assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
+    with mpl.rc_context({"text.usetex": True}):
+        for words in (["plot", "out"], ["report", "out"], ["surface", "job.yaml"], ["fit", "moduli.csv"]):
+            drawn.clear()
+            assert main(*words)[0] == DONE, words
+            assert drawn, words
+            assert not any(drawn), words
+        assert mpl.rcParams["text.usetex"]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from . import files
-from .pictures.style import save
+from .pictures.style import drawing, save
 
 TITLES = {
     "mu_max": "largest friction",
@@ -54,9 +54,10 @@ def plot(
     `doubts` are the relative uncertainties of the references, shown as grey bands: what lies in them is not known.
     """
     pictures = []
-    if drawn := [curve for curve in curves if any(error > 0.0 for error in curve.errors)]:
-        pictures.append(_convergence(directory / "convergence.png", drawn, doubts))
-    pictures.append(_work_precision(directory / "work_precision.png", points))
+    with drawing({}):
+        if drawn := [curve for curve in curves if any(error > 0.0 for error in curve.errors)]:
+            pictures.append(_convergence(directory / "convergence.png", drawn, doubts))
+        pictures.append(_work_precision(directory / "work_precision.png", points))
     return pictures
 
 
