@@ -134,3 +134,15 @@ def test_pictures_are_as_without_the_settings_of_others(
             assert drawn, words
             assert not any(drawn), words
         assert mpl.rcParams["text.usetex"]
+
+
+@pytest.mark.parametrize("name", ["/proc/absent", "job.yaml"])
+def test_directory_for_scratch_files_that_cannot_be(
+    here: Path, main: Main, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("TMPDIR", name)
+    code, _, said = main("job.yaml", "--out", "out")
+    assert code == BAD_INPUT
+    assert said.startswith(f"parcontact: TMPDIR is {name}, which cannot be made (")
+    assert len(said.splitlines()) == 1
+    assert not (here / "out").exists()

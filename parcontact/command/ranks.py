@@ -54,7 +54,7 @@ def started() -> MPI.Intracomm | None:
 
 def start() -> MPI.Intracomm:
     """All ranks; starts MPI. Raises InputError where that must fail, and for a rank that is alone but should not be."""
-    _refuse_narrow_limits()
+    _refuse_surroundings()
     from ..parallel.mpi import MPI
 
     world, count = MPI.COMM_WORLD, launched()
@@ -67,11 +67,19 @@ def start() -> MPI.Intracomm:
     return world
 
 
-def _refuse_narrow_limits() -> None:
-    """Raises InputError for limits of the shell under which MPI and other libraries end without a sentence."""
+def _refuse_surroundings() -> None:
+    """Raises InputError for limits and settings of the shell under which MPI ends without a sentence."""
     files, memory = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_NOFILE, resource.RLIMIT_AS))
     if 0 <= files < LEAST_FILES:
         raise InputError(f"only {files} files may be open: set a limit of {LEAST_FILES} or more, by ulimit -n")
+    if scratch := os.environ.get("TMPDIR"):
+        try:
+            os.makedirs(scratch, exist_ok=True)  # as MPI does
+        except OSError as error:
+            text = (
+                f"TMPDIR is {scratch}, which cannot be made ({error.strerror}): name a directory in which you may write"
+            )
+            raise InputError(text) from None
     if 0 <= memory < LEAST_MEMORY:
         raise InputError(f"only {memory >> 20} MB of memory may be used: set a limit of 1 GB or more, by ulimit -v")
 
