@@ -119,7 +119,8 @@ def _end_all(error: BaseException) -> NoReturn:
 
 def _shortage(error: BaseException) -> str:
     """What the machine lacks, where that has ended the program, and what to do; '' for any other error."""
-    if isinstance(error, MemoryError):
+    unloaded = isinstance(error, ImportError) and "failed to map segment" in str(error)
+    if isinstance(error, MemoryError) or unloaded:
         return "out of memory; free some, allow more by ulimit -v, or take fewer points"
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return "out of open files; allow more by ulimit -n"

@@ -94,6 +94,7 @@ def test_limits_too_narrow_to_start(
     ("error", "said"),
     [
         (MemoryError(), "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"),
+        (ImportError("libx.so: failed to map segment from shared object"), "parcontact: out of memory; "),
         (OSError(errno.EMFILE, "Too many open files"), "parcontact: out of open files; allow more by ulimit -n: "),
     ],
 )
