@@ -108,8 +108,8 @@ def _end_all(error: BaseException) -> NoReturn:
     several = world is not None and world.size > 1
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
     said = f": {error}" if str(error) else ""
-    reason = _shortage(error) or f"ended by {type(error).__name__}"
-    if not isinstance(error, KeyboardInterrupt) and not _shortage(error):
+    reason = _trouble_around(error) or f"ended by {type(error).__name__}"
+    if not isinstance(error, KeyboardInterrupt) and not _trouble_around(error):
         traceback.print_exception(error)
     print(f"parcontact: {reason}{where}{said}", file=sys.stderr, flush=True)
     if world is not None and several:
@@ -117,13 +117,16 @@ def _end_all(error: BaseException) -> NoReturn:
     sys.exit(FAILED)
 
 
-def _shortage(error: BaseException) -> str:
-    """What the machine lacks, where that has ended the program, and what to do; '' for any other error."""
+def _trouble_around(error: BaseException) -> str:
+    """What is wrong around the program, where that has ended it, and what to do; '' for any other error."""
     unloaded = isinstance(error, ImportError) and "failed to map segment" in str(error)
     if isinstance(error, MemoryError) or unloaded:
         return "out of memory; free some, allow more by ulimit -v, or take fewer points"
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return "out of open files; allow more by ulimit -n"
+    frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__) if frame.f_code.co_name == "<module>")
+    if any(frame.f_globals["__name__"] == "matplotlib" for frame in frames):
+        return "Matplotlib cannot start; mend MPLBACKEND, or matplotlibrc in the working directory"
     return ""
 
 

@@ -3,6 +3,7 @@
 import errno
 import os
 import resource
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -117,6 +118,23 @@ def test_working_directory_that_was_removed(here: Path, main: Main, verb: str) -
     code, _, said = main(verb, here / "job.yaml")
     assert code == BAD_INPUT
     assert said.startswith("parcontact: the working directory cannot be found (No such file or directory): change to")
+
+
+@pytest.mark.parametrize("kind", ["matplotlibrc", "MPLBACKEND"])
+def test_settings_of_others_with_which_matplotlib_does_not_start(
+    here: Path, main: Main, outside_mpi: dict[str, str], kind: str
+) -> None:
+    assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
+    if kind == "matplotlibrc":
+        (here / kind).write_bytes(b"\xff\xfe: 1")
+    environment = outside_mpi if kind == "matplotlibrc" else {**outside_mpi, kind: "none"}
+    command = [sys.executable, "-m", "parcontact", "plot", "out"]
+    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True)
+    assert done.returncode == FAILED
+    assert done.stderr.splitlines()[-1].startswith(
+        "parcontact: Matplotlib cannot start; mend MPLBACKEND, or matplotlib"
+    )
+    assert "Traceback" not in done.stderr
 
 
 def test_pictures_are_as_without_the_settings_of_others(
