@@ -165,3 +165,12 @@ def test_directory_for_scratch_files_that_cannot_be(
     assert said.startswith(f"parcontact: TMPDIR is {name}, which cannot be made (")
     assert len(said.splitlines()) == 1
     assert not (here / "out").exists()
+
+
+@pytest.mark.parametrize("text", ["", "[]", "grid: 1\nmaterial: {}\n", "title: x\n"])
+def test_what_to_cite_for_a_damaged_job(here: Path, main: Main, text: str) -> None:
+    (here / "out").mkdir()
+    (here / "out" / "job.resolved.yaml").write_text(text)
+    code, _, said = main("cite", "out")
+    assert code == BAD_INPUT
+    assert said.startswith("parcontact: out/job.resolved.yaml is damaged: ")
