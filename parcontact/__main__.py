@@ -1,5 +1,6 @@
 """The program `parcontact`: a command line in, an exit code out."""
 
+import errno
 import gc
 import os
 import sys
@@ -43,6 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     try:
+        _refuse_nowhere()
         options = understand(words)
         code = int(options.act(options))
         return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output())
@@ -55,6 +57,14 @@ def _run(words: list[str]) -> int:
         return _end_together(str(error) if isinstance(error, JobError) else f"parcontact: {error}", code)
     except (Exception, KeyboardInterrupt) as error:
         _end_all(error)
+
+
+def _refuse_nowhere() -> None:
+    try:
+        os.getcwd()
+    except OSError as error:
+        text = f"the working directory cannot be found ({error.strerror}): change to one that is there"
+        raise InputError(text) from None
 
 
 def _judge_output() -> int:
@@ -97,13 +107,27 @@ def _end_all(error: BaseException) -> NoReturn:
         time.sleep(STAGGER_SECONDS)
     several = world is not None and world.size > 1
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
-    if not isinstance(error, KeyboardInterrupt):
-        traceback.print_exception(error)
     said = f": {error}" if str(error) else ""
-    print(f"parcontact: ended by {type(error).__name__}{where}{said}", file=sys.stderr, flush=True)
+    reason = _trouble_around(error) or f"ended by {type(error).__name__}"
+    if not isinstance(error, KeyboardInterrupt) and not _trouble_around(error):
+        traceback.print_exception(error)
+    print(f"parcontact: {reason}{where}{said}", file=sys.stderr, flush=True)
     if world is not None and several:
         world.Abort(FAILED)
     sys.exit(FAILED)
+
+
+def _trouble_around(error: BaseException) -> str:
+    """What is wrong around the program, where that has ended it, and what to do; '' for any other error."""
+    unloaded = isinstance(error, ImportError) and "failed to map segment" in str(error)
+    if isinstance(error, MemoryError) or unloaded:
+        return "out of memory; free some, allow more by ulimit -v, or take fewer points"
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        return "out of open files; allow more by ulimit -n"
+    frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__) if frame.f_code.co_name == "<module>")
+    if any(frame.f_globals["__name__"] == "matplotlib" for frame in frames):
+        return "Matplotlib cannot start; mend MPLBACKEND, or matplotlibrc in the working directory"
+    return ""
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from .effects import decisions, relaxation
-from .effects.effect import Decision, Effect, effects_that_follow
+from .effects.effect import Decision, Effect, effects_that_follow, values_of
 from .effects.folded_branches import describe_folded_branches, fold_branches_of
 from .effects.interface import interface_of
 from .effects.relaxation import relaxation_of
@@ -152,6 +152,7 @@ def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -
     kept = decisions.lasting(job).on, decisions.further_starts(job).on
     scene = Scene(base, motion, branches, material, solver, base.ledger(), energy, *kept)
     scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
+    values_of(scene.followers)  # refuses those that do not fit, before anything is written
     return scene
 
 

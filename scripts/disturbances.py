@@ -1,10 +1,11 @@
-"""What else may happen to a run, for faults.py: races, planted links, files that vanish, locks, wishes that stay.
+"""What else may happen to a run, for faults.py: races, planted links, files that vanish, locks, wishes, narrow limits.
 
 After each the same command must finish with the undisturbed result; no exit code but those of the README, no traceback.
 """
 
 import fcntl
 import os
+import shutil
 import subprocess
 import time
 from collections.abc import Callable
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 LINKS = (".lock", "run.log", "fields.xdmf", "job.resolved.yaml", "job.yaml", "picture.png", "checkpoint/step-4.h5.part")
 VANISHING = ("measures.csv", "fields.xdmf", "run.log", "job.yaml", "job.resolved.yaml", ".lock", ".parcontact")
+LIMITS = {"f": (1, 6000), "n": (8, 60), "v": (200_000, 1_500_000)}  # of ulimit: kB of a file, open files, kB of memory
 CODES = (0, 1, 2, 3)
 
 
@@ -90,7 +92,33 @@ def wish(campaign: "Campaign", trial: int) -> None:
     campaign.judge(f"wish {trial}", out)
 
 
-ALL: tuple[Callable[["Campaign", int], None], ...] = (race, link, vanish, lock, wish)
+def narrow(campaign: "Campaign", trial: int) -> None:
+    """The ranks may write no long files, open few, or use little memory."""
+    out, kind = campaign.where / f"narrow{trial}", campaign.random.choice(list(LIMITS))
+    most = campaign.random.randint(*LIMITS[kind])
+    if campaign.random.random() < 0.5:
+        _stop_part_way(campaign, out)
+    process = campaign.start(out, ("sh", "-c", f'ulimit -{kind} {most}; exec "$@"', "sh"))
+    _noted(campaign, f"ulimit -{kind}", process.wait(600))
+    campaign.judge(f"narrow {trial}: ulimit -{kind} {most}", out)
+
+
+def remove(campaign: "Campaign", trial: int) -> None:
+    """The output directory is removed while a run is under way."""
+    out = campaign.where / f"remove{trial}"
+    process = campaign.start(out)
+    _under_way(campaign, process, out)
+    shutil.rmtree(out, ignore_errors=True)
+    _noted(campaign, "directory removed", process.wait(600))
+    campaign.judge(f"remove {trial}", out)
+
+
+ALL: tuple[Callable[["Campaign", int], None], ...] = (race, link, vanish, lock, wish, narrow, remove)
+
+
+def disturb(campaign: "Campaign", trial: int) -> None:
+    """Each kind in its turn."""
+    ALL[trial % len(ALL)](campaign, trial)
 
 
 def _noted(campaign: "Campaign", what: str, code: int) -> None:

@@ -4,7 +4,7 @@
     .venv/bin/python scripts/faults.py [--trials 200] [--around 100] [--flips 2000] [--fills 10] [--ranks 2] [--seed 0]
 
 Kills are SIGKILL of one rank, of all ranks, or of mpirun too, at random instants, every other time inside the writing
-of a checkpoint. Around them (disturbances.py): races of two runs, planted links, files that vanish, locks. Filling a
+of a checkpoint. Around them (disturbances.py): races, planted links, files that vanish, locks, narrow limits. Filling a
 disk needs root (it mounts a small tmpfs). Ends with 0 if nothing was lost, hung or changed.
 """
 
@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from shutil import copytree, rmtree
@@ -77,9 +77,9 @@ class Campaign:
         self.seconds = time.monotonic() - began
         self.expected = results(self.whole)
 
-    def start(self, out: Path) -> subprocess.Popen[str]:
-        command = [BIN / "mpirun", "-n", str(self.ranks), BIN / "parcontact", self.job, "--quiet", "--out", out]
-        words, env = list(map(str, command)), outside.environment()
+    def start(self, out: Path, within: Sequence[str] = ()) -> subprocess.Popen[str]:
+        ranks = [*within, BIN / "parcontact", self.job, "--quiet", "--out", out]
+        words, env = list(map(str, [BIN / "mpirun", "-n", self.ranks, *ranks])), outside.environment()
         return subprocess.Popen(words, env=env, stdout=self.log, stderr=self.log, text=True, start_new_session=True)
 
     def run(self, out: Path) -> int:
@@ -260,7 +260,7 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, value, what in (
         ("--trials", 200, "runs that are killed"),
-        ("--around", 100, "races, links, vanishing files, locks, wishes to stop"),
+        ("--around", 100, "races, links, vanishing files, locks, wishes to stop, narrow limits"),
         ("--flips", 2000, "damaged checkpoints"),
         ("--backs", 10, "runs that must fall back to an older checkpoint"),
         ("--fills", 10, "runs on a disk that is too small (root only)"),
@@ -280,7 +280,7 @@ def main() -> int:
     campaign.damage(chosen.flips)
     trials: list[Callable[[], None]] = [partial(campaign.fall_back, trial) for trial in range(chosen.backs)]
     trials += [partial(campaign.fill, trial) for trial in range(chosen.fills if os.geteuid() == 0 else 0)]
-    trials += [partial(disturbances.ALL[trial % 5], campaign, trial) for trial in range(chosen.around)]
+    trials += [partial(disturbances.disturb, campaign, trial) for trial in range(chosen.around)]
     trials += [partial(campaign.kill, trial) for trial in range(chosen.trials)]
     campaign.random.shuffle(trials)
     while trials and time.monotonic() - began < 60.0 * chosen.minutes:

@@ -52,9 +52,13 @@ def manual(options: argparse.Namespace) -> int:
 @root_alone
 def schema(options: argparse.Namespace) -> int:
     import json
+    import sys
 
+    from ..job import extension
     from ..job import schema as job_schema
 
+    for text in extension.unusable():
+        print(f"warning: {text}; the schema is without it", file=sys.stderr)
     print(json.dumps(job_schema.schema(), indent=1))
     return DONE
 

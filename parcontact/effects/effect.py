@@ -5,12 +5,14 @@ file knows it. One that takes the place of a part (another body, operator or pat
 `scene.py` makes it where it makes that part.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from numpy.typing import DTypeLike
 
+from ..errors import InputError
 from ..job import Job, extension
 from ..job.part import Part
 from ..job.timeline import Step
@@ -83,3 +85,23 @@ def effects_that_follow(job: Job) -> dict[str, type[Effect]]:
     """The effects that the sections of a job ask for, by their names in checkpoints."""
     found = extension.effects_of(type(job).model_fields).values()
     return {effect.decide(job).name: effect for effect in found if effect.decide(job).on}
+
+
+def columns_of(effects: Mapping[str, Effect]) -> tuple[str, ...]:
+    """What effects add to measures.csv."""
+    return tuple(name for effect in effects.values() for name in effect.columns)
+
+
+def values_of(effects: Mapping[str, Effect]) -> tuple[float, ...]:
+    """What effects have for their columns in the row of the last step made. Raises InputError for what does not fit."""
+    return tuple(number for name, effect in effects.items() for number in _numbers(name, effect))
+
+
+def _numbers(name: str, effect: Effect) -> list[float]:
+    values, found = effect.values(), list[float]()
+    with suppress(TypeError, ValueError):
+        found = [float(value) for value in values]
+    if len(found) != len(effect.columns):
+        wanted = f"must give a number for each of its columns ({', '.join(effect.columns)})"
+        raise InputError(f"the effect {name} cannot be used: its values() {wanted}, got {values!r:.80}")
+    return found

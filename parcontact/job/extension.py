@@ -27,13 +27,25 @@ OURS: dict[str, str] = {
 
 
 def find_effects() -> dict[str, Any]:
-    """Every registered effect, by the name of its section; raises ValidationError for one that cannot be loaded."""
-    return {section: _load(section) for section in _registered()}
+    """Every registered effect that can be used, by the name of its section."""
+    return {section: _load(section) for section in _registered() if not why_unusable(section)}
 
 
 def effects_of(sections: Iterable[str]) -> dict[str, Any]:
-    """The effects that have registered one of some sections, by the name of the section."""
-    return {section: _load(section) for section in sections if section in _registered()}
+    """The effects that have registered one of some sections, by the name of the section.
+
+    Raises ValidationError for one that cannot be used.
+    """
+    found = [section for section in sections if section in _registered()]
+    for section in found:
+        if reason := why_unusable(section):
+            refuse(Fault(reason, (section,), at_key=True))
+    return {section: _load(section) for section in found}
+
+
+def unusable() -> list[str]:
+    """Sentences on the registered effects that cannot be used."""
+    return [f"{section} {reason}" for section in _registered() if (reason := why_unusable(section))]
 
 
 @cache
@@ -44,12 +56,22 @@ def _registered() -> dict[str, EntryPoint]:
 
 @cache
 def _load(section: str) -> Any:
-    entry = _registered()[section]
+    return _registered()[section].load()
+
+
+@cache
+def why_unusable(section: str) -> str:
+    """Why the effect of a section cannot be used; '' if it can."""
     try:
-        effect = entry.load()
-        if issubclass(effect.section, Part):
-            return effect
-        reason = f"its section is no {Part.__module__}.{Part.__name__}"
-    except Exception as error:  # whatever the code of somebody else does
+        effect = _load(section)
+        reason = "" if issubclass(effect.section, Part) else f"its section is no {Part.__module__}.{Part.__name__}"
+        if not _are_names(effect.columns):
+            reason = f"its columns must be a tuple of different names, of letters, digits and _, got {effect.columns!r}"
+    except (Exception, SystemExit) as error:  # whatever the code of somebody else does
         reason = f"{type(error).__name__}: {error}"
-    refuse(Fault(f"belongs to the effect {entry.value}, which cannot be used: {reason}", (section,), at_key=True))
+    return reason and f"belongs to the effect {_registered()[section].value}, which cannot be used: {reason}"
+
+
+def _are_names(columns: Any) -> bool:
+    kind = isinstance(columns, tuple | list) and len(set(columns)) == len(columns)
+    return kind and all(isinstance(name, str) and name.isidentifier() for name in columns)

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..effects.effect import Instant
+from ..effects.effect import Instant, values_of
 from ..job.chosen import SYMBOLS
 from ..job.timeline import Step, Timeline
 from ..parallel.slab import Array
@@ -241,12 +241,8 @@ class March:
     def _complete(self, row: Row) -> Row:
         """A row with the energies, and with the columns of effects."""
         work, stored, lost, split = self._energies()
-        added = self._added()
+        added = values_of(self.scene.followers)
         return replace(row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
-
-    def _added(self) -> tuple[float, ...]:
-        """What effects have for their columns."""
-        return tuple(float(value) for follower in self.scene.followers.values() for value in follower.values())
 
     def _energies(self) -> tuple[float, float, float, tuple[float, ...]]:
         """Work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for."""

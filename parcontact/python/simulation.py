@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job
 from ..job.yamltext import parse
@@ -105,7 +106,7 @@ class Simulation:
     def row(self) -> Row:
         """What the last step has measured, also one before a restart; of the initial state before the first."""
         march, saved = self._march, self._saved
-        added = tuple(name for follower in march.scene.followers.values() for name in follower.columns)
+        added = columns_of(march.scene.followers)
         if saved is not None and saved.table.last and march.row.step == saved.step:
             return Row.of_line(saved.table.last, added)
         return Row.of(march.row, added)

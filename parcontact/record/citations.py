@@ -112,15 +112,17 @@ CITATIONS = (
 
 
 def describe(directory: Path) -> str:
-    """What to cite for the run in a directory. Raises InputError where none is."""
+    """What to cite for the run in a directory. Raises InputError where none is, or its job is damaged."""
     found = next((directory / name for name in RESOLVED if (directory / name).is_file()), None)
     if found is None:
         raise InputError(f"{directory} holds no run: it has neither {' nor '.join(RESOLVED)}")
     job = read(found, str(found)).data
     lines = [f"{directory}: please cite", "", f"* {_program(directory)}", "    this program (CITATION.cff)"]
-    for one in CITATIONS:
-        if one.used(job, directory):
+    try:
+        for one in (one for one in CITATIONS if one.used(job, directory)):
             lines += [f"* {one.reference}", f"    {one.what}"]
+    except (AttributeError, KeyError, TypeError) as error:
+        raise InputError(f"{found} is damaged: not every section of a resolved job is there; run it again") from error
     return "\n".join(lines)
 
 

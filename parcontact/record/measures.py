@@ -31,8 +31,14 @@ MAX_LINE = 1 << 20  # bytes: a longer one is none of ours
 
 
 def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
-    """Names of the columns when the dissipation of so many branches is asked for, and effects have added some."""
-    return [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
+    """Names of the columns when the dissipation of so many branches is asked for, and effects have added some.
+
+    Raises InputError for a name that is there twice.
+    """
+    names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
+    if twice := {name for name in added if names.count(name) > 1}:
+        raise InputError(f"measures.csv has a column {', '.join(sorted(twice))}: an effect must name its own otherwise")
+    return names
 
 
 def numbers(row: Row, branches: int) -> list[float]:

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..errors import InputError
@@ -54,7 +53,7 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
         raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y, x,y or none")
     if options.at and (options.movie or options.compare):
         raise InputError("--at chooses the maps of one picture, and goes with neither --movie nor --compare")
-    with rc_context(style.RC):
+    with style.drawing():
         if options.movie:
             return [_movie(directory, options) for directory in directories]
         if options.compare:
@@ -64,7 +63,7 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
-    with rc_context(style.RC):
+    with style.drawing():
         figure = layout.figure_of(_wrapped(steady.title(table.parent)), [_steady(table.parent, Options())])
         return _save(figure, table.with_suffix(""), Options())
 

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from matplotlib import rc_context
 from PIL import Image
 
 from .. import progress
 from ..record import hdf5
-from ..record.pictures import units
+from ..record.pictures import style, units
 from ..record.pictures.frames import Frames
 from .parts import RC, Browser, uri_of
 
@@ -50,7 +49,7 @@ def _of(path: Path, label: Callable[[h5py.File], Labels]) -> Iterator[Browser]:
 
 
 def _browser(file: h5py.File, name: str, labels: Labels) -> Browser:
-    with rc_context(RC):
+    with style.drawing(RC):
         frames = Frames(file, name, list(labels), SIZE)
         uris = []
         for index, label in progress.shown(list(labels.items()), f"maps of {name}", "map"):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..record import files
@@ -97,7 +96,7 @@ def of_chart(chart: Chart, caption: str = "") -> Picture:
 def of_panel(panel: Panel, caption: str) -> Picture:
     """A picture of one panel, as SVG."""
     file = io.BytesIO()
-    with rc_context(RC):
+    with style.drawing(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
         panel(figure.subplots())
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})

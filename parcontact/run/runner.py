@@ -6,6 +6,7 @@ from pathlib import Path
 
 from .. import sanity
 from ..effects import decisions
+from ..effects.effect import columns_of
 from ..effects.measured_range import describe_beyond
 from ..errors import InputError, RunError
 from ..job import Job, Rough, RoughSpectrum
@@ -14,7 +15,7 @@ from ..job.timeline import Timeline
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import header, heights, marker, wisdom
+from ..record import header, heights, marker, measures, wisdom
 from ..record.checkpoint import Contents, Facts, Table
 from ..record.console import Console, Silence, always
 from ..record.directory import Directory
@@ -183,7 +184,8 @@ def _begin(
     quiet: bool,
 ) -> Recorder:
     """Make the output directory ready, and its files; collective."""
-    job = built.job
+    job, added = built.job, columns_of(built.followers)
+    measures.columns(0, added)  # refuses names that are taken
     directory.make(job.path, job.resolved(), claim)
     heights.store(job, directory.path, built.slab)
     if origin and origin.own:
@@ -193,6 +195,5 @@ def _begin(
     split = decisions.branch_dissipation(job).on
     dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
     after, then = (origin.contents.step, origin.contents.table) if origin else (None, Table())
-    added = [name for follower in built.followers.values() for name in follower.columns]
     total, chooses = len(timeline), timeline.chooses
     return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet, added, chooses)

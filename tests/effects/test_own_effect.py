@@ -43,7 +43,7 @@ WEAR = {**DATA, "wear": {"coefficient": COEFFICIENT}}
 
 def forget() -> None:
     """What was found before is looked for anew."""
-    for found in (extension._registered, extension._load, model.extended):
+    for found in (extension._registered, extension._load, extension.why_unusable, model.extended):
         found.cache_clear()
     sys.modules.pop("tread_wear", None)
 

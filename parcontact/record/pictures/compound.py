@@ -18,20 +18,21 @@ POINTS = 400  # of a line
 
 def draw(compound: Compound, file: BinaryIO, job_band: tuple[float, float] | None = None) -> None:
     """Write a png; `job_band` [Hz] are the frequencies that a job excites."""
-    figure = Figure(figsize=(8, 6), layout="constrained")
-    top, bottom = figure.subplots(2, 2, width_ratios=(2, 1))
-    _moduli(top[0], compound)
-    _misfit(bottom[0], compound)
-    bottom[0].sharex(top[0])
-    if job_band:
-        for axes, label in ((top[0], "frequencies of the job"), (bottom[0], None)):
-            axes.axvspan(*job_band, color=BAND, alpha=0.25, lw=0, label=label)
-    top[0].legend(frameon=False, fontsize="small")
-    _spectrum(top[1], compound)
-    _shift(bottom[1], compound)
-    for axes in (*top, *bottom):
-        axes.grid(alpha=0.3)
-    style.save(figure, file, dpi=150)
+    with style.drawing({}):
+        figure = Figure(figsize=(8, 6), layout="constrained")
+        top, bottom = figure.subplots(2, 2, width_ratios=(2, 1))
+        _moduli(top[0], compound)
+        _misfit(bottom[0], compound)
+        bottom[0].sharex(top[0])
+        if job_band:
+            for axes, label in ((top[0], "frequencies of the job"), (bottom[0], None)):
+                axes.axvspan(*job_band, color=BAND, alpha=0.25, lw=0, label=label)
+        top[0].legend(frameon=False, fontsize="small")
+        _spectrum(top[1], compound)
+        _shift(bottom[1], compound)
+        for axes in (*top, *bottom):
+            axes.grid(alpha=0.3)
+        style.save(figure, file, dpi=150)
 
 
 def _reduced(compound: Compound) -> Iterator[tuple[Set, np.ndarray]]:

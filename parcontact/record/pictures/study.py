@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -57,7 +56,7 @@ def plot(
     `doubts` are the relative uncertainties of the references, shown as grey bands: what lies in them is not known.
     """
     drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
-    with rc_context(style.RC):
+    with style.drawing():
         figures = {"convergence.png": _convergence(drawn, doubts)} if drawn else {}
         figures["work_precision.png"] = _work_precision(points)
         for name, figure in figures.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .. import files
@@ -33,6 +35,17 @@ RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
+
+
+@contextmanager
+def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
+    """Pictures look as these settings say, and otherwise as Matplotlib's own: a matplotlibrc of others has no say."""
+    import matplotlib as mpl  # slow to import, and for pictures only
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(settings)
+        yield
 
 
 MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures say what has made them

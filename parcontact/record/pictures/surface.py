@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import BinaryIO
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -31,7 +30,7 @@ class Sketch:
 
 def draw(sketch: Sketch, file: BinaryIO, kind: str) -> None:
     """Write the picture, a png, pdf or svg."""
-    with mpl.rc_context(style.RC):
+    with style.drawing():
         figure = Figure(figsize=(style.WIDTH, 2 * style.HEIGHT), layout="constrained")
         for axes, panel in zip(figure.subplots(2, 2).ravel(), PANELS.values(), strict=True):
             panel(axes, sketch)
