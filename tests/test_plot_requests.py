@@ -260,8 +260,8 @@ def test_all_maps_that_were_saved(tmp_path: Path, drawn: list[Figure]) -> None:
     assert asked(ran(tmp_path, WAVE + ELASTIC + LOADS + fields), "--panels", "maps") == 0
     assert [axes.get_title().split("\n")[0] for axes in drawn[0].axes if axes.get_xlabel()] == [
         "pressure",
-        "gap",
-        "height",
+        "gap (contact black)",
+        "height (up is into the body)",
     ]
 
 
