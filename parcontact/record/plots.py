@@ -65,7 +65,8 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with rc_context(style.RC):
-        figure = layout.figure_of(_wrapped(steady.title(table.parent)), [_steady(table.parent, Options())])
+        panels = [_steady(table.parent, Options())]
+        figure = layout.figure_of(_wrapped(steady.title(table.parent)), panels, legend=True)
         return _save(figure, table.with_suffix(""), Options())
 
 
@@ -120,7 +121,8 @@ def _picture(directory: Path, options: Options) -> Figure:
         )
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    return layout.figure_of("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups)
+    alone = (directory / steady.TABLE).is_file() and len(groups) == 1
+    return layout.figure_of("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups, alone)
 
 
 def _instead(path: Path) -> str:
