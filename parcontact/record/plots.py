@@ -113,7 +113,7 @@ def _picture(directory: Path, options: Options) -> Figure:
         groups.insert(1, _steady(directory, options))
     if (directory / sweep.TABLE).is_file():
         title = title if groups else _wrapped(sweep.title(directory) or title)
-        groups.append(_panels(_chosen(sweep.charts(directory), options), options))
+        groups += [_panels([chart], options) for chart in _chosen(sweep.charts(directory), options)]
     elif not groups:
         raise InputError(
             f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawing import ELASTIC, LOADS, WAVE, touching
+from drawing import ELASTIC, LOADS, WAVE, outside, touching
 from matplotlib.figure import Figure
 
 from parcontact import job
 from parcontact.record.pictures import sweep
 from parcontact.record.plots import Options, plot
 
+SIZES = (1e-3, 2e-3, 3e-3)
 HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "state", "mu_max", "mu_dyn", "contact_area")
 
 
@@ -83,3 +84,16 @@ def test_dots_of_cases_have_a_key(tmp_path: Path, drawn: list[Figure]) -> None:
     names = [[text.get_text() for text in legend.get_texts()] for legend in legends if legend is not None]
     assert names == [["highest", "each case", "theory", "dynamic"], ["highest", "theory", "dynamic"]]
     assert not touching(drawn[0])
+
+
+def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Three values of a second key, means, cases and theories: thirteen names on the page, and none over a line."""
+    rows = [case(v, seed, v * seed + 1e3 * size, size) for v in (1.0, 2.0) for seed in (1, 2) for size in SIZES]
+    plot([saved(tmp_path, *rows)], Options())
+    (figure,) = drawn
+    assert not touching(figure)
+    assert not outside(figure)
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        assert legend is not None
+        assert legend.get_window_extent().x0 >= axes.get_window_extent().x1

@@ -18,6 +18,8 @@ SPIKE_SHARE = 0.02  # of the abscissa, at its beginning: what stands out there o
 SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
 AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
+FEW_NAMES = 2  # of lines, for which a key finds room among them
+HEADROOM = 1.08  # of a panel over its highest point
 FRACTION = "contact area /\nnominal area"
 MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
@@ -48,7 +50,7 @@ class Axis:
 class Chart:
     """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
     are names, starts and ends over `x`; `peak`: whether the highest point is told, and so stays in the picture;
-    `headroom`: the height of the panel over that of its highest point."""
+    `beside`: whether the key is beside the panel, which then needs the whole width."""
 
     key: str
     x: Axis
@@ -61,10 +63,15 @@ class Chart:
     named: bool = False
     legend_title: str = ""
     log_x: bool = False
-    headroom: float = 1.08
+    beside: bool = False
 
     def __call__(self, axes: Axes) -> None:
         draw(self, axes)
+
+
+def with_key_beside(chart: Chart) -> Chart:
+    """A chart that stands alone: the key of many lines is beside them, where it hides none."""
+    return replace(chart, beside=sum(bool(one.name) for one in chart.series) > FEW_NAMES)
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
@@ -88,7 +95,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     _scale(axes, "x", xs, log_x)
     _scale(axes, "y", ys, log_y)
     if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        axes.set_ylim(0.0, chart.headroom * highest or 1.0)
+        axes.set_ylim(0.0, HEADROOM * highest or 1.0)
         if not highest:
             axes.set_yticks([0.0])  # a scale would be made up
     if top < math.inf:
@@ -100,7 +107,10 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     width = units.size_of(x_unit, chart.x.unit) if x_unit else 1.0
     _mark(axes, [(name, a / width, b / width) for name, a, b in chart.stages], chart.named)
     if any(one.name for one in chart.series):
-        legend = axes.legend(title=chart.legend_title or None, title_fontsize=9, ncols=1 + (len(chart.series) > 4))
+        place: dict[str, Any] = {"ncols": 1 + (len(chart.series) > 4)}
+        legend = axes.legend(
+            title=chart.legend_title or None, title_fontsize=9, **(style.BESIDE if chart.beside else place)
+        )
         for text in legend.get_texts():
             text.set_path_effects(HALO)
 

@@ -61,7 +61,7 @@ def strips(run: Run, fields: Fields) -> Panel:
         axes.set_xlabel(("x " if lies else "y ") + axes.get_xlabel())
         some = "some of the " if len(curves) < len(fields.shown) else "the "
         axes.set_title(f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads")
-        _legend_beside(axes)
+        axes.legend(**style.BESIDE)
 
     return draw
 
@@ -84,15 +84,15 @@ def profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
         length, unit = _draw_curves(axes, curves)
         if isinstance(shape, Sphere) and force > 0.0:
             r = np.linspace(-reach, reach, 401)
-            for name, modulus, style in _moduli(run.job):
+            for name, modulus, dashes in _moduli(run.job):
                 pressure = hertz.pressure(np.abs(r), force, shape.radius, modulus, run.job.material.poisson)
-                axes.plot(r / length, pressure / unit, "k" + style, lw=1.0, label=name)
+                axes.plot(r / length, pressure / unit, "k" + dashes, lw=1.0, label=name)
         axes.set_xlabel(f"{'y' if across else 'x'} from the axis {axes.get_xlabel()}")
         axes.set_title(f"pressure on a line through the axis{load}")
         if reach > 0.0:
             axes.set_xlim(-reach / length, reach / length)
         axes.set_ylim(bottom=0.0)
-        _legend_beside(axes)
+        axes.legend(**style.BESIDE)
 
     return draw
 
@@ -104,7 +104,3 @@ def _moduli(job: Job) -> list[tuple[str, float, str]]:
         return [("Hertz", material.shear_modulus, "--")]
     ends = [("Hertz, G(0)", material.instant_modulus, "--"), ("Hertz, G(∞)", material.long_modulus, ":")]
     return [end for end in ends if end[1] > 0.0]
-
-
-def _legend_beside(axes: Axes) -> None:
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, handlelength=1.2)

@@ -35,6 +35,12 @@ RC: dict[Any, Any] = {
 }
 
 
+BESIDE: dict[str, Any] = {  # where the legend of a panel is that leaves it no room
+    "loc": "upper left",
+    "bbox_to_anchor": (1.0, 1.0),
+    "borderaxespad": 0.0,
+    "handlelength": 1.2,
+}
 MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures say what has made them
 
 
