@@ -59,13 +59,15 @@ def _browser(file: h5py.File, name: str, labels: Labels) -> Browser:
             frames.show(index, f"{name}, {label}")
             image = io.BytesIO()
             frames.figure.savefig(image, format="png", dpi=DPI)
-            uris.append(uri_of(_fewer_colours(image), "image/png"))
+            uris.append(uri_of(fewer_colours(image), "image/png"))
     return Browser(name, list(labels.values()), uris)
 
 
-def _fewer_colours(png: io.BytesIO) -> bytes:
-    small = io.BytesIO()
-    Image.open(png).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(small, "png", optimize=True)
+def fewer_colours(png: io.BytesIO) -> bytes:
+    """The picture with so few colours that all of it, also what is rare, has nearly its own."""
+    small, true = io.BytesIO(), Image.open(png).convert("RGB")
+    few = true.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few.save(small, "png", optimize=True)
     return small.getvalue()
 
 

@@ -1,15 +1,18 @@
 """Maps in pictures, films and reports: one look, told when and under what load, and no scale that is made up."""
 
+import io
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from drawing import ELASTIC, LOADS, SPHERE, STRIP, WAVE, ZENER, ran
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 
 from parcontact.record import plots
 from parcontact.record.pictures import frames, maps, movie
@@ -119,3 +122,15 @@ def test_no_scale_of_nothing(
             assert (found.colorbar is None) == (ticks is None)
             if found.colorbar is not None:
                 assert list(found.colorbar.get_ticks()) == ticks
+
+
+def test_rare_colours_stay() -> None:
+    """A map of nearly one value leaves the colours of its scale as they are, to 2 %."""
+    scale = np.vstack([np.linspace(0.3, 1.0, 256)] * 500 + [np.linspace(0.0, 1.0, 256)])
+    colors = (255 * colormaps["viridis"](scale)[..., :3]).round().astype(np.uint8)
+    colors[:200] = 255  # the paper, and grey around letters
+    colors[:2] = np.arange(256)[None, :, None]
+    file = io.BytesIO()
+    Image.fromarray(colors).save(file, "png")
+    found = np.asarray(Image.open(io.BytesIO(browse.fewer_colours(file))).convert("RGB"))
+    assert np.abs(found.astype(int) - colors).max() <= 0.02 * 255
