@@ -14,10 +14,11 @@ from .command import ranks
 from .command.verbs import BAD_INPUT, DONE, FAILED
 from .command.words import understand
 from .errors import InputError, JobError, RunError
-from .streams import patient
+from .streams import patient, why_unread
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
 WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the others to do so too
+LEAVE_FILES = {"run", "steady", "theory", "fit", "surface", "study", "plot", "report"}  # what they print is also there
 UNCOLLECTED_OBJECTS = 20_000  # that Python may make before it looks for cycles among them; imports make far more
 
 
@@ -43,12 +44,25 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(words: list[str]) -> int:
     try:
         options = understand(words)
-        return _leave_code(int(options.act(options)))
+        code = int(options.act(options))
+        return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output())
+    except SystemExit as asked:  # of --help and --version
+        if asked.code or _judge_output() == DONE:
+            raise
+        return BAD_INPUT
     except (InputError, RunError) as error:
         code = FAILED if isinstance(error, RunError) else BAD_INPUT
         return _end_together(str(error) if isinstance(error, JobError) else f"parcontact: {error}", code)
     except (Exception, KeyboardInterrupt) as error:
         _end_all(error)
+
+
+def _judge_output() -> int:
+    """The exit code of what has done its work if somebody can read it."""
+    reason = why_unread() if ranks.is_root() else ""
+    if reason:
+        print(f"parcontact: cannot write to standard output: {reason}", file=sys.stderr, flush=True)
+    return BAD_INPUT if reason else DONE
 
 
 def _leave_code(code: int) -> int:

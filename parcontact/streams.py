@@ -24,6 +24,7 @@ class Patient(io.TextIOBase):
 
     def __init__(self, stream: TextIO | None, plain: bool) -> None:
         self._stream, self._plain, self.gone = stream, plain, False
+        self.lost = "" if stream else "it is closed"  # why not all was written, but for a reader who has left
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -35,16 +36,21 @@ class Patient(io.TextIOBase):
                 self._stream.write(shown)
             except UnicodeEncodeError:
                 self._stream.write(shown.encode("ascii", "backslashreplace").decode())
-            except (OSError, ValueError):
-                self.gone = True
+            except (OSError, ValueError) as error:
+                self._give_up(error)
         return len(text)
 
     def flush(self) -> None:
         if self._stream is not None and not self.gone:
             try:
                 self._stream.flush()
-            except (OSError, ValueError):
-                self.gone = True
+            except (OSError, ValueError) as error:
+                self._give_up(error)
+
+    def _give_up(self, error: OSError | ValueError) -> None:
+        self.gone = True
+        if not isinstance(error, BrokenPipeError):
+            self.lost = getattr(error, "strerror", None) or "it is closed"
 
     def isatty(self) -> bool:
         with suppress(OSError, ValueError):
@@ -73,3 +79,9 @@ def patient() -> Iterator[None]:
         sys.stdout, sys.stderr = before
         out.let_go()
         err.let_go()
+
+
+def why_unread() -> str:
+    """Why nobody can read what was printed so far; '' if all was written, or if its reader has left before the end."""
+    sys.stdout.flush()
+    return sys.stdout.lost if isinstance(sys.stdout, Patient) else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import ranks
+from .ranks import root_alone
 from .verbs import DONE
 
 if TYPE_CHECKING:
@@ -33,14 +33,9 @@ def add_verbs(found: Verbs, parser: argparse.ArgumentParser) -> None:
     own.set_defaults(act=completion, parser=parser)
 
 
+@root_alone
 def manual(options: argparse.Namespace) -> int:
-    """Root alone; without MPI but for the page on Python, which imports all that it tells of."""
     from ..manual import texts
-
-    if texts.imports(options.page):
-        ranks.start()
-    if not ranks.is_root():
-        return DONE
     from .completion import reference
 
     if options.open:
@@ -54,30 +49,27 @@ def manual(options: argparse.Namespace) -> int:
     return DONE
 
 
+@root_alone
 def schema(options: argparse.Namespace) -> int:
-    """Root alone, without MPI."""
-    if ranks.is_root():
-        import json
+    import json
 
-        from ..job import schema as job_schema
+    from ..job import schema as job_schema
 
-        print(json.dumps(job_schema.schema(), indent=1))
+    print(json.dumps(job_schema.schema(), indent=1))
     return DONE
 
 
+@root_alone
 def cite(options: argparse.Namespace) -> int:
-    """Root alone, without MPI."""
-    if ranks.is_root():
-        from ..record import citations
+    from ..record import citations
 
-        print(citations.describe(options.directory))
+    print(citations.describe(options.directory))
     return DONE
 
 
+@root_alone
 def completion(options: argparse.Namespace) -> int:
-    """Root alone, without MPI."""
-    if ranks.is_root():
-        from .completion import bash
+    from .completion import bash
 
-        print(bash(options.parser))
+    print(bash(options.parser))
     return DONE

@@ -8,12 +8,19 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import wraps
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..parallel.root import on_root
 
 if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Callable
+
     from ..parallel.mpi import MPI
+
+    Verb = Callable[[argparse.Namespace], int]
 
 BLANK = " \0"  # what may follow the name of an MPI library
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # say which rank a process is
@@ -55,3 +62,15 @@ def start() -> MPI.Intracomm:
             "(see parcontact manual install)."
         )
     return world
+
+
+def root_alone(verb: Verb) -> Verb:
+    """A verb that root does alone: without MPI where there is one rank; several start it, as what root imports may."""
+
+    @wraps(verb)
+    def act(options: argparse.Namespace) -> int:
+        if launched() > 1:
+            return on_root(start(), lambda: verb(options))
+        return verb(options) if is_root() else 0
+
+    return act

@@ -55,33 +55,32 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     return code
 
 
+@ranks.root_alone
 def check(options: argparse.Namespace) -> int:
-    """Root alone, without MPI."""
-    if ranks.is_root():
-        from .. import job as jobs
+    from .. import job as jobs
 
-        cases, chosen = cases_of(options)
-        job = chosen[0].job
-        print(jobs.describe(job))
-        if job.included:
-            print(f"\n{job.included}")
-        if job.about_steps:
-            print(f"\ntime steps that are chosen: {job.about_steps}")
-        each = [case.job for case in chosen]
-        doubts = [text for job in each for text in (*job.warnings, *_doubts(job))]
-        for warning in dict.fromkeys(doubts):
-            print(f"warning: {warning}")
-        if cases[0].settings:
-            print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
-            print("\n".join(map(str, chosen)))
+    cases, chosen = cases_of(options)
+    job = chosen[0].job
+    print(jobs.describe(job))
+    if job.included:
+        print(f"\n{job.included}")
+    if job.about_steps:
+        print(f"\ntime steps that are chosen: {job.about_steps}")
+    each = [case.job for case in chosen]
+    doubts = [text for job in each for text in (*job.warnings, *_doubts(job))]
+    for warning in dict.fromkeys(doubts):
+        print(f"warning: {warning}")
+    if cases[0].settings:
+        print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
+        print("\n".join(map(str, chosen)))
     return DONE
 
 
 def _doubts(job: Job) -> list[str]:
-    """What only a look at heights and measured moduli tells, for a root that no other ranks wait for."""
+    """What only a look at heights and measured moduli tells."""
     from ..job import meaning
 
-    if (meaning.says_all(job.surface) and not job.measured) or ranks.launched() > 1:
+    if meaning.says_all(job.surface) and not job.measured:
         return []
     from .. import sanity, scene
     from ..effects.measured_range import describe_beyond
@@ -150,10 +149,8 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
     return DONE
 
 
+@ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
-    """Root alone, without MPI."""
-    if not ranks.is_root():
-        return DONE
     from .. import job as jobs
     from ..effects.folded_branches import excited_band
     from ..record import compounds

@@ -20,7 +20,6 @@ MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
 FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
 Writers = Mapping[str, Callable[[], str]]
 OURS: Writers = {"keys": reference.keys}
-NOTHING: Writers = {"keys": str, "verbs": str}
 
 
 def names() -> list[str]:
@@ -44,11 +43,6 @@ def page(name: str, writers: Writers | None = None) -> str:
     known = {**OURS, **(writers or {})}
     text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
     return MARK.sub(lambda found: known[found.group(1)](), text)
-
-
-def imports(name: str) -> bool:
-    """Whether a page, to be read in a terminal, needs the functions that it tells of."""
-    return name in names() and docstrings.BLOCK.search(page(name, NOTHING)) is not None
 
 
 def plain(name: str, writers: Writers | None = None) -> str:

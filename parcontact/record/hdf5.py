@@ -22,6 +22,7 @@ from ..parallel.slab import Array, Slab
 
 T = TypeVar("T")
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
+TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
 
 
@@ -105,7 +106,7 @@ def reason(error: BaseException) -> str:
     if found := re.search(r"error message = '([^']+)'", text):
         return found.group(1)
     if isinstance(error, OSError) and error.strerror and error.errno:
-        return os.strerror(error.errno)
+        return TOO_LARGE if error.errno == errno.EFBIG else os.strerror(error.errno)
     return text.splitlines()[0] if text else type(error).__name__
 
 

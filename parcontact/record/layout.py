@@ -5,10 +5,12 @@ while it writes leaves a readable file. HDF5 does not survive a disk that is ful
 does that in memory, from where plain writing takes it to the disk.
 """
 
+import io
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import h5py
 import numpy as np
@@ -18,21 +20,21 @@ from ..parallel.slab import Slab
 from . import hdf5
 from .hdf5 import overwrite
 
-PIECE = 1 << 20  # bytes read at a time
+PIECE = 1 << 16  # bytes read at a time
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], block: int = 0) -> None:
     """Root makes the file with `build(file)`, after an empty `block` of bytes; collective. The name must be unused."""
 
     def make() -> None:
-        with _memory() as memory:
-            with h5py.File(memory, "w", userblock_size=block) as file:
-                build(file)
-                found = regions(file)
-            size = os.fstat(memory.fileno()).st_size
-            with path.open("xb") as target:
-                target.truncate(size)
-                _copy(memory, target, outside(size, found))
+        memory = _Memory()
+        with h5py.File(memory, "w", userblock_size=block) as file:
+            build(file)
+            found = regions(file)
+        with path.open("xb") as target, _removed_after_an_error(path):
+            target.truncate(memory.size)
+            for start, stop in outside(memory.size, found):
+                overwrite(target, memory.piece(start, stop - start), start)
 
     hdf5.on_root(slab, make, f"cannot make {path}")
 
@@ -43,16 +45,18 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
     def apply() -> None:
         with h5py.File(path, "r", locking=False) as file:
             found = regions(file)
-        with _memory() as memory, path.open("r+b") as target:
-            size = os.fstat(target.fileno()).st_size
+        with path.open("r+b") as target:
+            memory, size = _Memory(), os.fstat(target.fileno()).st_size
             memory.truncate(size)
             spans = list(outside(size, found))
-            _copy(target, memory, spans)
+            for start, stop in spans:
+                memory.put(os.pread(target.fileno(), stop - start, start), start)
             with h5py.File(memory, "r+") as file:
                 act(file)
-            if os.fstat(memory.fileno()).st_size != size:
+            if memory.size != size:
                 raise ValueError("its length may not change")
-            _copy(memory, target, spans)
+            for start, stop in spans:
+                overwrite(target, memory.piece(start, stop - start), start)
 
     hdf5.on_root(slab, apply, f"cannot write {path}")
 
@@ -88,14 +92,58 @@ def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterat
         start = last
 
 
-def _memory() -> BinaryIO:
-    """A file in memory, whose holes take none."""
-    return open(os.memfd_create("hdf5"), "w+b", buffering=0)
+@contextmanager
+def _removed_after_an_error(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
 
 
-def _copy(source: BinaryIO, target: BinaryIO, spans: Iterable[tuple[int, int]]) -> None:
-    for start, stop in spans:
-        overwrite(target, os.pread(source.fileno(), stop - start, start), start)
+class _Memory(io.RawIOBase):
+    """A file in memory for HDF5, which crashes where a write fails; the places of maps, never written, take no room."""
+
+    def __init__(self) -> None:
+        self.size, self._at = 0, 0
+        self._pages: dict[int, bytearray] = {}
+
+    def put(self, data: bytes | memoryview, start: int) -> None:
+        """Write from a place on."""
+        done = 0
+        while done < len(data):
+            number, first = divmod(start + done, PIECE)
+            count = min(PIECE - first, len(data) - done)
+            page = self._pages.setdefault(number, bytearray(PIECE))
+            page[first : first + count] = data[done : done + count]
+            done += count
+        self.size = max(self.size, start + len(data))
+
+    def piece(self, start: int, length: int) -> bytes:
+        """Read from a place on."""
+        stop = min(start + length, self.size)
+        numbers = range(start // PIECE, -(-stop // PIECE))
+        whole = b"".join(self._pages.get(number, bytes(PIECE)) for number in numbers)
+        return whole[start % PIECE : start % PIECE + max(0, stop - start)]
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self.size}[whence]
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        data = self.piece(self._at, len(buffer))
+        buffer[: len(data)] = data
+        self._at += len(data)
+        return len(data)
+
+    def write(self, data: Any) -> int:
+        self.put(memoryview(data), self._at)
+        self._at += len(data)
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self._at if size is None else size
+        return self.size
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:

@@ -17,6 +17,8 @@ from . import curve_points, files, measures, slide
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
 COLUMNS = ("state", *RESULTS, "residual", *slide.ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
+NUMBERS = frozenset(COLUMNS) - {"state"}
+MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SEED = "seed"  # the last word of keys over whose values means are taken
 FAILURE = ".failure"  # why a case has failed
@@ -38,8 +40,8 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
 def read(path: Path) -> list[dict[str, Any]]:
     """The rows of a table, numbers as such, an empty field as nan. Raises InputError for what is no such table."""
     try:
-        with path.open(newline="") as file:
-            names, *rows = list(csv.reader(file)) or [[]]
+        text = path.read_text(encoding="utf-8")
+        names, *rows = list(csv.reader(StringIO(text, newline=""))) or [[]]
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(f"{path} cannot be read: {error}") from error
     if names[:1] != ["case"] or "state" not in names:
@@ -50,6 +52,11 @@ def read(path: Path) -> list[dict[str, Any]]:
                 f"{path}, line {number}: the number of a case and {len(names) - 1} values more were expected, got "
                 f"{','.join(cells)[:60]!r}"
             )
+        for name, cell in zip(names, cells, strict=True):
+            if name in NUMBERS and not isinstance(_number(cell), float):
+                raise InputError(f"{path}, line {number}: {name} is {cell[:20]!r}, not a number; {MEND}")
+    if not text.endswith("\n"):
+        raise InputError(f"{path} ends within line {len(rows) + 1}; {MEND}")
     return [dict(zip(names, map(_number, cells), strict=True)) for cells in rows]
 
 

@@ -56,7 +56,6 @@ class Point:
     seconds: float
     dissipated: tuple[float, ...]
 
-
     @property
     def error_friction(self) -> float:
         """The relative error of friction; NaN where there is none."""

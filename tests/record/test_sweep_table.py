@@ -19,6 +19,9 @@ DAMAGED = {
         "line 3: the number of a case and 3 values more were expected, got '1,2.0'",
     ),
     "no case": (f"{HEAD}x,1.0,done,0.1\n", "line 2: the number of a case and 3 values more were expected"),
+    "cut number": (f"{HEAD}0,1.0,done,0.1\n1,2.0,done,0.01", "sweep.csv ends within line 3"),
+    "cut names": (HEAD[:-4], "sweep.csv ends within line 1"),
+    "no number": (f"{HEAD}0,1.0,done,0.1\n1,2.0,done,O.1\n", "line 3: mu_max is 'O.1', not a number"),
     "zeros": ("\0" * 99, "sweep.csv cannot be read: line contains NUL|is damaged"),
 }
 
