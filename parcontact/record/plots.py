@@ -64,7 +64,8 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        figure = layout.figure_of(_wrapped(steady.title(table.parent)), [_steady(table.parent, Options())])
+        panels = [_steady(table.parent, Options())]
+        figure = layout.figure_of(_wrapped(steady.title(table.parent)), panels, legend=True)
         return _save(figure, table.with_suffix(""), Options())
 
 
@@ -111,7 +112,7 @@ def _picture(directory: Path, options: Options) -> Figure:
         groups.insert(1, _steady(directory, options))
     if (directory / sweep.TABLE).is_file():
         title = title if groups else _wrapped(sweep.title(directory) or title)
-        groups.append(_panels(_chosen(sweep.charts(directory), options), options))
+        groups += [_panels([chart], options) for chart in _chosen(sweep.charts(directory), options)]
     elif not groups:
         raise InputError(
             f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"
@@ -119,7 +120,8 @@ def _picture(directory: Path, options: Options) -> Figure:
         )
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    return layout.figure_of("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups)
+    alone = (directory / steady.TABLE).is_file() and len(groups) == 1
+    return layout.figure_of("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups, alone)
 
 
 def _instead(path: Path) -> str:

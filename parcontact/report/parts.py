@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..record import files
 from ..record.pictures import style
-from ..record.pictures.charts import Chart, draw
+from ..record.pictures.charts import Chart, draw, with_key_beside
 from ..record.pictures.run import Panel
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
@@ -90,7 +90,9 @@ class Chapter:
 
 def of_chart(chart: Chart, caption: str = "") -> Picture:
     """A picture of one chart."""
-    return of_panel(partial(draw, chart), caption or f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
+    return of_panel(
+        partial(draw, with_key_beside(chart)), caption or f"{chart.y.name} over {chart.x.name}".replace("\n", " ")
+    )
 
 
 def of_panel(panel: Panel, caption: str) -> Picture:

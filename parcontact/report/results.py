@@ -32,7 +32,7 @@ def of_run(directory: Path) -> Section:
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     pictures = [of_chart(chart) for chart in histories.charts(run)]
     told = [*slide.describe(run.job, columns), theory_settings.describe(directory)]
-    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(directory))
+    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(run))
 
 
 def of_curve(directory: Path) -> Section:

@@ -10,18 +10,18 @@ from . import style
 from .run import Panel
 
 LINE = 68  # letters of a title
-LEGEND_LINE = 0.2  # height of each line of a legend above panels, beyond the first [inch]
+LEGEND_LINE = 0.2  # height of each line of a legend [inch]
 
 
 def figure_of(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False) -> Figure:
-    """Groups of panels below each other, each in even rows; with `legend` one for all panels, above them.
+    """Groups of panels below each other, each in even rows; with `legend` one for all panels, under the title.
 
     Draw it within `style.RC`.
     """
     rows = [row for group in groups for row in _rows(group)]
     height = 0.25 + 0.2 * (title.count("\n") + 1) + style.HEIGHT * len(rows)
     figure = Figure(figsize=(style.WIDTH, height), layout="constrained")
-    if title:
+    if title and not legend:
         figure.suptitle(style.plain(title), fontsize=11)
     drawn = []
     for part, panels in zip(figure.subfigures(len(rows) or 1, 1, squeeze=False)[:, 0], rows, strict=False):
@@ -29,7 +29,7 @@ def figure_of(title: str, groups: Sequence[Sequence[Panel]], legend: bool = Fals
             panel(axes)
             drawn.append(axes)
     if legend and drawn:
-        _legend_above(figure, drawn)
+        _legend_above(figure, drawn, title)
     return figure
 
 
@@ -38,13 +38,14 @@ def _rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
 
 
-def _legend_above(figure: Figure, drawn: Sequence[Axes]) -> None:
-    """One legend of what all panels show, in place of theirs."""
+def _legend_above(figure: Figure, drawn: Sequence[Axes], title: str) -> None:
+    """One legend of what all panels show, in place of theirs; the title of the figure is its own."""
     found: dict[str, Artist] = {}
     for axes in drawn:
         found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
         if legend := axes.get_legend():
             legend.remove()
     columns = max(1, min(len(found), LINE // (8 + max(map(len, found)))))
-    figure.set_figheight(figure.get_figheight() + LEGEND_LINE * (-(-len(found) // columns) - 1))
-    figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=columns)
+    figure.set_figheight(figure.get_figheight() + LEGEND_LINE * -(-len(found) // columns))
+    handles, names, title = list(found.values()), list(found), style.plain(title)
+    figure.legend(handles, names, loc="outside upper center", ncols=columns, title=title, title_fontsize=11)
