@@ -17,7 +17,14 @@ def open_numbers(path: Path) -> NDArray[Any]:
         start = file.read(12)
     if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:  # numpy would read them
         raise InputError(f"{path} cannot be read: its header claims to be larger than {HEADER_BYTES / 1e6:g} MB")
-    values = np.lib.format.open_memmap(path, mode="r")
+    try:
+        values = np.lib.format.open_memmap(path, mode="r")
+    except ValueError as error:
+        if "mmap length" not in str(error):
+            raise
+        raise InputError(
+            f"{path} cannot be read: it ends before the last of the values that its header tells"
+        ) from error
     refuse_no_numbers(path, values.dtype)
     return values
 

@@ -237,7 +237,12 @@ def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
     return f"; more than numerics.accuracy = {accuracy:g} asks for: try {remedy}"
 
 
+def per_cent(share: float) -> str:
+    """Return a share in per cent, to two digits at least."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+
+
 def describe(parts: Parts) -> str:
     """Return the total in per cent, and what it is made of."""
-    shares = ", ".join(f"{name} {100 * getattr(parts, name):.2g} %" for name in NAMES)
+    shares = ", ".join(f"{name} {per_cent(getattr(parts, name))}" for name in NAMES)
     return f"{100 * parts.total:.3g} % ({shares})"

@@ -22,7 +22,7 @@ from ..job.advice import STEPS_PER_WAVE, cells_per_wave
 from ..job.chosen import ChosenEnds
 from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.table import plain
-from ..physics.budget import SPOTS_ORDER
+from ..physics.budget import SPOTS_ORDER, per_cent
 from ..physics.time_error import TIME_ORDER
 from .report import MARK, Costs, duration_text, ranks_text, unit_of
 from .sample import Sample, StageCost
@@ -204,7 +204,7 @@ def _with_calls(cost: StageCost, times: float) -> StageCost:
 def table(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     """Mesh, steps, precision, memory and time of each accuracy on some numbers of ranks, and how far to trust them."""
     own = Offer(costs.job.numerics.accuracy, costs, _area_error(costs, costs.job))
-    rows = [("this job", own), *((_per_cent(one.accuracy), one) for one in offers(costs))]
+    rows = [("this job", own), *((per_cent(one.accuracy), one) for one in offers(costs))]
     unit, size = unit_of(max(each.costs.held(1) for _, each in rows))
     slides = costs.scaling.samples[0].total("friction weight") > 0.0
     yield f"what accuracy costs, in {'friction; the contact area is then within' if slides else 'contact area'}"
@@ -213,14 +213,10 @@ def table(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
     yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11}" + "".join(f" {ranks_text(n):>10}" for n in ranks)
     for name, each in rows:
         grid, held = each.job.grid, each.costs.held(1) / size
-        area = f"{_per_cent(each.area):>9}" if slides else ""
+        area = f"{per_cent(each.area):>9}" if slides else ""
         numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.steps:9d}  {each.job.numerics.precision:9}{held:11.4g}"
         yield f"  {name:9}{area}{numbers}" + "".join(f" {_time(each.costs, count):>10}" for count in ranks)
     yield from _basis(costs)
-
-
-def _per_cent(share: float) -> str:
-    return f"{100 * share:.2g} %"
 
 
 def _time(costs: Costs, ranks: int) -> str:
@@ -237,8 +233,8 @@ def _basis(costs: Costs) -> Iterator[str]:
     if sample.job.steady:
         what, errors = "state", ""
     else:
-        what, errors = "step", f", errors of {_per_cent(time_error(StageCost(0), sample))} by time steps"
-    by_mesh = "errors by the mesh unknown" if mesh is None else f"errors of {_per_cent(mesh)} by the mesh"
+        what, errors = "step", f", errors of {per_cent(time_error(StageCost(0), sample))} by time steps"
+    by_mesh = "errors by the mesh unknown" if mesh is None else f"errors of {per_cent(mesh)} by the mesh"
     points = " x ".join(map(str, sample.job.grid.points))
     yield f"measured on {points} points: times, {calls:.3g} operator calls a {what}{errors}, {by_mesh}"
     yield (

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..job import Initial, Job, Ramp, Stage
+from ..physics.budget import per_cent
 
 DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
 SAME_INSTANT = 1e-9  # relative: instants this close are the same
+CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
 
 
@@ -109,14 +111,24 @@ def describe(job: Job, columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
     yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}{within}, {after}"
     length = f"{distance[-1] - distance[0]:.4g} m"
     yield f"mu_dyn, the mean friction over the last three quarters of its {length}, is {found.mu_dyn:.6g}"
-    yield f"the mean contact area over the same is {found.contact_area:.6g}"
+    yield f"the mean contact area over the same is {found.contact_area:.6g}{_corrected(so_far, columns)}"
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
-        told = ", ".join(f"{what[name]} {100 * value:.2g} %" for name, value in known.items())
+        told = ", ".join(f"{what[name]} {per_cent(value)}" for name, value in known.items())
         yield f"largest errors of the steps of the slide: {told}"
+    if known.get(ERRORS[0], 0.0) >= 1.0:
+        yield "friction of some of its steps cannot be told from no friction"
     if _goes_on(job.initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
+
+
+def _corrected(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> str:
+    """The mean contact area as corrected by its edges, whose error is told."""
+    if CORRECTED not in columns:
+        return ""
+    found = measure(history, {**columns, "contact_area": columns[CORRECTED]})
+    return f", corrected by its edges {found.contact_area:.6g}" if found else ""
 
 
 def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:

@@ -14,7 +14,10 @@ from .parts import Picture, Section, Table, of_chart, uri_of
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 SHOWN = ("friction", "contact_area", "approach", "mean_gap", "max_pressure")
 INTERFACE = ("friction_viscous", "friction_interface")
-POINTS = ("velocity", "temperature", "pressure", "friction", *INTERFACE, "contact_area", "mean_gap", "max_pressure")
+POINTS = (
+    *("velocity", "temperature", "pressure", "friction", "error_friction", *INTERFACE),
+    *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
+)
 DIGITS = 5
 MOST_ROWS = 200  # of a table: the whole is in the data
 

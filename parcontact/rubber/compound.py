@@ -1,11 +1,16 @@
 """A compound from a table of measured moduli: fitted, and written as a material file that any job can include."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import InputError
+from .sane import odd_moduli
 from .shift import WLF, Arrhenius, Factors, Shift
 
 if TYPE_CHECKING:
@@ -15,6 +20,7 @@ TITLE = "# Fitted by parcontact fit to"  # with which material files of fits beg
 POOR, HOPELESS = 0.2, 1.0  # rms errors of fits that are warned of, and refused
 CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # misfits of more than so many times the scatter, and so much, are told
 SWAPPED = 0.5  # of the misfit: that of exchanged moduli, if they were
+WIDE_GAP = 1.0  # decades between sweeps as shifted, beyond which they say nothing of the shift
 DIGITS = 7  # of the numbers in a material file
 
 
@@ -22,13 +28,14 @@ DIGITS = 7  # of the numbers in a material file
 class Compound:
     """What was measured (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
     `shift` (None for a table of one temperature); `poisson` is the ratio with which Young's moduli were divided; both
-    moduli count in the fit, or only the one to `weigh`."""
+    moduli count in the fit, or only the one to `weigh`; whether the shift was fitted to the sweeps that it `joined`."""
 
     measured: Any
     series: Any
     shift: Shift | None
     poisson: float
     weigh: "Weigh" = "both"
+    joined: bool = False
 
     def material(self) -> dict[str, Any]:
         """The material section of a job."""
@@ -69,7 +76,26 @@ class Compound:
                 "they contradict each other (Kramers-Kronig), or the sweeps do not shift onto one another; check the "
                 "table, or weigh one of them: --weight storage, or loss"
             )
-        return found
+        return [*found, *self._gaps(), *odd_moduli(self.measured.sets)]
+
+    def _gaps(self) -> Iterator[str]:
+        """Tell neighbouring sweeps that are far from overlapping, where the shift was fitted to them."""
+        if self.shift is None or not self.joined:
+            return
+        sign = 1.0 if self.measured.kind == "frequency" else -1.0
+        logs = [sign * self.shift.log_factor(t) for t in self.temperatures]
+        ends = [
+            (float(np.log10(each.at.min())) + log, float(np.log10(each.at.max())) + log)
+            for each, log in zip(self.measured.sets, logs, strict=True)
+        ]
+        for (one, mine), (other, its) in pairwise(zip(self.temperatures, ends, strict=True)):
+            gap = max(mine[0], its[0]) - min(mine[1], its[1])
+            if gap > WIDE_GAP:
+                yield (
+                    f"the sweeps at {one:g} and {other:g} C do not overlap, they are {gap:.2g} decades apart as "
+                    "shifted: nothing measured says how far, and moduli between them are a guess; measure at a "
+                    "temperature between, or give the shift: --shift FILE"
+                )
 
     def text(self) -> str:
         """The material file: what it is and how good, then the material."""
@@ -110,7 +136,9 @@ def fitted(
         middle = temperatures[len(temperatures) // 2]
         shift = series.find_shift(measured, middle if reference is None else reference, law, weigh)
     logs = [shift.log_factor(t) for t in temperatures] if shift is not None and temperatures else None
-    found = Compound(measured, series.fit(measured.sets, measured.kind, error, logs, weigh), shift, poisson, weigh)
+    joined = isinstance(law, str) and shift is not None
+    best = series.fit(measured.sets, measured.kind, error, logs, weigh)
+    found = Compound(measured, best, shift, poisson, weigh, joined)
     missed = found.series.error
     exchanged = missed if missed <= POOR or measured.kind == "time" else series.swapped(measured.sets, logs)
     if exchanged < SWAPPED * missed:

@@ -1,8 +1,9 @@
 """What cannot be a measured rubber: wrong units and orders, told in a sentence before anything is fitted."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ Array = NDArray[np.float64]
 MOST_DECADES = 40.0  # of frequencies or times in one table
 COLDEST = -150.0  # deg C: rubbers are not measured below
 SOFTEST, HARDEST = 3e3, 1e13  # Pa: of the largest modulus of a table; a soft gel, ten times diamond
+GLASS, SOFT = 4e9, 1e5  # Pa: shear moduli of no rubber's glass are larger, and of none's glass transition smaller
 RISE = 0.1  # of a relaxation modulus from its first to its last time, beyond scatter
 
 
@@ -30,6 +32,15 @@ def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: A
         raise InputError(
             f"{path}: its lowest temperature is {temperatures.min():.4g} C, below {COLDEST:g} C; is the unit C, not K?"
         )
+
+
+def odd_moduli(sets: Sequence[Any]) -> Iterator[str]:
+    """Tell shear moduli [Pa] of `sets` that are allowed but of no rubber."""
+    largest = max(float(each.storage.max()) for each in sets)
+    if largest > GLASS:
+        yield f"its largest shear modulus is {largest:.3g} Pa, more than rubber has as a glass: is the unit right?"
+    if largest < SOFT:
+        yield f"its largest shear modulus is {largest:.3g} Pa, softer than any rubber: is the unit right?"
 
 
 def refuse_rising(path: Path, sets: Sequence[Array]) -> None:

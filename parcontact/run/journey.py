@@ -202,7 +202,7 @@ class Journey:
         if self.errors.summary.area is not None and (text := describe_sample(self.job, self._slides)):
             console.say(text)
         if self.stop:
-            of = f"about {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
+            of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")
             return AGAIN
         self._tell_slide()

@@ -23,7 +23,7 @@ LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the 
 ERRORS = ("error_friction", "error_area", "friction_slopes")
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 WAVES = ("velocity", "pressure", "wavelength", "share")
-HEAD = "velocity [m/s]    load [Pa]      area  friction  error  calls  residual"
+HEAD = "velocity [m/s]    load [Pa]      area  error  friction  error  calls  residual"  # the area as corrected
 
 
 class CurveTable:
@@ -94,7 +94,8 @@ class CurveTable:
         self._file.append([repr(float(value)) for value in cells])
         self._points.append(point)
         self.say(
-            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area:9.5f} {point.friction:9.6f} "
+            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.errors.area.total)} "
+            f"{point.friction:9.6f} "
             f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
             f"{c.worst:9.2e}{f'  {point.temperature:g} C' if self.heated else ''}"
         )
@@ -134,4 +135,4 @@ class CurveTable:
 
 def _percent(share: float) -> str:
     """Return a relative error in six characters."""
-    return "> 100%" if share >= 1.0 else f"{100 * share:5.2g}%"
+    return "     -" if math.isnan(share) else "> 100%" if share >= 1.0 else f"{100 * share:5.2g}%"

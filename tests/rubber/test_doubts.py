@@ -11,7 +11,7 @@ from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.rubber import compound, sane, tables
 from parcontact.rubber.series import Weigh
-from parcontact.rubber.shift import Factors, given
+from parcontact.rubber.shift import WLF, Factors, given
 
 from . import measured
 
@@ -98,6 +98,27 @@ def test_scatter_is_what_neighbours_differ_by() -> None:
     assert sane.scatter([(x, smooth)]) < 1e-5
     assert sane.scatter([(x, smooth * np.exp(0.03 * dice.standard_normal(1000)))]) == pytest.approx(0.03, rel=0.1)
     assert np.isnan(sane.scatter([(x[:4], smooth[:4])]))
+
+
+def test_sweeps_that_do_not_overlap(tmp_path: Path) -> None:
+    """A fitted law joins sweeps of three decades at -20 and 60 C as it likes; one that is given is not judged."""
+    path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=(-20.0, 60.0))
+    (text,) = compound.fitted(path, 0.5, None, "wlf", 0.05).doubts()
+    assert text.startswith("the sweeps at -20 and 60 C do not overlap")
+    assert "measure at a temperature between" in text
+    known = WLF(measured.C1, measured.C2, measured.REFERENCE)
+    assert compound.fitted(path, 0.5, None, known, 0.05).doubts() == []
+    whole = measured.write_sweeps(tmp_path / "whole.csv")
+    assert compound.fitted(whole, 0.5, None, "wlf", 0.05).doubts() == []
+
+
+@pytest.mark.parametrize(("unit", "says"), [("GPa", "more than rubber has as a glass"), ("Pa", "softer than any")])
+def test_moduli_of_no_rubber(tmp_path: Path, unit: str, says: str) -> None:
+    """The rubber's 1 GPa as a thousand of them; a plateau of 1 MPa and a glass of 1 GPa as 1 and 1000 Pa times 50."""
+    scale = 1.0 if unit == "GPa" else 50.0
+    path = sweep(tmp_path / "rubber.csv", f"f[Hz],G'[{unit}],G''[{unit}]", [FREQUENCY, scale * STORAGE, scale * LOSS])
+    (text,) = compound.fitted(path, 0.5, None, "wlf", 0.05).doubts()
+    assert says in text
 
 
 def contradiction(path: Path, factor: float = 3.0) -> Path:

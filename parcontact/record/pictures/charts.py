@@ -95,7 +95,8 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     _scale(axes, "x", xs, log_x)
     _scale(axes, "y", ys, log_y)
     if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        axes.set_ylim(0.0, HEADROOM * highest or 1.0)
+        roofs = [_highest(_with_bar(y, one.error)) for y, one in zip(ys, chart.series, strict=True)]
+        axes.set_ylim(0.0, HEADROOM * max(highest, *roofs) or 1.0)
         if not highest:
             axes.set_yticks([0.0])  # a scale would be made up
     if top < math.inf:
@@ -120,6 +121,11 @@ def _draw_errors(axes: Axes, x: Array, y: Array, share: Array, color: str) -> No
     size = np.where(np.isfinite(share), np.abs(share * y), 0.0)
     below = np.minimum(size, LEAST * np.abs(y))
     axes.errorbar(x, y, yerr=[below, size], fmt="none", ecolor=color, elinewidth=1.0, capsize=2.5, alpha=0.7)
+
+
+def _with_bar(y: Array, share: Array | None) -> Array:
+    """The upper ends of bars of errors; those of more than all of a value may leave the picture."""
+    return y if share is None else y * (1.0 + np.where(np.isfinite(share), np.minimum(share, 1.0), 0.0))
 
 
 def _shown(values: Array, log: bool) -> Array:
