@@ -17,6 +17,8 @@ from conftest import WORLD, Main
 from matplotlib.figure import Figure
 
 from parcontact.command import verbs
+from parcontact.errors import InputError
+from parcontact.record import measures
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 
@@ -174,3 +176,15 @@ def test_what_to_cite_for_a_damaged_job(here: Path, main: Main, text: str) -> No
     code, _, said = main("cite", "out")
     assert code == BAD_INPUT
     assert said.startswith("parcontact: out/job.resolved.yaml is damaged: ")
+
+
+@pytest.mark.parametrize(("verb", "column"), [("report", "seconds"), ("report", "operator_calls"), ("info", "step")])
+def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) -> None:
+    assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
+    table = here / "out" / "measures.csv"
+    table.write_text(table.read_text().replace(column, "other", 1))
+    code, shown, said = main(verb, "out")
+    assert code == BAD_INPUT
+    assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
+    with pytest.raises(InputError, match="names no column"):
+        measures.read(table)[column]
