@@ -98,6 +98,7 @@ def test_limits_too_narrow_to_start(
     [
         (MemoryError(), "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"),
         (ImportError("libx.so: failed to map segment from shared object"), "parcontact: out of memory; "),
+        (SystemError("error return without exception set"), "parcontact: out of memory; "),
         (OSError(errno.EMFILE, "Too many open files"), "parcontact: out of open files; allow more by ulimit -n: "),
     ],
 )
@@ -106,7 +107,8 @@ def test_what_the_machine_lacks(main: Main, monkeypatch: pytest.MonkeyPatch, err
         raise error
 
     monkeypatch.setattr(verbs, "info", fail)
-    code, _, errors = main("info", "out")
+    with limited(resource.RLIMIT_AS, 1 << 45):
+        code, _, errors = main("info", "out")
     assert code == FAILED
     assert errors.startswith(said)
     assert len(errors.splitlines()) == 1
