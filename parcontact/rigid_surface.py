@@ -59,7 +59,7 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
     windows = 2 if any(part.periodic == "mirror" for part in maps) else 1  # side by side
     windowed = job.grid.boundary == "free" or bool(maps)
     if windowed:
-        heights = replace(surface, shapes=()).heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
+        heights = replace(surface, shapes=()).heights((0.0, 0.0), surface.slab.empty())
         rows, columns = (
             np.sin(np.pi * windows * (np.arange(n) + 0.5) / n) ** 2 if n > 1 else np.ones(1)
             for n in (surface.slab.ny, surface.slab.nx)
@@ -133,9 +133,9 @@ def _told(part: jobs.RoughSpectrum, grid: Grid, long: float, short: float) -> It
 
 
 def _transform(heights: Array, fft: FFT) -> Spectrum:
-    """Of heights in double precision, their mean apart: single precision may have no digits for both; collective."""
+    """Of heights, their mean apart: there may be no digits for both; collective."""
     mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
-    spectrum = fft.forward((heights - mean).astype(fft.dtype)).astype(np.complex128)
+    spectrum = fft.forward(heights - mean)
     if fft.columns.start == 0 < fft.columns.stop:
         spectrum[0, 0] += mean * fft.slab.points
     return spectrum
@@ -152,7 +152,7 @@ class Heights(NamedTuple):
 
 def heights_of(surface: Surface) -> Heights:
     """What a surface reaches; collective."""
-    heights = surface.heights((0.0, 0.0), surface.slab.empty(surface.fft.dtype))
+    heights = surface.heights((0.0, 0.0), surface.slab.empty())
     extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
     total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)
     span = top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0

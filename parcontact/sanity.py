@@ -60,7 +60,7 @@ def _of_surface(frame: Frame) -> Iterator[str]:
         yield text
     seams: list[str] = []
     if any(isinstance(shape, OnOneMesh) for shape in frame.job.surface):
-        heights = frame.surface.heights((0.0, 0.0), np.empty(frame.slab.shape, frame.dtype)).astype(np.float64)
+        heights = frame.surface.heights((0.0, 0.0), frame.slab.empty())
         seams = list(_seams(frame, heights)) if frame.job.grid.boundary == "periodic" else []
         yield from seams
     if frame.shortest is not None and not seams:  # a seam has waves of its own

@@ -71,10 +71,6 @@ class Frame:
             self.size, self.job.material.poisson, self.job.numerics.kernel, self.job.grid.boundary == "free"
         )
 
-    @property
-    def dtype(self) -> type[np.floating]:
-        return np.dtype(self.job.numerics.map_type).type
-
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
         """A velocity [m/s] in the run's units of length per second."""
         return velocity[0] / self.units.length, velocity[1] / self.units.length
@@ -130,7 +126,7 @@ def effects(job: Job) -> list[Decision]:
 
 def frame(job: Job, slab: Slab) -> Frame:
     """The surface of a job and what it is measured in; collective. Raises InputError for files that do not fit."""
-    fft = FFT(slab, dtype=job.numerics.map_type)
+    fft = FFT(slab)
     surface, told = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     shortest = shortest_measured(job, surface)
@@ -166,7 +162,7 @@ def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
     Its transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give other
     last digits.
     """
-    return _solver(replace(base, slab=slab, fft=FFT(slab, dtype=base.dtype, measured=False)), tolerance)
+    return _solver(replace(base, slab=slab, fft=FFT(slab, measured=False)), tolerance)
 
 
 def solver_in_double(base: Frame) -> Callable[[], ContactSolver] | None:
@@ -199,25 +195,25 @@ def facts(built: Scene) -> list[str]:
 def _motion(base: Frame) -> Motion:
     """How the surface moves."""
     if not decisions.part_cells(base.job).on:
-        return WholeCells(base.surface, base.dtype)
+        return WholeCells(base.surface)
     if decisions.along_x(base.job):
-        return PartCells(base.surface, base.dtype)
-    return AnyFraction(base.surface, base.dtype)
+        return PartCells(base.surface)
+    return AnyFraction(base.surface)
 
 
 def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:
     if not relaxation.decide(base.job).on:
         return ElasticBody(base.slab, base.prony.modulus_inf)
     integrator = base.job.numerics.integrator
-    return ZenerBody(base.slab, base.prony, integrator, base.dtype, branches.memoryless, branches.frozen)
+    return ZenerBody(base.slab, base.prony, integrator, branches.memoryless, branches.frozen)
 
 
 def _solver(base: Frame, tolerance: float) -> ContactSolver:
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
     operators = _operators(base)
     grids = grids_for(base.job.grid.dx, base.job.grid.dy)
-    kept = np.float32 if decisions.single_operator(base.job).on else None
-    return ContactSolver(base.slab, *operators, height, tolerance, limit, base.dtype, grids, kept)
+    kept = np.float32 if decisions.single_operator(base.job).on else np.float64
+    return ContactSolver(base.slab, *operators, height, tolerance, limit, grids, kept)
 
 
 def _operators(base: Frame) -> tuple[Convolution, Convolution]:

@@ -3,8 +3,7 @@
 Relaxation times from 1e-4 to 1e3, moduli of 2 each over a long-term modulus of 1, in a box of length 1 at a velocity of
 1, by one cell a step. Friction is judged, and a step is timed, over the second half of FIRST steps of others and of
 LATER ones of ours: tamaas starts each solve from nothing, so that its later steps take as long as its first ones. Ours
-are solved in single precision, whose rounding is a hundredth of the error that is asked for, and timed in the mean: for
-some the start does, which take half as long as others.
+are solved in mixed precision, and timed in the mean: for some the start does, which take half as long as others.
 """
 
 import statistics
@@ -50,10 +49,10 @@ def sliding(points: int, tolerance: float, precision: str = "double") -> dict[st
 def beside_peers(points: int, directory: Path) -> Iterator[Line]:
     """Ours at the tolerance that makes friction good to ERROR with the fewest calls, and theirs."""
     exact = _slid(points, EXACT, "double").friction
-    tried = [_slid(points, tolerance, "single") for tolerance in TOLERANCES]
+    tried = [_slid(points, tolerance, "mixed") for tolerance in TOLERANCES]
     good = [found for found in tried if found.error(exact) <= ERROR] or tried[-1:]
     found = min(good, key=lambda found: found.calls)
-    what = f"8 branches, single precision, tolerance {found.tolerance:.2g}"
+    what = f"8 branches, mixed precision, tolerance {found.tolerance:.2g}"
     ours = statistics.fmean(found.seconds[LATER // 2 :])
     yield Line("slide", f"{what}: contact area", found.area, "")
     yield Line("slide", f"{what}: largest error of friction", found.error(exact), "")

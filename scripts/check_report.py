@@ -1,7 +1,7 @@
 """Open reports in headless Chromium, at the widths of a laptop and a phone: python scripts/check_report.py FILE...
 
-Says what each page would load, prints to its console or shows without an area, and leaves screenshots beside it. Needs
-chromium (Debian: apt-get install chromium); exit code 1 where something is wrong.
+Says what each page would load, prints to its console, shows without an area or scrolls sideways, and leaves screenshots
+beside it. Needs chromium (Debian: apt-get install chromium); exit code 1 where something is wrong.
 """
 
 import re
@@ -22,7 +22,9 @@ PROBE = """<script>addEventListener("load", () => {
   sliders.forEach(one => { one.value = 0; one.dispatchEvent(new Event("input")); });
   const stuck = sliders.filter(one => !one.parentNode.querySelector("img").classList.contains("shown"));
   const wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
-  const found = `${pictures.length} ${bad.length} ${loaded.length} ${stuck.length} ${Number(wide)}`;
+  document.querySelectorAll("details").forEach(one => { one.open = true; });
+  const sideways = [...document.querySelectorAll(".scroll, pre")].filter(one => one.scrollWidth > one.clientWidth);
+  const found = `${pictures.length} ${bad.length} ${loaded.length} ${stuck.length} ${Number(wide)} ${sideways.length}`;
   document.documentElement.setAttribute("data-probe", found);
 });</script>"""
 
@@ -45,23 +47,27 @@ def _wrong(browser: str, page: Path, width: str) -> bool:
         probed = Path(directory) / "page.html"
         probed.write_text(page.read_text() + PROBE)
         done = _start(browser, WIDTHS[width], "--dump-dom", probed)
-    counts = re.search(r'data-probe="(\d+) (\d+) (\d+) (\d+) (\d+)"', done.stdout)
+    counts = re.search(r'data-probe="(\d+) (\d+) (\d+) (\d+) (\d+) (\d+)"', done.stdout)
     told = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
     if not counts:
         print(f"{page}, {width}: did not load")
         return True
-    pictures, bad, loaded, stuck, wide = map(int, counts.groups())
+    pictures, bad, loaded, stuck, wide, sideways = map(int, counts.groups())
     print(
         f"{page}, {width}: {pictures} pictures, {bad} of them without an area, {loaded} loaded from elsewhere, {stuck} "
-        f"sliders that do nothing, {len(told)} lines on the console{', wider than the screen' * wide}; {picture}"
+        f"sliders that do nothing, {len(told)} lines on the console, {sideways} tables or texts that scroll sideways"
+        f"{', wider than the screen' * wide}; {picture}"
     )
-    return bool(bad or loaded or stuck or wide or told or not pictures)
+    return bool(bad or loaded or stuck or wide or told or not pictures or (sideways and width == "phone"))
 
 
 def _start(browser: str, width: int, what: str, page: Path) -> subprocess.CompletedProcess[str]:
     words = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"]
-    words += [f"--window-size={width},{HEIGHT}", "--virtual-time-budget=5000", what, page.absolute().as_uri()]
-    return subprocess.run(words, capture_output=True, text=True, timeout=SECONDS, check=False)
+    words += ["--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update"]
+    words += ["--disable-sync", f"--window-size={width},{HEIGHT}", "--virtual-time-budget=5000", what]
+    with tempfile.TemporaryDirectory() as profile:
+        words += [f"--user-data-dir={profile}", page.absolute().as_uri()]
+        return subprocess.run(words, capture_output=True, text=True, timeout=SECONDS, check=False)
 
 
 if __name__ == "__main__":

@@ -46,8 +46,9 @@ def is_told(line: Line, name: str) -> bool:
 
 
 def is_kept(line: Line, name: str) -> bool:
-    """Whether it is as wrong as asked for at most, or says that it is not."""
-    return is_told(line, name) or value(line, f"{name}_error") <= value(line, "asked") * value(line, f"{name}_true")
+    """Whether it is as wrong as asked for at most, up to rounding, or says that it is not."""
+    allowed = max(value(line, "asked") * value(line, f"{name}_true"), ROUNDING)
+    return is_told(line, name) or value(line, f"{name}_error") <= allowed
 
 
 def is_covered(line: Line, name: str) -> bool:
@@ -195,7 +196,7 @@ def picture(lines: list[Line], path: Path) -> None:
 
 def _panel(axis, lines, name, key):
     for index, group in enumerate(sorted({line[key] for line in lines})):
-        some = [line for line in lines if line[key] == group and value(line, f"{name}_error") > 0.0]
+        some = [line for line in lines if line[key] == group and value(line, f"{name}_error") > ROUNDING]
         relative = [value(line, f"{name}_true") or value(line, name) for line in some]
         x = [value(line, f"{name}_error") / size for line, size in zip(some, relative, strict=True)]
         y = [value(line, f"{name}_estimate") / size for line, size in zip(some, relative, strict=True)]

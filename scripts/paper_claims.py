@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from parcontact import prediction
+from parcontact.errors import InputError
 from parcontact.job import Initial, load
 from parcontact.parallel.mpi import MPI
 from parcontact.parallel.slab import Slab
@@ -92,8 +93,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         for said, found in claims(parser.parse_args(argv).out):
             print(f"| {said} | {found} |")
-    except FileNotFoundError as error:
-        print(f"{error.filename} is missing: run the job of the figure first", file=sys.stderr)
+    except InputError as error:
+        print(f"{error}; run the job of the figure first", file=sys.stderr)
         return 1
     return 0
 

@@ -25,6 +25,7 @@ WORLD = MPI.COMM_WORLD
 REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
 UNSEEN = io.StringIO()  # what pytest says on the other ranks
 outside = load_script("outside")
+MOST_RANKS = 4  # that scripts/test starts
 MAX_SECONDS_APART = 20.0  # seconds in which the other ranks must end a test that failed here
 
 # All ranks must see the same examples, and a first example waits for the compiler.
@@ -134,9 +135,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def elsewhere(item: pytest.Item) -> bool:
-    """Whether a test is for other numbers of ranks than this one."""
+    """Whether a test is for other numbers of ranks than this one: it names its own, or makes groups of all smaller ones
+    from the most that tests run on."""
     mark = item.get_closest_marker("mpi")
-    return mark is not None and bool(mark.args) and WORLD.size not in mark.args
+    if mark is None:
+        return False
+    ranks = mark.args or ((MOST_RANKS,) if "communicators" in getattr(item, "fixturenames", ()) else ())
+    return bool(ranks) and WORLD.size not in ranks
 
 
 @pytest.hookimpl(trylast=True)

@@ -64,17 +64,29 @@ def panels(figure: Figure) -> list[str]:
 
 def touching(figure: Figure) -> list[tuple[str, str]]:
     """Pairs of texts of a figure that overlap."""
+    boxes = [(text.get_text(), text.get_window_extent()) for text in _seen(figure)]
+    return [(a, b) for (a, one), (b, other) in combinations(boxes, 2) if one.shrunk(0.9, 0.9).overlaps(other)]
+
+
+def outside(figure: Figure) -> list[str]:
+    """Texts of a figure that leave the page."""
+    page = figure.bbox.padded(1)
+    ends = [(text.get_text(), text.get_window_extent()) for text in _seen(figure)]
+    return [text for text, box in ends if not (page.contains(box.x0, box.y0) and page.contains(box.x1, box.y1))]
+
+
+def _seen(figure: Figure) -> list[Text]:
     figure.draw_without_rendering()
     texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
     hidden = {text for axis in figure.findobj(Axis) for text in _beyond(axis)}
-    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text not in hidden]
-    return [(a, b) for (a, one), (b, other) in combinations(boxes, 2) if one.shrunk(0.9, 0.9).overlaps(other)]
+    return [text for text in texts if text not in hidden]
 
 
 def _beyond(axis: Axis) -> list[Text]:
     """Labels of ticks outside of the range that is shown, and those that are switched off."""
-    low, high = sorted(axis.get_view_interval())
+    place = axis.get_transform().transform  # on a logarithmic axis the logarithm
+    low, high = sorted(map(place, axis.get_view_interval()))
     room = 1e-6 * (high - low)
     ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
-    outside = [tick for tick in ticks if not low - room <= tick.get_loc() <= high + room]
+    outside = [tick for tick in ticks if not low - room <= place(tick.get_loc()) <= high + room]
     return [text for tick in ticks for text in (tick.label1, tick.label2) if tick in outside or not text.get_visible()]

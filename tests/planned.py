@@ -44,7 +44,6 @@ JOBS: dict[str, Json] = {
     "free": {"grid": {"boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}},
     "free, energies": {"grid": {"boundary": "free"}, "material": TWO, "history": [SLIDE], "output": {"energy": True}},
     "energies": {"material": TWO, "history": [CELLS], "output": {"energy": True}},
-    "single": {"material": TWO, "history": [CELLS], "numerics": {"precision": "single"}},
     "long cells": {"grid": {"size": [1e-3, 1e-5]}, "history": [SLIDE]},
     "waves of two cells": {"grid": {"points": 16}, "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [8, 0]}},
     "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed", "tolerance": 1e-4}},

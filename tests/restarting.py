@@ -48,8 +48,8 @@ SCENES: dict[str, tuple[str, Any, Any, list[Any], dict[str, Any]]] = {  # bounda
     "free": ("free", SPHERE, ZENER, [PRESS, {**OBLIQUE, "name": "slide"}], {}),
     "approach": ("free", SPHERE, ZENER, [LIFT, {**LIFT, "velocity": 0.1}], {}),
     "ramped": ("periodic", [ROUGH, SPHERE], ZENER, [RAMP, {**SLIDE, "pressure": {"from": 3e5, "to": 0.0}}], {}),
-    "single": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"precision": "single", "tolerance": 1e-3}),
     "mixed": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"precision": "mixed"}),
+    "single operator": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"precision": "mixed", "tolerance": 1e-3}),
 }
 
 

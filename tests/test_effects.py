@@ -131,7 +131,6 @@ def test_mixed_precision() -> None:
     [
         ({"tolerance": 1e-5}, True),
         ({"tolerance": 0.99e-5}, False),
-        ({"tolerance": 1e-5, "precision": "single"}, False),
         ({"tolerance": 1e-5, "energy": True}, False),
         ({"tolerance": 1e-5, "energy": True, "kernel": "love"}, True),
     ],
@@ -159,7 +158,6 @@ def test_single_operator(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ({"precision": "mixed"}, True),
         ({"precision": "double"}, False),
-        ({"precision": "single"}, False),
         ({"precision": "mixed", "energy": True}, False),
     ],
 )

@@ -20,7 +20,7 @@ JOB: dict[str, Any] = {
     "surface": HEIGHTS,
     "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
     "history": [{"pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4, "cells_per_step": 1}],
-    "numerics": {"tolerance": 1e-8},
+    "numerics": {"tolerance": 1e-8, "accuracy": 0.5},  # of such coarse meshes nothing better is asked
 }
 
 

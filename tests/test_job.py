@@ -49,7 +49,7 @@ numerics:
   tolerance: 1.0e-4             # of the certified stop
   max_iterations: 500
   kernel: spectral
-  precision: double             # double | single | mixed
+  precision: double             # double | mixed
 output:
   directory: out/rough          # default: out/<job file stem>
   fields: [pressure, displacement, gap]     # default: none

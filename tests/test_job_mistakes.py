@@ -141,7 +141,8 @@ def test_checks_between_sections_run_beside_other_mistakes() -> None:
 
 
 def test_steady_needs_pressures_and_a_solid_at_rest() -> None:
-    assert mistakes_of(SMALL.replace("pressure: 1e5", "force: 1"), "steady.velocities=1") == [
+    by_approach = SMALL.replace("{pressure: 1e5}", "{approach: 1e-6}")
+    assert mistakes_of(by_approach, "steady.velocities=1") == [
         (
             "--set steady.velocities=1: steady.pressures is missing; "
             "it must be positive pressures [Pa] when no stage of the history has a pressure or force"

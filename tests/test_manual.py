@@ -261,7 +261,7 @@ def test_completion(tmp_path: Path) -> None:
     done = subprocess.run(
         ["bash", "-c", script + "\n" + lines], capture_output=True, text=True, cwd=tmp_path, timeout=20
     )
-    assert done.stdout.splitlines() == ["steady study", "--ranks", "double single mixed", "--until"]
+    assert done.stdout.splitlines() == ["steady study", "--ranks", "double mixed", "--until"]
 
 
 # -- gallery ---------------------------------------------------------------------------------------------------------

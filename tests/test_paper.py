@@ -177,6 +177,7 @@ def test_claims(tmp_path: Path) -> None:
             | {"theory_mu_max": mu, "theory_mu_dyn": 0.9 * mu, "theory_contact_area": 0.5 * area}
             for case, mu, area in zip(cases, frictions, areas, strict=True)
         ]
+        rows = [{"case": row.pop("case"), **row, "state": "finished"} for row in rows]
         sweep_table.save(tmp_path / name / "sweep.csv", list(rows[0]), rows)
     found = dict(claims.claims(tmp_path))
     assert found["mu_max grows with V1 throughout"] == "no"

@@ -11,6 +11,7 @@ import yaml
 from mpi4py import MPI
 from planned import CELLS, MACHINE, SWEEP, TWO, job
 
+import parcontact as pc
 from parcontact import __main__, private
 from parcontact.job.table import plain
 from parcontact.parallel.slab import Slab
@@ -121,7 +122,7 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     kept = tmp_path / "cache" / "parcontact" / "compiled"  # processes need not compile anew
     shutil.copytree(compiled, kept, ignore=unfinished)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    planned = job(grid={"points": 20}, steady={"velocities": [1e-2, 0.1]})
+    planned = job(grid={"points": 20}, material=TWO, steady={"velocities": [1e-2, 0.1]}, numerics={"accuracy": 0.5})
     (tmp_path / "job.yaml").write_text(planned.resolved())
     assert __main__.main(["plan", "job.yaml", "--ranks", "1,2", "--seconds", "1"]) == 0
     said = capsys.readouterr().out
@@ -130,6 +131,11 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert re.search(r"tried: [12] states on 1 rank in", said)
     assert bool(re.search(r"tried: [12] states on 2 ranks in", said)) == (machine.cores() > 1)
     assert "state [s]" in said
+    steady = said[said.index("parcontact steady:") :]
+    told = re.search(r"operator calls a state, errors of ([\d.]+) % by the mesh", steady)
+    assert told
+    found = pc.steady(planned)
+    assert 0.01 * float(told[1]) == pytest.approx(found.error_friction.mean(), rel=0.2)  # the rest is the solver's
 
 
 def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

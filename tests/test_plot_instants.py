@@ -32,8 +32,8 @@ def test_the_maps_of_an_instant(tmp_path: Path, drawn: list[Figure], at: str, ti
     out = ran(tmp_path, WAVE + ZENER + CREEP + MAPS)
     assert asked(out, "--at", at) == asked(out) == 0
     (title, highest), (last_title, last) = map(title_and_highest, drawn)
-    assert title == f"pressure at {time}"
-    assert last_title == "pressure at 10 ms"
+    assert title == f"pressure\n{time}, 1 kPa"
+    assert last_title == "pressure\n10 ms, 1 kPa"
     assert highest > last > 0.0
 
 

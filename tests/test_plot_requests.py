@@ -56,6 +56,18 @@ def test_wide_names_of_stages_do_not_touch(tmp_path: Path, drawn: list[Figure]) 
     assert touching(drawn[0]) == []
 
 
+@pytest.mark.parametrize(("rise", "levels"), [(0, 1), (1, 2)])
+def test_names_of_stages_use_the_room_there_is(tmp_path: Path, drawn: list[Figure], rise: int, levels: int) -> None:
+    """The first of three panels is as wide as the page, where names do not touch; with the load there are four."""
+    stages = [
+        f"{{name: stage number {k}, pressure: {1 + rise * k}.0e2, duration: 1.0, time_step: 1.0}}" for k in range(3)
+    ]
+    assert asked(ran(tmp_path, f"{WAVE}{ELASTIC}history: [{', '.join(stages)}]\n")) == 0
+    assert len(panels(drawn[0])) == 3 + rise
+    assert len({round(text.get_window_extent().y0) for text in drawn[0].axes[0].texts}) == levels
+    assert touching(drawn[0]) == []
+
+
 @pytest.mark.parametrize("kind", ["loads", "creep", "sliding"])
 def test_labels_do_not_touch(tmp_path: Path, drawn: list[Figure], kind: str) -> None:
     assert asked(ran(tmp_path, KINDS[kind][0])) == 0
@@ -123,9 +135,7 @@ def test_job_of_another_verb(tmp_path: Path, drawn: list[Figure]) -> None:
 
 def test_loads_of_curves_have_prefixes(tmp_path: Path, drawn: list[Figure]) -> None:
     assert asked(curve(tmp_path)) == 0
-    legend = drawn[0].axes[0].get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["1.04 kPa", "250 kPa"]
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["1.04 kPa", "250 kPa"]
     assert touching(drawn[0]) == []
 
 
@@ -136,9 +146,7 @@ def test_free_curve_in_areas_and_forces(tmp_path: Path, drawn: list[Figure]) -> 
     assert asked(out) == 0
     assert panels(drawn[0]) == [FRICTION, AREA]
     assert drawn[0].axes[1].get_lines()[0].get_ydata() == pytest.approx(0.8)
-    legend = drawn[0].axes[0].get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["4.17 mN", "1 N"]
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["4.17 mN", "1 N"]
 
 
 @pytest.mark.parametrize("points", [POINTS[:1], POINTS[:3:2], []])
@@ -260,8 +268,8 @@ def test_all_maps_that_were_saved(tmp_path: Path, drawn: list[Figure]) -> None:
     assert asked(ran(tmp_path, WAVE + ELASTIC + LOADS + fields), "--panels", "maps") == 0
     assert [axes.get_title().split("\n")[0] for axes in drawn[0].axes if axes.get_xlabel()] == [
         "pressure",
-        "gap",
-        "height",
+        "gap (contact black)",
+        "height (up is into the body)",
     ]
 
 

@@ -196,7 +196,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
 
 LIGHT = {**PRESS, "pressure": 2e4}
 HEAVY = {"name": "heavy", "pressure": 1e7}
-SINGLE = {"precision": "single", "tolerance": 5e-6}  # a fifth of what rounding allows under the large load, 2.8e-5,
+SHARP = {"tolerance": 1e-14}  # a fifth of what rounding allows under the large load, 5.2e-14,
 # and five times what it allows under the small one: which it is must not be a matter of the last digits
 
 
@@ -214,11 +214,11 @@ def failed(bench: Bench, history: list[dict[str, Any]], numerics: dict[str, Any]
 @pytest.mark.mpi(2)
 def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
     """Of the last good step: what a run to there has; the run goes on from it when the job has been mended."""
-    data, out, said = failed(bench, [LIGHT, HEAVY], SINGLE)
+    data, out, said = failed(bench, [LIGHT, HEAVY], SHARP)
     last = out / "checkpoint" / "step-5.h5"
     assert "step 6 at t = 0.001 s (stage 'heavy'): the contact solve stalled" in said
-    assert "single precision reaches only about " in said
-    assert said.endswith(f"numerics.precision: mixed; the newest checkpoint is {last}")
+    assert "double precision reaches only about " in said
+    assert said.endswith(f"try a larger numerics.tolerance; the newest checkpoint is {last}")
     if bench.comm.rank == 0:
         found, clean = maps(last), maps(bench.where / "clean" / "checkpoint" / last.name)
         assert found == clean
@@ -227,7 +227,7 @@ def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
         assert f", retry {1 + said.count(', with ')}," in f"{counts},"
         assert message.endswith(said)
     bench.comm.Barrier()
-    assert bench.run(data | {"numerics": {**SINGLE, "tolerance": 1e-3}}, out) == 0
+    assert bench.run(data | {"numerics": {"tolerance": 1e-3}}, out) == 0
     if bench.comm.rank == 0:
         assert [row["step"] for row in rows(out)] == [str(step) for step in range(7)]
 

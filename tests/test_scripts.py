@@ -51,9 +51,10 @@ SMALL = {
         ["--trials", "1", "--around", "1", "--flips", "4", "--backs", "1", "--fills", "0", "--shorter", "4"], r""
     ),
     "fuzz_jobs": Small(["--jobs", "40", "--processes", "1"], r"(?m)^40 jobs: 0 with faults; "),
+    "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/test_disturbed.py
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^2\d pages in pages"),
-    "mutants": Small(["--count", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
+    "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_claims": Small(["--from", "nowhere"], r"", (1,)),  # it reads sweeps: tests/test_paper.py has some
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "profile_solve": Small(["128"], r"(?m)^FFTs .*%"),

@@ -82,7 +82,7 @@ def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> N
     assert frictions == pytest.approx([frictions[0]] * len(frictions), rel=1e-4)
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 def test_both_methods_agree(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
     """Projected steps, and the active set that goes on where they do not help: to ten times the certificate's 1e-5."""
     projected = sphere_at(shared_path, comm, 1.0, 64)

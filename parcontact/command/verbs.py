@@ -203,7 +203,7 @@ def surface(options: argparse.Namespace) -> int:
         base = scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))
         doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
         base.surface.rescale(1.0)
-        heights = base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype))
+        heights = base.surface.heights((0.0, 0.0), base.slab.empty())
         lines = list(surfaces.describe(job, heights, base.told, base.shortest, picture))
         lines += [f"warning: {text}" for text in doubts]
         return [*lines, *measured_maps.start(job, given, options.start)] if alone else lines

@@ -170,7 +170,7 @@ def _parser() -> argparse.ArgumentParser:
     report.set_defaults(act=verbs.report)
 
     doctor = found.add_parser("doctor", help="run small hard cases on this machine, and say what came out of each")
-    doctor.add_argument("--precision", choices=("double", "single", "mixed"), default="double")
+    doctor.add_argument("--precision", choices=("double", "mixed"), default="double")
     doctor.set_defaults(act=verbs.doctor)
 
     guides.add_verbs(found, parser)

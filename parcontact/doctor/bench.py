@@ -21,9 +21,8 @@ if TYPE_CHECKING:
 
 Json = dict[str, Any]
 Watch = Callable[[March], None]
-SINGLE, SINGLE_TOLERANCE = 3e-4, 1e-5  # what single precision is held to where double must do better; its solves
-LOAD = {"double": 1e-13, "mixed": 1e-13, "single": 1e-6}  # how well the mean pressure is met
-BALANCE = {"double": 1e-11, "mixed": 1e-9, "single": 1e-3}  # work = stored + dissipated, over the largest of all times
+LOAD = 1e-13  # how well the mean pressure is met
+BALANCE = {"double": 1e-11, "mixed": 1e-9}  # work = stored + dissipated, over the largest of all times
 
 
 @dataclass(frozen=True)
@@ -61,18 +60,12 @@ class Bench:
         self.findings: dict[str, Finding] = {}
         self.residual, self.iterations = 0.0, 0
 
-    @property
-    def single(self) -> bool:
-        return self.precision == "single"
-
     # -- running ------------------------------------------------------------------------------------------------------
 
     def begin(self, data: Json) -> March:
         """A march at the start of a job, which is solved to 1e-10 and with all branches unless it says otherwise;
         collective."""
         numerics = {"tolerance": 1e-10, "branch_error": 0.0, **data.get("numerics", {}), "precision": self.precision}
-        if self.single:
-            numerics["tolerance"] = max(numerics["tolerance"], SINGLE_TOLERANCE)
         job = Job.model_validate({**data, "numerics": numerics})
         march = start.first(job, Slab(self.comm, *job.grid.points))
         self._note(march.row)
@@ -125,8 +118,8 @@ class Bench:
         if step.control != "approach":
             area = built.job.grid.lx * built.job.grid.ly if step.control == "force" else 1.0
             scale = step.load + 1e-30 * built.units.pressure * area  # less is none
-            self.expect("load", load / built.slab.points * area, step.load, LOAD[self.precision], scale)
-            self.expect("measured load", measures.pressure * area, step.load, LOAD[self.precision], scale)
+            self.expect("load", load / built.slab.points * area, step.load, LOAD, scale)
+            self.expect("measured load", measures.pressure * area, step.load, LOAD, scale)
 
     def _balance(self, rows: Sequence[Row]) -> None:
         largest = max(max(abs(row.work), row.stored, row.dissipated) for row in rows)
@@ -137,8 +130,7 @@ class Bench:
 
     def expect(self, what: str, found: float, expected: float, within: float, scale: float | None = None) -> None:
         """Note a number that may be off by `within` times `scale`, which is its expected size unless given."""
-        reach = max(within, SINGLE) if self.single and what not in ALWAYS else within
-        allowed = reach * (abs(float(expected)) if scale is None else scale)
+        allowed = within * (abs(float(expected)) if scale is None else scale)
         finding = Finding(what, float(found), float(expected), allowed)
         known = self.findings.get(what)
         if known is None or finding.share >= known.share:

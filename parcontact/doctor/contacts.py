@@ -65,7 +65,7 @@ def vanishing_load(bench: Bench) -> None:
         exact = float(hertz.approach(force, RADIUS, GLASSY))
         bench.expect(f"approach, {force:g} N", rows[-1].measures.approach, exact, 1e-3)
     cell = 1e-4
-    for force in (1e-6, 1e-12, 1e-20 if bench.single else 1e-150):
+    for force in (1e-6, 1e-12, 1e-150):
         stages = [{"force": force}, {"force": 1e-300}, {"force": 5e-324}, {"force": 0.0}]
         _, rows = bench.march(sphere(stages, points=8, size=8 * cell, material=RUBBER))
         pressed, free = rows[1].measures, rows[-1].measures

@@ -2,12 +2,43 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from ..job import Dma, Job, Zener
 from .folded_branches import excited_band
 from .relaxation import time_factor_of
 
 NEAR = 0.5  # decades beyond the measured band that pass: a surface has little of its last waves
+
+
+@dataclass(frozen=True)
+class ExcitedBand:
+    """Frequencies [Hz] that a job excites at a temperature [deg C], None where moduli do not depend on it.
+
+    `factor` is the shift factor a_T there.
+    """
+
+    temperature: float | None
+    factor: float
+    band: tuple[float, float]
+
+    @property
+    def reduced(self) -> tuple[float, float]:
+        """As at the reference temperature."""
+        return self.band[0] * self.factor, self.band[1] * self.factor
+
+
+def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
+    """What a job excites at each temperature of a friction curve, or else at that of the material; nothing where the
+    surface stands."""
+    body = job.material.fitted if isinstance(job.material, Dma) else job.material
+    if (band := excited_band(job)) is None:
+        return []
+    if not isinstance(body, Zener) or body.shift is None:
+        return [ExcitedBand(None, 1.0, band)]
+    reference = body.shift.made.reference
+    degrees = temperatures or (reference if body.temperature is None else body.temperature,)
+    return [ExcitedBand(value, time_factor_of(job.at_temperature(value)), band) for value in degrees]
 
 
 def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[str]:
@@ -27,10 +58,10 @@ def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[st
                 f"material: {', '.join(f'{value:g}' for value in beyond)} C is beyond the {low:g} to {high:g} C of its "
                 "measurement: the shift is an extrapolation there"
             )
-    if body.band is None or (excited := excited_band(job)) is None:
+    found = excited_bands(job, temperatures)
+    if body.band is None or not found:
         return
-    factors = [time_factor_of(job.at_temperature(value)) for value in degrees if body.shift] or [body.time_factor]
-    low, high = excited[0] * min(factors), excited[1] * max(factors)  # as at the reference
+    low, high = min(one.reduced[0] for one in found), max(one.reduced[1] for one in found)
     for decades, side in ((math.log10(body.band[0] / low), "below"), (math.log10(high / body.band[1]), "above")):
         if decades > NEAR:
             yield (

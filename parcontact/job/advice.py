@@ -117,13 +117,12 @@ def _stage(
 
 
 def _precision(numerics: Numerics) -> Iterator[str]:
-    reach = ROUNDINGS * (2.0**-23 if numerics.precision == "single" else 2.0**-52)
+    reach = ROUNDINGS * 2.0**-52
     if numerics.tolerance < reach:
-        other = "precision: mixed or " if numerics.precision == "single" else ""
         yield (
-            f"numerics.tolerance: {numerics.tolerance:g} is below {reach:.1g}, which {numerics.precision} precision "
+            f"numerics.tolerance: {numerics.tolerance:g} is below {reach:.1g}, which double precision "
             "reaches where displacements are as large as the surface is high, in proportion more or less elsewhere; "
-            f"use {other}a larger tolerance"
+            "use a larger tolerance"
         )
 
 

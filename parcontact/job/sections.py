@@ -72,7 +72,7 @@ class Numerics(Part):
         default=1e-3, ge=0, lt=1, strict=True, description="an error of friction [-] of zero or more and below 1"
     )
     kernel: Literal["spectral", "love"] = "spectral"  # in a free scene: love
-    precision: Literal["double", "single", "mixed"] = "double"
+    precision: Literal["double", "mixed"] = "double"
     slope: Literal["spectral", "finite-difference"] = "spectral"
     accept_unconverged: Flag = Field(default=False, description="true or false")
     strict: Flag = Field(default=False, description="true or false")
@@ -84,11 +84,6 @@ class Numerics(Part):
         if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
             return data
         return {"tolerance": TOLERANCE_SHARE * accuracy, "branch_error": BRANCH_SHARE * accuracy, **data}
-
-    @property
-    def map_type(self) -> str:
-        """The type of the numbers in maps."""
-        return "float32" if self.precision == "single" else "float64"
 
 
 FieldName = Literal["pressure", "displacement", "gap", "height"]

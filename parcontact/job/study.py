@@ -44,7 +44,7 @@ class Study(Part):
     tolerance: Annotated[tuple[Tolerance, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of tolerances [-] above 0 and below 1"
     )
-    precision: Annotated[tuple[Literal["double", "single", "mixed"], ...], BeforeValidator(listed)] = Field(
+    precision: Annotated[tuple[Literal["double", "mixed"], ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of precisions"
     )
     kernel: Annotated[tuple[Literal["spectral", "love"], ...], BeforeValidator(listed)] = Field(

@@ -53,8 +53,6 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
     reach, sharp = _reach(scene, last, h), _sharp(scene, h)
     if numerics.tolerance < reach:
         yield f"{numerics.precision} precision reaches only about {reach:.1g} here: try a larger numerics.tolerance"
-        if numerics.precision == "single":
-            yield "numerics.precision: mixed"
         return
     if "max_iterations" in failed.failure:
         yield f"try numerics.max_iterations above {numerics.max_iterations}"

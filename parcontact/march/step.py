@@ -39,14 +39,14 @@ class March:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        slab, dtype = scene.slab, scene.solver.dtype
-        earlier = slab.zeros(dtype) if scene.lasts else None
-        further = tuple(Past(slab.zeros(dtype)) for _ in range(FURTHER * scene.keeps_further))
+        slab = scene.slab
+        earlier = slab.zeros() if scene.lasts else None
+        further = tuple(Past(slab.zeros()) for _ in range(FURTHER * scene.keeps_further))
         frame, highest = scene.frame, scene.frame.heights.highest  # at no load the surface just touches the body
         touching = Measures(approach=0.0 - highest - frame.surface.datum, mean_gap=highest - frame.heights.mean)
         row, d = self._complete(Row(measures=touching)), -highest / scene.units.height
-        self.state = State(row, slab.zeros(dtype), earlier, approach=d, further=further)
-        self._next_pressure = slab.zeros(dtype)
+        self.state = State(row, slab.zeros(), earlier, approach=d, further=further)
+        self._next_pressure = slab.zeros()
         self._errors = Errors(scene)
         self.starts = Starts(scene)
         self._elastic_displacement: Array | None = None  # of the solver: until its next solve

@@ -5,7 +5,6 @@ do not divide `ny`, and ranks without rows, are normal.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,8 +20,7 @@ Array = NDArray[np.floating]
 
 def deal(count: int, ranks: int) -> list[slice]:
     """Split `count` items in order into one part per rank; parts differ by at most one item, and may be empty."""
-    bounds = [count * rank // ranks for rank in range(ranks + 1)]
-    return [slice(start, stop) for start, stop in pairwise(bounds)]
+    return [dealt_to(count, ranks, rank) for rank in range(ranks)]
 
 
 def dealt_to(count: int, ranks: int, rank: int) -> slice:

@@ -21,7 +21,6 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from ..parallel.slab import Array, Slab, allocate
 from . import loops
@@ -90,7 +89,7 @@ class ElasticBody:
         if heights.offset == 0:
             return Trial(self.modulus, heights.base, heights)
         if self._moved is None:
-            self._moved = self.slab.empty(heights.base.dtype)
+            self._moved = self.slab.empty()
         loops.roll(heights.base, heights.offset, self._moved)
         return Trial(self.modulus, self._moved, heights)
 
@@ -130,7 +129,6 @@ class ZenerBody:
         slab: Slab,
         prony: Prony,
         integrator: str,
-        dtype: DTypeLike = np.float64,
         memoryless: Collection[int] = (),
         frozen: Collection[int] = (),
     ) -> None:
@@ -139,10 +137,10 @@ class ZenerBody:
         self.kept = [k for k in numbers if k not in memoryless and k not in frozen]
         self.moving = [k for k in numbers if k not in frozen]
         self._spring = prony.modulus_inf + float(prony.moduli[list(frozen)].sum())
-        self.branches = allocate((len(self.kept), *slab.shape), dtype, slab.tally)
+        self.branches = allocate((len(self.kept), *slab.shape), np.float64, slab.tally)
         self.branches.fill(0.0)
-        self.u = slab.zeros(dtype)
-        self._buffer = slab.zeros(dtype)
+        self.u = slab.zeros()
+        self._buffer = slab.zeros()
         self._still: Advance = np.ones(len(self.kept)), np.zeros(len(self.kept))
         self._pending: Advance = self._still
         self._coefficients: _Coefficients | None = None

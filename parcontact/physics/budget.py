@@ -52,7 +52,7 @@ CORRECTED_ORDER = 1.0  # of the corrected area
 EDGES, STRAIGHT_EDGES = 0.25, 3.0  # of the correction of the area; along edges that follow the grid
 SMALL_SPOTS = 0.6  # of the square of the correction, which is large where spots of contact are a few cells wide
 NOISE = 0.4  # of the slope of the surface, times the complementarity: tangential force where there is no friction
-BY_ENERGY, BY_ENERGY_WAVES = 0.5, 0.2  # of the difference of the views, and of what waves make, in steady sliding
+BY_ENERGY, BY_ENERGY_WAVES = 1.0, 0.2  # of the difference of the views, and of what waves make, in steady sliding
 PRESSURES = 0.3  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
 FEW_WAVES = 6.0  # power of 4 cells over those of the shortest wave, with which that share rises to all of it
 ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
@@ -161,6 +161,7 @@ def _area(known: Known, seen: Seen, points: int) -> Parts:
     mesh = STRAIGHT_EDGES * seen.correction
     if not known.straight:
         mesh = EDGES * seen.correction + SMALL_SPOTS * seen.correction**2
+    mesh = max(mesh, 1.0 / (points * seen.area)) if seen.area > 0.0 else mesh  # it is counted in cells
     time = share_of_area(known, seen) * time_error(known, seen, points)
     return Parts(solver, time, known.folded * open_share, mesh)
 

@@ -21,7 +21,7 @@ from . import loops
 from .body import Trial, ZenerBody, coefficients
 
 SAMPLED_ROWS = 8  # at least, of a map with as many: the difference is then within some 5 % of that on all rows
-LEAST_VARIANCE = 1e-6  # of heights, over their mean square: less is rounding, in single precision
+LEAST_VARIANCE = 1e-6  # of heights, over their mean square: less is rounding
 MISSED = 0.5  # of the load, by which that of a sample is off where it does not stand for all rows
 
 

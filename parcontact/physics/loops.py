@@ -20,12 +20,10 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
     """Advance the branches, `h_k <- decay_k h_k + gain_k buffer`, and form the next effective heights in `buffer`:
     `heights(i - offset) + sum weight_k h_k - weight_u u`.
 
-    Branches advance in the precision of the maps, in which only `1 - decay` has the digits of a decay near 1; what they
-    weigh is added up in double precision, as much of it cancels where a body is stiff at once. Four branches at once
-    keep more of the memory's channels busy than one after the other.
+    Four branches at once keep more of the memory's channels busy than one after the other.
     """
     count, ny, nx = branches.shape
-    start, number = offset % nx, buffer.dtype.type
+    start = offset % nx
     effective = np.empty(nx)
     for j in range(ny):
         effective[start:] = heights[j, : nx - start]
@@ -37,7 +35,7 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
             rows = branches[k, j], branches[k + 1, j], branches[k + 2, j], branches[k + 3, j]
             _advance_four(*rows, decay[k:], gain[k:], weight[k:], change, effective)
         for k in range(count - count % 4, count):
-            a, b, c = number(1.0 - decay[k]), number(gain[k]), weight[k]
+            a, b, c = 1.0 - decay[k], gain[k], weight[k]
             for i in range(nx):
                 branches[k, j, i] += b * change[i] - a * branches[k, j, i]
                 effective[i] += c * branches[k, j, i]
@@ -47,10 +45,8 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
 @loop
 def _advance_four(a, b, c, d, decay, gain, weight, change, effective):
     """The same of four branches in one row."""
-    number = change.dtype.type
-    fall_a, fall_b = number(1.0 - decay[0]), number(1.0 - decay[1])
-    fall_c, fall_d = number(1.0 - decay[2]), number(1.0 - decay[3])
-    rise_a, rise_b, rise_c, rise_d = number(gain[0]), number(gain[1]), number(gain[2]), number(gain[3])
+    fall_a, fall_b, fall_c, fall_d = 1.0 - decay[0], 1.0 - decay[1], 1.0 - decay[2], 1.0 - decay[3]
+    rise_a, rise_b, rise_c, rise_d = gain[0], gain[1], gain[2], gain[3]
     weight_a, weight_b, weight_c, weight_d = weight[0], weight[1], weight[2], weight[3]
     for i in range(change.size):
         a[i] += rise_a * change[i] - fall_a * a[i]

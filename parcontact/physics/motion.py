@@ -2,9 +2,6 @@
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import DTypeLike
-
 from ..job.cells import SAME_PLACE
 from .body import Heights
 from .surface import Surface
@@ -32,10 +29,10 @@ class Motion(Protocol):
 class WholeCells:
     """Standing, or sliding by whole cells along x on a periodic box: one map, and an index offset."""
 
-    def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
+    def __init__(self, surface: Surface) -> None:
         self._cell = surface.cell[0]
         self._count = surface.slab.nx
-        self._base = surface.heights((0.0, 0.0), surface.slab.empty(dtype))
+        self._base = surface.heights((0.0, 0.0), surface.slab.empty())
 
     def at(self, displacement: tuple[float, float]) -> Heights:
         return Heights(self._base, round(displacement[0] / self._cell) % self._count)
@@ -44,10 +41,10 @@ class WholeCells:
 class AnyFraction:
     """Any fraction of a cell in any direction: the heights are made anew when the surface has moved."""
 
-    def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
+    def __init__(self, surface: Surface) -> None:
         self._surface = surface
         self._where = (0.0, 0.0)
-        self._map = surface.heights(self._where, surface.slab.empty(dtype))
+        self._map = surface.heights(self._where, surface.slab.empty())
 
     def at(self, displacement: tuple[float, float]) -> Heights:
         if displacement != self._where:
@@ -61,11 +58,11 @@ class PartCells:
     """Sliding along x on a periodic box, not by whole cells at times: one map, made anew when the part of a cell beside
     the whole ones has changed, and an index offset for these."""
 
-    def __init__(self, surface: Surface, dtype: DTypeLike = np.float64) -> None:
+    def __init__(self, surface: Surface) -> None:
         self._surface = surface
         self._cell = surface.cell[0]
         self._part = 0
-        self._map = surface.heights((0.0, 0.0), surface.slab.empty(dtype))
+        self._map = surface.heights((0.0, 0.0), surface.slab.empty())
 
     def at(self, displacement: tuple[float, float]) -> Heights:
         cells = displacement[0] / self._cell

@@ -87,24 +87,23 @@ def saved(job: Job) -> int:
 
 
 def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
-    precision, part = np.dtype(job.numerics.map_type), dealt_to(job.grid.ny, ranks, rank)
+    part = dealt_to(job.grid.ny, ranks, rank)
     cells = (part.stop - part.start) * job.grid.nx
-    spectrum, *_ = footprint(job.grid.points, job.grid.points, precision, ranks, rank)
+    spectrum, *_ = footprint(job.grid.points, job.grid.points, np.float64, ranks, rank)
     symbol = Convolution.footprint(spectrum, job.grid.ny)
-    of_operator = np.dtype(np.float32) if decisions.single_operator(job).on else precision
-    yield _transform(TRANSFORMS, job, job.grid.points, precision, ranks, rank)
+    kept: type[np.floating] = np.float32 if decisions.single_operator(job).on else np.float64
+    yield _transform(TRANSFORMS, job, job.grid.points, np.float64, ranks, rank)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
-        yield _transform("padded transforms and operator", job, lengths, of_operator, ranks, rank, with_symbol=True)
+        yield _transform("padded transforms and operator", job, lengths, kept, ranks, rank, with_symbol=True)
     else:
-        yield Holding("operator", symbol * of_operator.itemsize // precision.itemsize)
+        yield Holding("operator", symbol * np.dtype(kept).itemsize // 8)
     if decisions.mixed_precision(job).on:
         what, points = "single transforms and preconditioner", job.grid.points
         yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True, lent=True)
     else:
         yield Holding("preconditioner", symbol)
     grids = grids_for(job.grid.dx, job.grid.dy)
-    numbers = precision.type, job.numerics.tolerance
-    yield Holding("solver", ContactSolver.footprint(*job.grid.points, *numbers, ranks, rank, grids, of_operator.type))
+    yield Holding("solver", ContactSolver.footprint(*job.grid.points, job.numerics.tolerance, ranks, rank, grids, kept))
     if decisions.spectrum(job).on:
         yield Holding("surface spectrum", waves)
     for maps in _maps(job):
@@ -113,23 +112,23 @@ def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
 
 
 def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> Iterator[int]:
-    points, precision = job.grid.points, np.dtype(job.numerics.map_type)
+    points = job.grid.points
     even = not job.initial.velocity[1]
-    finest = _transform("", job, points, precision, ranks, rank).bytes
-    spectrum, *_ = footprint(points, points, precision, ranks, rank)
-    yield SteadySolver.footprint(*points, precision.type, tolerance_of(job.numerics.tolerance), ranks, rank, sets)
-    yield 2 * _map(points, precision, ranks, rank)  # the heights and the start
+    finest = _transform("", job, points, np.float64, ranks, rank).bytes
+    spectrum, *_ = footprint(points, points, np.float64, ranks, rank)
+    yield SteadySolver.footprint(*points, tolerance_of(job.numerics.tolerance), ranks, rank, sets)
+    yield 2 * _map(points, ranks, rank)  # the heights and the start
     yield finest + waves
     yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(points):
-        padded, *_ = footprint(points, lengths, precision, ranks, rank)
-        yield _transform("", job, lengths, precision, ranks, rank).bytes
+        padded, *_ = footprint(points, lengths, np.float64, ranks, rank)
+        yield _transform("", job, lengths, np.float64, ranks, rank).bytes
         yield Convolution.footprint(padded, lengths[1], even, is_complex=True)
     else:
         yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
     for coarse in coarser_points(*points):
-        spectrum, blocks, _ = footprint(coarse, coarse, precision, ranks, rank)
-        yield spectrum + blocks + _map(coarse, precision, ranks, rank)
+        spectrum, blocks, _ = footprint(coarse, coarse, np.float64, ranks, rank)
+        yield spectrum + blocks + _map(coarse, ranks, rank)
 
 
 def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
@@ -140,13 +139,13 @@ def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
     count = points[0] // 2 + 1
     dealt = deal(count, min(ranks, count)) if rank is None else [dealt_to(count, ranks, rank)]  # more ranks have none
     shapes = [shape_of(waves, points, columns) for columns in dealt]
-    return max(rows * columns for rows, columns in shapes) * 2 * np.dtype(job.numerics.map_type).itemsize
+    return max(rows * columns for rows, columns in shapes) * 16
 
 
-def _map(points: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int) -> int:
+def _map(points: tuple[int, int], ranks: int, rank: int) -> int:
     """Bytes of a map on a rank."""
     rows = dealt_to(points[1], ranks, rank)
-    return (rows.stop - rows.start) * points[0] * np.dtype(dtype).itemsize
+    return (rows.stop - rows.start) * points[0] * 8
 
 
 def _transform(
@@ -167,13 +166,12 @@ def _transform(
 
 def _maps(job: Job) -> Iterator[Maps]:
     """Of everything that holds whole maps, or has them in checkpoints."""
-    precision = np.dtype(job.numerics.map_type)
-    yield Maps("heights", MapCount(1), precision)
-    yield Maps("pressures", State.count_maps(decisions.lasting(job).on, decisions.further_starts(job).on), precision)
+    yield Maps("heights", MapCount(1), np.float64)
+    yield Maps("pressures", State.count_maps(decisions.lasting(job).on, decisions.further_starts(job).on), np.float64)
     if relaxation.decide(job).on:
-        yield Maps("branches", ZenerBody.count_maps(len(fold_branches_of(job).kept)), precision)
+        yield Maps("branches", ZenerBody.count_maps(len(fold_branches_of(job).kept)), np.float64)
     else:
-        yield Maps("moved heights", ElasticBody.count_maps(decisions.along_x(job)), precision)
+        yield Maps("moved heights", ElasticBody.count_maps(decisions.along_x(job)), np.float64)
     if decisions.energy_memory(job).on:
         yield Maps("energy memory", ElasticPressure.count_maps(relaxation_of(job).moduli.size), np.float64)
     for name, effect in effects_that_follow(job).items():

@@ -93,8 +93,6 @@ def _finer(job: Job, sample: Sample, accuracy: float) -> float:
     error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
     share = MESH_SHARE * accuracy
     of_waves = cells_per_wave(share) * max(job.grid.dx, job.grid.dy) / waves if waves else 0.0
-    if waves and error is not None:
-        return of_waves
     if error is None:
         error, order = mesh_error(sample, "area") or 0.0, EDGE_ORDER
     factor = (error / share) ** (1.0 / order) * sample.job.grid.nx / job.grid.nx
@@ -234,14 +232,15 @@ def _basis(costs: Costs) -> Iterator[str]:
     """What was measured, and what is scaled from it."""
     sample = costs.scaling.samples[0]
     calls = sample.total("operator") / max(sample.steps, 1)
-    time, mesh = time_error(StageCost(0), sample), mesh_error(sample, "friction")
+    mesh = mesh_error(sample, "friction")
     mesh = mesh_error(sample, "area") if mesh is None else mesh
-    by_mesh = "errors by the mesh unknown" if mesh is None else f"{_per_cent(mesh)} by the mesh"
+    if sample.job.steady:
+        what, errors = "state", ""
+    else:
+        what, errors = "step", f", errors of {_per_cent(time_error(StageCost(0), sample))} by time steps"
+    by_mesh = "errors by the mesh unknown" if mesh is None else f"errors of {_per_cent(mesh)} by the mesh"
     points = " x ".join(map(str, sample.job.grid.points))
-    yield (
-        f"measured on {points} points: times, {calls:.3g} operator calls a step, errors of {_per_cent(time)} by time "
-        f"steps, {by_mesh}"
-    )
+    yield f"measured on {points} points: times, {calls:.3g} operator calls a {what}{errors}, {by_mesh}"
     yield (
         "scaled: cells by what the shortest wave or a contact spot needs, steps by the order of the integrator, "
         f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time by N log N; maps are those on 1 rank"

@@ -168,9 +168,7 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
     return building, [stage]
 
 
-def _solve_or_fail(
-    sliding: SteadySliding, velocity: tuple[float, float], pressure: float, points: list[Point]
-) -> None:
+def _solve_or_fail(sliding: SteadySliding, velocity: tuple[float, float], pressure: float, points: list[Point]) -> None:
     """Append the state to `points`; one that cannot be solved costs what it has cost."""
     with suppress(RunError):
         points.append(sliding.solve(velocity, pressure))

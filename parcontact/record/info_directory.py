@@ -65,7 +65,7 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
     if (directory / RESOLVED).exists():
         job = shown_job(directory / RESOLVED)
-        yield from (f"  {text}" for text in slide.describe(job.history, columns, job.grid.dx))
+        yield from (f"  {text}" for text in slide.describe(job, columns))
 
 
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

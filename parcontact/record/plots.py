@@ -11,21 +11,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..job.reading import CASES
 from . import files, hdf5, sweep_table, theory_settings
-from .pictures import charts, histories, movie, steady, style, sweep
+from .pictures import charts, histories, layout, movie, steady, style, sweep
 from .pictures.charts import Chart
 from .pictures.maps import maps
 from .pictures.run import Panel, Run
 
 FORMATS = ("png", "pdf", "svg")
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "steady", "maps")
-LINE = 68  # letters of a title
 
 
 @dataclass(frozen=True)
@@ -67,12 +64,13 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        figure = _figure(_wrapped(steady.title(table.parent)), [_steady(table.parent, Options())])
+        panels = [_steady(table.parent, Options())]
+        figure = layout.figure_of(_wrapped(steady.title(table.parent)), panels, legend=True)
         return _save(figure, table.with_suffix(""), Options())
 
 
 def _wrapped(title: str) -> str:
-    return "\n".join(textwrap.wrap(title, LINE))
+    return "\n".join(textwrap.wrap(title, layout.LINE))
 
 
 def _movie(directory: Path, options: Options) -> Path:
@@ -114,7 +112,7 @@ def _picture(directory: Path, options: Options) -> Figure:
         groups.insert(1, _steady(directory, options))
     if (directory / sweep.TABLE).is_file():
         title = title if groups else _wrapped(sweep.title(directory) or title)
-        groups.append(_panels(_chosen(sweep.charts(directory), options), options))
+        groups += [_panels([chart], options) for chart in _chosen(sweep.charts(directory), options)]
     elif not groups:
         raise InputError(
             f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"
@@ -122,7 +120,8 @@ def _picture(directory: Path, options: Options) -> Figure:
         )
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    return _figure("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups)
+    alone = (directory / steady.TABLE).is_file() and len(groups) == 1
+    return layout.figure_of("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups, alone)
 
 
 def _instead(path: Path) -> str:
@@ -139,7 +138,7 @@ def _comparison(directories: Sequence[Path], options: Options) -> Figure:
     for directory in directories:
         if not _lines(directory, options):
             raise InputError(f"{directory} holds nothing to compare")
-    return _figure("", [_panels(compared_charts(directories, options), options)], legend=True)
+    return layout.figure_of("", [_panels(compared_charts(directories, options), options)], legend=True)
 
 
 def compared_charts(directories: Sequence[Path], options: Options = Options()) -> list[Chart]:
@@ -206,36 +205,3 @@ def _chosen(found: Sequence[Chart], options: Options) -> list[Chart]:
 
 def _panels(found: Sequence[Chart], options: Options) -> list[Panel]:
     return [partial(charts.draw, chart, log=options.log) for chart in found]
-
-
-def _figure(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False) -> Figure:
-    """Groups of panels below each other, each in even rows; with `legend` one for all panels, above them."""
-    rows = [row for group in groups for row in _rows(group)]
-    height = 0.25 + 0.2 * (title.count("\n") + 1) + style.HEIGHT * len(rows)
-    figure = Figure(figsize=(style.WIDTH, height), layout="constrained")
-    if title:
-        figure.suptitle(style.plain(title), fontsize=11)
-    drawn = []
-    for part, panels in zip(figure.subfigures(len(rows) or 1, 1, squeeze=False)[:, 0], rows, strict=False):
-        for panel, axes in zip(panels, part.subplots(1, len(panels), squeeze=False)[0], strict=True):
-            panel(axes)
-            drawn.append(axes)
-    if legend and drawn:
-        _legend_above(figure, drawn)
-    return figure
-
-
-def _rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
-    count = -(-len(group) // style.COLUMNS)
-    return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
-
-
-def _legend_above(figure: Figure, drawn: Sequence[Axes]) -> None:
-    """One legend of what all panels show, in place of theirs."""
-    found: dict[str, Artist] = {}
-    for axes in drawn:
-        found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-        if legend := axes.get_legend():
-            legend.remove()
-    columns = max(1, min(len(found), LINE // (8 + max(map(len, found)))))
-    figure.legend(list(found.values()), list(found), loc="outside upper center", ncols=columns)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..job import Stage
+from ..job import Initial, Job, Ramp, Stage
 
 DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
 SAME_INSTANT = 1e-9  # relative: instants this close are the same
@@ -88,12 +88,12 @@ def _within(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell
     return f" +- {both:.2g}" + (f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * both else "")
 
 
-def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> Iterator[str]:
-    """Sentences about the slide so far, from the columns of `measure` and of `errors`, on a grid of such cells [m];
-    none where nothing has slid.
+def describe(job: Job, columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
+    """Sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing has slid.
 
     As long as the last slide has not begun, they are about the one before it, and say so.
     """
+    history, cell = job.history, job.grid.dx
     last, begun = _slide(history), _begun(history, columns["time"])
     waits = begun <= last.start
     so_far = history[:begun] if waits else history
@@ -115,6 +115,28 @@ def describe(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], c
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
         told = ", ".join(f"{what[name]} {100 * value:.2g} %" for name, value in known.items())
         yield f"largest errors of the steps of the slide: {told}"
+    if _goes_on(job.initial, [history[index] for index in _slide(so_far)], rows):
+        yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
+
+
+def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:
+    """Whether a slide is the steady sliding with which its run began, under the same load."""
+    if initial.state != "steady" or initial.pressure is None or rows[0] != 0:
+        return False
+    same = initial.velocity, Ramp(initial.pressure, initial.pressure)
+    return all((stage.velocity, stage.pressure) == same for stage in stages)
+
+
+def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error: float) -> Iterator[str]:
+    """A steady start and the slide that goes on from it are one state, found twice: tell if they differ by more than
+    they are known to."""
+    start, known = columns["friction"][0], columns.get(ERRORS[0], [math.nan])[0]
+    allowed = known * abs(start) + error * abs(mu_dyn)
+    if abs(mu_dyn - start) > allowed:
+        yield (
+            f"friction left the {start:.6g} of the steady start by {abs(mu_dyn - start):.2g}, more than the errors of "
+            f"both, {allowed:.2g}: where nothing changes it is to stay; try smaller steps and a smaller tolerance"
+        )
 
 
 _COLUMNS = ("distance", "friction", "contact_area")

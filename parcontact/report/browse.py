@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -12,6 +13,7 @@ from .. import progress
 from ..record import hdf5
 from ..record.pictures import style, units
 from ..record.pictures.frames import Frames
+from ..record.pictures.run import Fields, Run, box, frame_label
 from .parts import RC, Browser, uri_of
 
 MAPS = ("pressure", "gap", "displacement", "height")
@@ -23,14 +25,14 @@ SIZE = (4.2, 3.5)  # [inch]
 Labels = dict[int, str]  # of the maps that were saved, by their index
 
 
-def of_run(directory: Path) -> list[Browser]:
-    """Of all maps that a run has saved in a directory, over time."""
-    return list(_of(directory / "fields.h5", _instants))
+def of_run(run: Run) -> list[Browser]:
+    """Of all maps that a run has saved, over time."""
+    return list(_of(run.directory / "fields.h5", partial(_instants, run)))
 
 
 def of_curve(directory: Path) -> list[Browser]:
     """Of all maps that a friction curve has saved in a directory, over velocity and load."""
-    return list(_of(directory / "steady.h5", _states))
+    return list(_of(directory / "steady.h5", partial(_states, box(directory))))
 
 
 def _of(path: Path, label: Callable[[h5py.File], Labels]) -> Iterator[Browser]:
@@ -56,13 +58,15 @@ def _browser(file: h5py.File, name: str, labels: Labels) -> Browser:
             frames.show(index, f"{name}, {label}")
             image = io.BytesIO()
             frames.figure.savefig(image, format="png", dpi=DPI)
-            uris.append(uri_of(_fewer_colours(image), "image/png"))
+            uris.append(uri_of(fewer_colours(image), "image/png"))
     return Browser(name, list(labels.values()), uris)
 
 
-def _fewer_colours(png: io.BytesIO) -> bytes:
-    small = io.BytesIO()
-    Image.open(png).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(small, "png", optimize=True)
+def fewer_colours(png: io.BytesIO) -> bytes:
+    """The picture with so few colours that all of it, also what is rare, has nearly its own."""
+    small, true = io.BytesIO(), Image.open(png).convert("RGB")
+    few = true.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few.save(small, "png", optimize=True)
     return small.getvalue()
 
 
@@ -72,18 +76,18 @@ def _spread(indices: Sequence[int]) -> list[int]:
     return [indices[int(k)] for k in np.linspace(0, len(indices) - 1, count)] if count else []
 
 
-def _instants(file: h5py.File) -> Labels:
-    times, steps = file["t"][...], file["step"][...]
-    known = np.flatnonzero(~np.isnan(times))
-    return {int(k): f"{units.text(float(times[k]), 's', 4)} (step {int(steps[k])})" for k in known}
+def _instants(run: Run, file: h5py.File) -> Labels:
+    fields = Fields(file)
+    return {index: frame_label(run, fields, index) for index in fields.saved}
 
 
-def _states(file: h5py.File) -> Labels:
+def _states(area: float, file: h5py.File) -> Labels:
+    """Speeds and loads: forces on the box of a free scene, whose `area` [m^2] is not 0."""
     speeds, loads = file["velocity"][...], file["load"][...]
     known = np.flatnonzero(~np.isnan(speeds))
     warm = (
         [f", {degrees:g} °C" for degrees in file["temperature"][...]] if "temperature" in file else [""] * len(speeds)
     )
-    return {
-        int(k): f"{units.text(float(speeds[k]), 'm/s')}, {units.text(float(loads[k]), 'Pa')}{warm[k]}" for k in known
-    }
+    size, unit = (area, "N") if area else (1.0, "Pa")
+    pressed = [units.text(size * float(load), unit) for load in loads]
+    return {int(k): f"{units.text(float(speeds[k]), 'm/s')}, {pressed[k]}{warm[k]}" for k in known}

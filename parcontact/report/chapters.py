@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..job import Job
 from ..record import measures, plots
 from ..record.pictures.charts import Series
 from ..record.resolved import RESOLVED, STEADY_RESOLVED
-from . import asked, log, material, origin, results, road
+from . import asked, budget, log, material, origin, results, road
 from .parts import Chapter, Section, of_chart, of_file
 
 KINDS = {  # by the table that each of them has
@@ -40,7 +41,7 @@ def chapter(directory: Path) -> Chapter:
         job, complete = asked.read(resolved)
         title = job.title
         sections += [asked.section(job, resolved.with_name(JOBS[resolved.name])), material.section(job)]
-        sections += [road.section(job), *_costs(directory, found), origin.warnings(job, complete, found)]
+        sections += [road.section(job), *_costs(directory, job, found), origin.warnings(job, complete, found)]
     sections += [origin.section(directory, found), origin.to_cite(), _data(directory)]
     kinds = " and ".join(KINDS[name][0] for name in there)
     return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if not one.empty])
@@ -65,12 +66,12 @@ def _resolved(directory: Path) -> Path | None:
     return next((path for path in paths if path.is_file()), None)
 
 
-def _costs(directory: Path, found: log.Log) -> Iterator[Section]:
+def _costs(directory: Path, job: Job, found: log.Log) -> Iterator[Section]:
     """The error budget and the cost of a run, or else of a curve."""
-    for name in ("measures.csv", "steady.csv"):
+    for name, budget_of in (("measures.csv", budget.of_run), ("steady.csv", budget.of_curve)):
         if (directory / name).is_file():
             columns = measures.read(directory / name)
-            yield origin.budget(columns)
+            yield budget_of(columns, found.estimates, job.numerics.accuracy)
             yield origin.cost(columns, found)
             return
 

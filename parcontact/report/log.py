@@ -1,4 +1,4 @@
-"""What run.log says of a run: its warnings, its counts, and the machine."""
+"""What run.log and steady.log say of a run and a curve: warnings, estimated errors, counts, and the machine."""
 
 import re
 from collections.abc import Iterator
@@ -6,29 +6,65 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..record import files
+from ..record.console import STAMP, WARNING
+from ..record.curve_points import LOG
 
-STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
+LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
 STARTED = ("parcontact ", "in ", "machine: ", "batch job: ")
+ESTIMATE = re.compile(r"estimated error of ([^:]*): (?:up to )?(\S+) % \(([^)]*)\)")
+PART = re.compile(r"(\w+) (\S+) %")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An estimated error of a run or of the worst point of a curve: the sentence of the log, total and parts [%]."""
+
+    name: str
+    of_curve: bool
+    sentence: str
+    total: float
+    parts: dict[str, float]
+
+    @property
+    def largest(self) -> str:
+        """The part that makes most of it."""
+        return max(self.parts, key=self.parts.__getitem__)
 
 
 @dataclass(frozen=True)
 class Log:
-    """Warnings, each once and in their order; what was counted in the last run; lines about the program and machine."""
+    """Warnings, each once and in their order; the estimated errors of the last run or curve; what was counted in the
+    last run; lines about the program and machine."""
 
     warnings: list[str]
+    estimates: list[Estimate]
     counts: list[tuple[str, str]]
     machine: list[str]
 
 
 def read(directory: Path) -> Log:
     """Of a directory; empty where there is no log."""
-    path = directory / "run.log"
-    lines = [STAMP.sub("", line) for line in files.text(path).splitlines()] if path.is_file() else []
-    warnings = [line.removeprefix("warning: ") for line in lines if line.startswith("warning: ")]
+    texts = [files.text(directory / name) for name in LOGS if (directory / name).is_file()]
+    lines = [STAMP.sub("", line) for text in texts for line in text.splitlines()]
+    warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]
     machine = [line for line in lines if line.startswith(STARTED) or re.match(r"\d+ ranks?, ", line)]
-    return Log(list(dict.fromkeys(warnings)), list(_counts(counted[-1])) if counted else [], machine)
+    counts = list(_counts(counted[-1])) if counted else []
+    return Log(list(dict.fromkeys(warnings)), list(_estimates(lines)), counts, machine)
+
+
+def _estimates(lines: list[str]) -> Iterator[Estimate]:
+    """Of a run the last of friction and of area: it says them again when it goes on. Of a curve the largest of each."""
+    found: dict[tuple[str, bool], Estimate] = {}
+    for line in lines:
+        if match := ESTIMATE.match(line.removeprefix(WARNING)):
+            name, of_curve = "friction" if "friction" in match[1] else "contact area", "points" in match[1]
+            parts = {part: float(share) for part, share in PART.findall(match[3])}
+            before = found.get((name, of_curve))
+            if before is None or not of_curve or float(match[2]) > before.total:
+                found[name, of_curve] = Estimate(name, of_curve, match.string, float(match[2]), parts)
+    yield from found.values()
 
 
 def _counts(text: str) -> Iterator[tuple[str, str]]:

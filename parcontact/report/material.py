@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..effects.folded_branches import excited_band
+from ..effects.measured_range import excited_bands
 from ..effects.relaxation import relaxation_of
 from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
@@ -38,6 +39,8 @@ def section(job: Job) -> Section:
     branches = zip(series.relaxation_times, series.moduli, strict=True)
     listed = [(units.text(float(tau), "s"), units.text(float(modulus), "Pa")) for tau, modulus in branches]
     tables.append(Table(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
+    if (excited := _excited(job)).rows:
+        tables.append(excited)
     return Section("Rubber", tables=tables, pictures=[of_panel(partial(_moduli, job=job), CAPTION)])
 
 
@@ -50,6 +53,30 @@ def _temperature(job: Job) -> Iterator[tuple[str, str]]:
         temperature = reference if found.temperature is None else found.temperature
         yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
         yield "shift factor a_T", f"{found.time_factor:.4g}"
+    if isinstance(found, Zener) and found.band is not None:
+        yield "measured at, as at the reference", _range(found.band, "Hz")
+    if isinstance(found, Zener) and found.temperatures is not None:
+        yield "measured from", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
+
+
+def _excited(job: Job) -> Table:
+    """Which frequencies the waves of the surface excite at each temperature, if they move."""
+    found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
+    rows = [
+        (
+            "–" if one.temperature is None else f"{one.temperature:g} °C",
+            f"{one.factor:.3g}",
+            _range(one.band, "Hz"),
+            _range(one.reduced, "Hz"),
+        )
+        for one in found
+    ]
+    told = "frequencies with which the waves of the surface pass, at all velocities of the job"
+    return Table(("temperature", "a_T", "excited by the job", "as at the reference"), rows, told)
+
+
+def _range(ends: tuple[float, float], unit: str) -> str:
+    return f"{units.text(ends[0], unit)} to {units.text(ends[1], unit)}"
 
 
 def _moduli(axes: Axes, job: Job) -> None:

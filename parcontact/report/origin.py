@@ -13,18 +13,6 @@ from ..record import hdf5, provenance
 from . import log
 from .parts import Section, Table
 
-ERRORS = {"error_friction": "friction", "error_area": "contact area"}
-
-
-def budget(columns: dict[str, Any]) -> Section:
-    """The error budget of a table, relative, if it has one."""
-    rows = []
-    for name, what in ERRORS.items():
-        known = [float(value) for value in columns.get(name, ()) if value == value]
-        if known:
-            rows.append((what, f"{max(known):.2%}", f"{known[-1]:.2%}"))
-    return Section("Error budget", tables=[Table(("error of", "largest", "in the end"), rows)] if rows else ())
-
 
 def cost(columns: dict[str, Any], found: log.Log) -> Section:
     """Wall time, operator calls and what was counted."""

@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 
 from ..record import files
 from ..record.pictures import style
-from ..record.pictures.charts import Chart, draw
+from ..record.pictures.charts import Chart, draw, with_key_beside
 from ..record.pictures.run import Panel
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
+PHONE_COLUMNS = 2  # of a table that is shown as one on a phone
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
 
 
@@ -26,14 +27,18 @@ class Table:
     rows: Sequence[Sequence[str]]
     caption: str = ""
 
+    @property
+    def folds(self) -> bool:
+        """Whether it is too wide for a phone, which shows each row as a list of names and values."""
+        return len(self.head) > PHONE_COLUMNS
+
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as a data: URI, and what it shows; a `wide` one stands alone."""
+    """A picture as a data: URI, and what it shows."""
 
     uri: str
     caption: str
-    wide: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,9 @@ class Chapter:
 
 def of_chart(chart: Chart, caption: str = "") -> Picture:
     """A picture of one chart."""
-    return of_panel(partial(draw, chart), caption or f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
+    return of_panel(
+        partial(draw, with_key_beside(chart)), caption or f"{chart.y.name} over {chart.x.name}".replace("\n", " ")
+    )
 
 
 def of_panel(panel: Panel, caption: str) -> Picture:

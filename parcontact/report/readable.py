@@ -17,7 +17,7 @@ from ..job import yamltext
 from ..record import hdf5
 
 READ = (  # in an output directory, each before what is below it
-    *("*.csv", "*.h5", "*.yaml", "*.png", "run.log", "study.txt", "checkpoint", "checkpoint/*.h5"),
+    *("*.csv", "*.h5", "*.yaml", "*.png", "*.log", "study.txt", "checkpoint", "checkpoint/*.h5"),
     *("cases", "cases/*", "cases/*/*.csv", "cases/*/*.yaml"),
 )
 NAMING = ("path", "spectrum", "include")  # keys whose values are files

@@ -31,8 +31,8 @@ def of_run(directory: Path) -> Section:
             rows.append((name.replace("_", " "), number(known[-1]), number(min(known)), number(max(known)), unit))
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     pictures = [of_chart(chart) for chart in histories.charts(run)]
-    told = [*slide.describe(run.job.history, columns, run.job.grid.dx), theory_settings.describe(directory)]
-    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(directory))
+    told = [*slide.describe(run.job, columns), theory_settings.describe(directory)]
+    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(run))
 
 
 def of_curve(directory: Path) -> Section:
@@ -69,7 +69,7 @@ def of_study(directory: Path) -> Section:
 def _study_pictures(directory: Path) -> Iterator[Picture]:
     for name, caption in STUDY_PICTURES.items():
         if (directory / name).is_file():
-            yield Picture(uri_of(files.contents(directory / name), "image/png"), caption, wide=True)
+            yield Picture(uri_of(files.contents(directory / name), "image/png"), caption)
 
 
 def shortened(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

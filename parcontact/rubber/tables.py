@@ -61,12 +61,16 @@ class Set:
 
 @dataclass(frozen=True)
 class Measurement:
-    """All sets of a file, by temperature; `tension` tells that moduli were Young's and have been divided."""
+    """All sets of a file, by temperature; `tension` tells that moduli were Young's and have been divided.
+
+    `derived` is the modulus that follows from the other one and tan delta, "stor" or "loss"; "" where both are given.
+    """
 
     path: Path
     kind: Kind
     sets: tuple[Set, ...]
     tension: bool
+    derived: str = ""
 
 
 class _Column(NamedTuple):
@@ -177,7 +181,7 @@ def _measurement(
             raise InputError(f"{path}: two columns mean the same: {name} is given twice; remove one")
     values = {column.name: rows[:, k] for k, column in enumerate(columns)}
     units = {column.name: column.unit for column in columns}
-    _complete(path, values, units, numbers)
+    derived = _complete(path, values, units, numbers)
     modulus = _modulus(path, values)
     kind: Kind = "time" if f"{modulus}_relax" in values else "frequency"
     factor = 1.0 / (2.0 * (1.0 + poisson)) if modulus == "E" else 1.0
@@ -194,18 +198,20 @@ def _measurement(
     sets = tuple(_sets(path, at, moduli, temperatures))
     if kind == "time":
         refuse_rising(path, [each.storage for each in sets])
-    return Measurement(path, kind, sets, modulus == "E")
+    return Measurement(path, kind, sets, modulus == "E", derived)
 
 
-def _complete(path: Path, values: dict[str, Array], units: dict[str, str], numbers: Sequence[int]) -> None:
-    """Add the storage or loss modulus that follows from the other one and tan delta."""
+def _complete(path: Path, values: dict[str, Array], units: dict[str, str], numbers: Sequence[int]) -> str:
+    """Add the storage or loss modulus that follows from the other one and tan delta; returns which, if one does."""
+    derived = ""
     for modulus in ("E", "G") if "tan_del" in values else ():
         storage, loss = f"{modulus}_stor", f"{modulus}_loss"
         if (storage in values) != (loss in values):
             known, missing = (storage, loss) if storage in values else (loss, storage)
             tangent = _positive(path, "tan_del", values, numbers)
             values[missing] = values[known] * tangent if missing == loss else values[known] / tangent
-            units[missing] = units[known]
+            units[missing], derived = units[known], missing.removeprefix(f"{modulus}_")
+    return derived
 
 
 def _modulus(path: Path, values: dict[str, Array]) -> str:

@@ -191,7 +191,7 @@ class Journey:
         if self.slab.root and self._slides:
             with suppress(OSError, InputError):
                 rows = measures.read(self.directory.path / "measures.csv")
-                for text in slide.describe(self.job.history, rows, self.job.grid.dx):
+                for text in slide.describe(self.job, rows):
                     self.console.say(text)
 
     def _farewell(self) -> int:

@@ -50,7 +50,8 @@ UNLIKE = 1.25  # times a step: an exact one that is longer, or shorter by as muc
 PATIENCE = 5  # iterations without a better certificate until steps are exact
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at p = 0, the next one takes no notice of its direction
-UNSEEN_RISE = 64  # times the precision of maps, times <p, A p>/2: a rise of f that cannot be told from none
+UNSEEN_RISE = 64 * float(np.finfo(np.float64).eps)  # of <p, A p>/2: a rise of f that cannot be told from none
+LEAST_LOAD = float(np.finfo(np.float64).tiny)  # a smaller one than maps can hold is none
 NOT_FINITE = "met numbers that are not finite"
 
 
@@ -93,9 +94,9 @@ class ContactSolver:
     is in single precision where the tolerance is loose, a byte per point, and those of `Surround`.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
-    lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `dtype` of maps;
-    `grids` of larger cells by which a residual is extended (`surround.grids_for`); `kept`, the type of displacements,
-    that of maps unless the operator has fewer digits.
+    lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `grids` of
+    larger cells by which a residual is extended (`surround.grids_for`); `kept`, the type of displacements, single
+    precision where the operator has no more digits.
     """
 
     def __init__(
@@ -106,18 +107,14 @@ class ContactSolver:
         height: float,
         tolerance: float,
         max_iterations: int,
-        dtype: type[np.floating] = np.float64,
         grids: int | None = None,
-        kept: type[np.floating] | None = None,
+        kept: type[np.floating] = np.float64,
     ) -> None:
         self.slab, self.operator, self.preconditioner = slab, operator, preconditioner
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
-        self.dtype = dtype
-        self._rounding = UNSEEN_RISE * float(np.finfo(dtype).eps)
-        self._least = float(np.finfo(dtype).tiny)  # a smaller load than maps can hold is none
-        self._u, self._w = (slab.zeros(kept or dtype) for _ in range(2))
-        self._other = slab.zeros(dtype)
-        self._t = slab.zeros(precision_of_directions(dtype, tolerance))
+        self._u, self._w = (slab.zeros(kept) for _ in range(2))
+        self._other = slab.zeros()
+        self._t = slab.zeros(precision_of_directions(tolerance))
         self._working = slab.zeros(np.bool_)
         self._surround = Surround(slab, preconditioner, most=grids)
         self._rough_inverse = grids == 0 or min(slab.nx, slab.ny) == 1  # K E is no more than roughly the inverse
@@ -127,16 +124,15 @@ class ContactSolver:
     def footprint(
         nx: int,
         ny: int,
-        dtype: type[np.floating],
         tolerance: float,
         ranks: int,
         rank: int,
         grids: int | None = None,
-        kept: type[np.floating] | None = None,
+        kept: type[np.floating] = np.float64,
     ) -> int:
         """Bytes that it holds on a rank."""
         rows = dealt_to(ny, ranks, rank)
-        maps = dtype, kept or dtype, kept or dtype, precision_of_directions(dtype, tolerance)
+        maps = np.float64, kept, kept, precision_of_directions(tolerance)
         bytes_of_point = 1 + sum(np.dtype(each).itemsize for each in maps)
         cells = Surround.footprint(nx, ny, ranks, rank, grids)
         return bytes_of_point * (rows.stop - rows.start) * nx + cells
@@ -150,7 +146,7 @@ class ContactSolver:
         the last iterate, not a solution.
         """
         mean = control.value if isinstance(control, MeanPressure) else None
-        if mean is not None and 0.0 <= mean < self._least:
+        if mean is not None and 0.0 <= mean < LEAST_LOAD:
             return self._separate(h, start)
         centred = mean is not None
         p, other = start, self._other
@@ -262,7 +258,7 @@ class ContactSolver:
                 self._local_load.restore(p, load, mean * self.slab.points, cut > LEAST * load and halvings == 0)
             self._u, self._w = self.operator.apply(p, self._w), self._u
             new = weigh(self.slab, p, self._u, h, old.d)
-            if new.f - old.f <= self._rounding * new.energy or halvings == MAX_HALVINGS:
+            if new.f - old.f <= UNSEEN_RISE * new.energy or halvings == MAX_HALVINGS:
                 break
             self._u, self._w = self._w, self._u
             step *= 0.5

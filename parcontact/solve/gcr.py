@@ -30,17 +30,16 @@ class Directions:
         operator: Operator,
         preconditioner: Operator,
         count: int,
-        dtype: type,
         kept: type,
         lent: Sequence[tuple[Array, Array]] = (),
     ) -> None:
         self.slab, self.operator, self.preconditioner, self.count = slab, operator, preconditioner, count
-        self.dtype, self.kept, self._pairs = dtype, kept, list(lent)
+        self.kept, self._pairs = kept, list(lent)
         self._r: Array | None = None
 
     def _residual(self) -> Array:
         if self._r is None:
-            self._r = self.slab.empty(self.dtype)
+            self._r = self.slab.empty()
         return self._r
 
     def _pair(self, number: int) -> tuple[Array, Array]:

@@ -13,6 +13,6 @@ VERY_LOOSE = 1e-3  # tolerance with which displacements may have the digits of s
 LOOSE = 1e-5  # tolerance on a certificate with which they are in single precision
 
 
-def precision_of_directions(dtype: type[np.floating], tolerance: float, loose: float = LOOSE) -> type[np.floating]:
-    """The type of their maps beside others of the type `dtype`, in a solver for which such a tolerance is loose."""
-    return np.float32 if tolerance >= loose else dtype
+def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.floating]:
+    """The type of their maps in a solver for which such a tolerance is loose, or not."""
+    return np.float32 if tolerance >= loose else np.float64

@@ -32,11 +32,9 @@ def surround_on(nx: int, ny: int, narrow: bool = False) -> tuple[int, float]:
 class Projected:
     """Holds DIRECTIONS maps t and as many of their images w, and those of `Surround`."""
 
-    def __init__(
-        self, slab: Slab, operator: Operator, preconditioner: Operator, dtype: type, narrow: bool = False
-    ) -> None:
+    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, narrow: bool = False) -> None:
         self.slab, self.operator = slab, operator
-        self.t, self.w = ([slab.empty(dtype) for _ in range(DIRECTIONS)] for _ in range(2))
+        self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
         grids, floor = surround_on(slab.nx, slab.ny, narrow)
         self.surround = Surround(slab, preconditioner, floor, grids)
         self.local_load = LocalLoad(slab)

@@ -52,10 +52,10 @@ class Proximal:
     It solves as a `SteadySolver` of A does.
     """
 
-    def __init__(self, solver: SteadySolver, operator: Operator, pull: Operator, dtype: type[np.floating]) -> None:
+    def __init__(self, solver: SteadySolver, operator: Operator, pull: Operator) -> None:
         self.solver, self.operator, self.pull = solver, operator, pull
         self.tolerance = solver.tolerance
-        self._h, self._kept = solver.slab.empty(dtype), solver.slab.empty(dtype)
+        self._h, self._kept = solver.slab.empty(), solver.slab.empty()
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         """As `SteadySolver.solve`; its numbers of steps are those of all contacts. Collective."""

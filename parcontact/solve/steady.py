@@ -36,6 +36,7 @@ MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
 WAYS = 2 * ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
 MAX_DIRECTIONS = 10  # of the linear steps on a set
+LOST = 1.0 / float(np.finfo(np.float64).eps)  # a guess with which no digit of the load is left
 LOOSE = 1.5e-3  # tolerance with which those beyond the projected steps' are in single precision: with a smaller one
 # rounded directions took up to half as many steps more where a body is a thousand times as stiff at once as in the end
 KAPPA = 0.1  # times the stiffness of a point
@@ -83,26 +84,22 @@ class SteadySolver:
         tolerance: float,
         max_steps: int,
         directions: int = MAX_DIRECTIONS,
-        dtype: type[np.floating] = np.float64,
         narrow: bool = False,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
-        self._projected = Projected(slab, operator, preconditioner, dtype, narrow)
-        kept = precision_of_directions(dtype, tolerance, LOOSE)
-        self._linear = Directions(slab, operator, preconditioner, directions, dtype, kept, self._projected.lend())
-        self._lost = 1.0 / float(np.finfo(dtype).eps)  # a guess with which no digit of the load is left
-        self._u = slab.zeros(dtype)
+        self._projected = Projected(slab, operator, preconditioner, narrow)
+        kept = precision_of_directions(tolerance, LOOSE)
+        self._linear = Directions(slab, operator, preconditioner, directions, kept, self._projected.lend())
+        self._u = slab.zeros()
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
 
     @staticmethod
-    def footprint(
-        nx: int, ny: int, dtype: type[np.floating], tolerance: float, ranks: int, rank: int, sets: bool = False
-    ) -> int:
+    def footprint(nx: int, ny: int, tolerance: float, ranks: int, rank: int, sets: bool = False) -> int:
         """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
-        rows, kept = dealt_to(ny, ranks, rank), precision_of_directions(dtype, tolerance, LOOSE)
-        bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * np.dtype(dtype).itemsize + 1
+        rows, kept = dealt_to(ny, ranks, rank), precision_of_directions(tolerance, LOOSE)
+        bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * 8 + 1
         bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
         surround = Surround.footprint(nx, ny, ranks, rank, surround_on(nx, ny)[0])
         return bytes_of_maps * (rows.stop - rows.start) * nx + surround
@@ -182,7 +179,7 @@ class SteadySolver:
                 (rounds, reduction), *others = others
                 self._take_in(h, best * self._length)
                 best, since = np.inf, 0
-            if not guess < self._lost or since >= MAX_STALLED_SETS or steps >= self.max_steps:
+            if not guess < LOST or since >= MAX_STALLED_SETS or steps >= self.max_steps:
                 self._admit(x, mean)
                 d, certificate = self._certify(x, h, mean)
                 failure = self._failure(certificate, since, steps)

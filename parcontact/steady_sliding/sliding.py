@@ -56,7 +56,6 @@ class Point:
     seconds: float
     dissipated: tuple[float, ...]
 
-
     @property
     def error_friction(self) -> float:
         """The relative error of friction; NaN where there is none."""
@@ -84,10 +83,10 @@ class SteadySliding:
     def __init__(self, base: Frame) -> None:
         self.base = base
         self.ledger = base.ledger()
-        heights = base.surface.heights((0.0, 0.0), base.slab.empty(base.dtype))
+        heights = base.surface.heights((0.0, 0.0), base.slab.empty())
         finest, *coarser = nested.levels_of(base.slab, heights)
         self.levels = [Level(base.slab, base.fft, finest.heights)]
-        self.levels += [Level(level.slab, FFT(level.slab, dtype=base.fft.dtype), level.heights) for level in coarser]
+        self.levels += [Level(level.slab, FFT(level.slab), level.heights) for level in coarser]
         self._known = known_of(base, 0.0, True, None)
         self.contact: SteadyContact | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
@@ -233,7 +232,7 @@ class SteadySliding:
             calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
             return contact, operator
 
-        p = self.base.slab.empty(self.base.dtype)
+        p = self.base.slab.empty()
         if start is None:
             nested.descend(self.levels, lambda level, below: solve(level, below)[0].p, p)
         else:
@@ -252,8 +251,8 @@ class SteadySliding:
         kind = self.base.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
         solver = self._solver_for(level, nearer, nearer_inverse, narrow=True)
-        pull = operator.mapped(proximal.pull, self.base.fft.dtype)
-        return Proximal(solver, operator, pull, self.base.dtype), operator
+        pull = operator.mapped(proximal.pull, np.float64)
+        return Proximal(solver, operator, pull), operator
 
     def _solver_for(
         self, level: Level, operator: Convolution, preconditioner: Convolution, narrow: bool
@@ -267,7 +266,6 @@ class SteadySliding:
             base.height / base.units.height,
             tolerance if level is self.levels[0] else max(tolerance, COARSE_TOLERANCE),
             20 * numerics.max_iterations,
-            dtype=base.dtype,
             narrow=narrow,
         )
 

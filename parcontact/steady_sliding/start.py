@@ -52,6 +52,7 @@ def _from_steady_sliding(job: Job, slab: Slab, until: float) -> March:
         measures=point.measures,
         iterations=iterations,
         certificate=point.certificate,
+        errors=point.errors,
         operator_calls=round(point.operator_calls),
         seconds=point.seconds,
     )

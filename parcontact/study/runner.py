@@ -8,8 +8,9 @@ from ..errors import RunError
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import files, marker, stopfile, study_plots
+from ..record import files, marker, stopfile
 from ..record.directory import Directory
+from ..record.pictures import study as study_plots
 from . import outcome, table, verdict
 from .cases import Case, Ladders, about_chosen_steps, ladders, overrides
 from .outcome import Outcome
@@ -138,9 +139,9 @@ class _Study:
 
 
 def _short(case: Case) -> str:
-    """Its settings as they fit into a picture."""
-    steps = "auto" if case.cells_per_step is None else f"{case.cells_per_step:.3g} cells"
-    return f"{case.mesh}, {steps}\n{case.tolerance:g} {case.precision}"
+    """Its settings in the order of the key of a picture."""
+    steps = "auto" if case.cells_per_step is None else f"{case.cells_per_step:.3g}"
+    return f"{case.mesh}, {steps}, {case.tolerance:g}, {case.precision}"
 
 
 def _fingerprint(job: Job) -> str:

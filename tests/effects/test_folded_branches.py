@@ -108,7 +108,7 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     numerics = {"branch_error": 0.0, "tolerance": 1e-7}
     marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
     base = marches[1].scene.frame
-    marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", base.dtype, frozen=[1])
+    marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", frozen=[1])
     timeline = list(base.job.timeline())
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
     wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]

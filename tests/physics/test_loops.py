@@ -39,18 +39,6 @@ def test_begin(offset: int, count: int) -> None:
     assert_allclose(work, effective, rtol=1e-14, atol=1e-14)
 
 
-def test_small_losses_in_single_precision() -> None:
-    """Each of five branches, of which four advance at once, loses its share in the mean over many points to 2e-9, the
-    roundings of 1e5 points: a decay half-way between two numbers of single precision, were it rounded to one of them,
-    would make it wrong by 4e-8."""
-    loss = (1000.5 + np.arange(5)) * 2.0**-24
-    branches = np.random.default_rng(1).uniform(1.0, 2.0, (5, 100, 1000)).astype(np.float32)
-    exact = branches * (1.0 - loss)[:, None, None]
-    still = np.zeros((100, 1000), np.float32)
-    loops.begin(branches, 1.0 - loss, np.zeros(5), still.copy(), np.zeros(5), 0.0, still, still, 0)
-    assert np.abs(np.mean(branches - exact, axis=(1, 2))).max() < 2e-9
-
-
 @pytest.mark.parametrize("offset", OFFSETS)
 def test_commit(offset: int) -> None:
     displacement, work, u, heights = maps(4)

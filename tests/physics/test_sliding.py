@@ -120,9 +120,3 @@ def test_the_same_part_of_a_cell_costs_nothing(comm: MPI.Intracomm) -> None:
         assert moved.offset == cells % NX
     assert tally.since(before) == {}
     assert_array_equal(other.at((positions[-1], 0.0)).base, first.base)
-
-
-def test_single_precision(comm: MPI.Intracomm) -> None:
-    surface = surface_on(comm)
-    for path in (WholeCells(surface, np.float32), AnyFraction(surface, np.float32)):
-        assert path.at((0.0, 0.0)).base.dtype == np.float32

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from parcontact.job import Stage
+from parcontact.job import Job, Stage
 from parcontact.record.slide import describe, mean_over_end, measure, ripple
 
 REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
@@ -17,6 +17,13 @@ BACK = {**CLIMB, "velocity": -2.0}
 
 def stages(*data: dict[str, Any]) -> list[Stage]:
     return [Stage.model_validate(one) for one in data]
+
+
+def said(history: list[dict[str, Any]], table: dict[str, list[float]], cell: float = 0.1, **more: Any) -> list[str]:
+    """The sentences about the slide of a job with such a history, on cells of so many metres."""
+    data = {"grid": {"points": 8, "size": 8 * cell}, "surface": {"shape": "wave", "amplitude": 1e-9, "waves": [1, 1]}}
+    material = {"model": "elastic", "shear_modulus": 1e6}
+    return list(describe(Job.model_validate({**data, "material": material, "history": history, **more}), table))
 
 
 def rows(*rows: tuple[float, float, float]) -> dict[str, list[float]]:
@@ -74,26 +81,26 @@ def test_sentences_about_a_slide() -> None:
     """Each number with what it is; errors as far as they are known, the largest of the slide alone."""
     table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
     table["error_friction"] = [float("nan"), 0.5, 0.02, 0.03, float("nan"), 0.01]
-    assert list(describe(stages(REST, CLIMB, SETTLE), table, 0.1)) == [
+    assert said([REST, CLIMB, SETTLE], table) == [
         "mu_max, the highest friction of the slide, is 4 +- 0.12, after 1 m of it",
         "mu_dyn, the mean friction over the last three quarters of its 4 m, is 2.33333",
         "the mean contact area over the same is 0.233333",
         "largest errors of the steps of the slide: friction 3 %",
     ]
-    assert not list(describe(stages(REST), table, 0.1))
+    assert not said([REST], table)
 
 
 def test_sentences_about_a_slide_that_others_follow() -> None:
     """As long as the last slide has not begun; then the sentences are about that one."""
     table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2))
-    history = stages(REST, CLIMB, REST, {**CLIMB, "velocity": 3.0})
-    told = list(describe(history, table, 0.1))
+    history = [REST, CLIMB, REST, {**CLIMB, "velocity": 3.0}]
+    told = said(history, table)
     assert told[0] == "the last slide has not begun; what follows is of the one before it, which ends with history.1"
-    assert told[1:] == list(describe(history[:2], table, 0.1))
-    assert measure(history, table) is None
-    assert len(list(describe(stages(REST, CLIMB, SETTLE), rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)), 0.1))) == 3
+    assert told[1:] == said(history[:2], table)
+    assert measure(stages(*history), table) is None
+    assert len(said([REST, CLIMB, SETTLE], rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)))) == 3
     begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
-    assert next(describe(history, begun, 0.1)) == ("mu_max, the highest friction of the slide, is 7, after 1.5 m of it")
+    assert said(history, begun)[0] == "mu_max, the highest friction of the slide, is 7, after 1.5 m of it"
 
 
 def test_mu_max_on_a_ripple() -> None:
@@ -104,5 +111,18 @@ def test_mu_max_on_a_ripple() -> None:
     assert ripple(x, friction, 16, 1.0) == pytest.approx(1.0, rel=1e-12)
     assert ripple(x[::8], friction[::8], 2, 1.0) == 0.0
     table = rows(*zip(x / 2.0, x, friction, strict=True))
-    told = next(iter(describe(stages({**CLIMB, "duration": 2.0}), table, 1.0)))
+    told = said([{**CLIMB, "duration": 2.0}], table, 1.0)[0]
     assert "is 6 +- 1 (1 of it a ripple with the period of a cell), after" in told
+
+
+def test_a_steady_start_that_does_not_last() -> None:
+    """The slide that goes on from it has the same friction; a difference beyond the errors of both is told, one within
+    them is not, nor one to a slide under another load."""
+    start: Any = {"initial": {"state": "steady", "velocity": 2.0, "pressure": 1.0}}
+    table = rows((0, 0, 3), (0.25, 0.5, 4), (0.5, 1, 4))
+    table["error_friction"] = [0.1, 0.1, 0.1]  # of 3, and of the slide's 3.92
+    text = "friction left the 3 of the steady start by 0.92, more than the errors of both, 0.69: "
+    assert said([CLIMB], table, **start)[-1].startswith(text)
+    assert "left" not in said([{**CLIMB, "pressure": 2.0}], table, **start)[-1]
+    table["error_friction"] = [0.2, 0.2, 0.2]
+    assert "left" not in said([CLIMB], table, **start)[-1]

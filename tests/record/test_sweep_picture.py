@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawing import ELASTIC, LOADS, WAVE, outside, touching
+from matplotlib.figure import Figure
 
+from parcontact import job
 from parcontact.record.pictures import sweep
 from parcontact.record.plots import Options, plot
 
+SIZES = (1e-3, 2e-3, 3e-3)
 HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "state", "mu_max", "mu_dyn", "contact_area")
 
 
@@ -59,3 +63,37 @@ def test_the_picture(tmp_path: Path) -> None:
     (picture,) = plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))], Options())
     assert picture == tmp_path / "picture.png"
     assert picture.stat().st_size > 10_000
+
+
+def test_the_title_is_that_of_the_job(tmp_path: Path, drawn: list[Figure]) -> None:
+    """As the first case has it; without a case that of the directory."""
+    saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))
+    plot([tmp_path], Options())
+    (tmp_path / "cases" / "000").mkdir(parents=True)
+    (tmp_path / "job.yaml").write_text(f"title: A road at several speeds\n{WAVE}{ELASTIC}{LOADS}")
+    (tmp_path / "cases" / "000" / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    plot([tmp_path], Options())
+    assert [figure.get_suptitle() for figure in drawn] == [tmp_path.name, "A road at several speeds"]
+
+
+def test_dots_of_cases_have_a_key(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Once: those of every line look alike. None where each case is a point of the line."""
+    plot([saved(tmp_path, case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(2.0, 1, 7.0))], Options())
+    plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 7.0))], Options())
+    legends = [figure.axes[0].get_legend() for figure in drawn]
+    names = [[text.get_text() for text in legend.get_texts()] for legend in legends if legend is not None]
+    assert names == [["highest", "each case", "theory", "dynamic"], ["highest", "theory", "dynamic"]]
+    assert not touching(drawn[0])
+
+
+def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Three values of a second key, means, cases and theories: thirteen names on the page, and none over a line."""
+    rows = [case(v, seed, v * seed + 1e3 * size, size) for v in (1.0, 2.0) for seed in (1, 2) for size in SIZES]
+    plot([saved(tmp_path, *rows)], Options())
+    (figure,) = drawn
+    assert not touching(figure)
+    assert not outside(figure)
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        assert legend is not None
+        assert legend.get_window_extent().x0 >= axes.get_window_extent().x1

@@ -4,16 +4,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib.image
+import numpy as np
 import pytest
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
+from parcontact.record.pictures import compound as pictures
+from parcontact.rubber import compound
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, given
 
 from . import measured
+from .measured import Array
 
 if TYPE_CHECKING:
     from conftest import RunParcontact
+    from matplotlib.figure import Figure
 
 JOB = """
 grid: {points: 32, size: 1.0e-3}
@@ -48,6 +53,42 @@ def test_a_table_becomes_a_material(tmp_path: Path, run_parcontact: "RunParconta
     assert refused.returncode == 2
     assert refused.stderr.startswith("parcontact: mine.yaml is there and was not written by parcontact fit")
     assert (tmp_path / "mine.yaml").read_text() == "title: mine\n"
+
+
+def moduli(tmp_path: Path, head: str, given: tuple[int, int], drawn: "list[Figure]") -> tuple[str, dict[str, Array]]:
+    """What the first panel of the picture of a fit shows, for a table with two columns: storage [MPa], loss [MPa] and
+    tan delta of one sweep are 0, 1 and 2."""
+    g = measured.complex_modulus(2 * np.pi * measured.FREQUENCIES)
+    columns = (1e-6 * g.real, 1e-6 * g.imag, g.imag / g.real)
+    rows = zip(measured.FREQUENCIES, columns[given[0]], columns[given[1]], strict=True)
+    (tmp_path / "rubber.csv").write_text("\n".join([head, *(f"{f:.9g} {a:.9g} {b:.9g}" for f, a, b in rows)]) + "\n")
+    made = compound.fitted(tmp_path / "rubber.csv", 0.25, None, "wlf", 0.05)
+    with (tmp_path / "rubber.png").open("wb") as file:
+        pictures.draw(made, file)
+    axes = drawn[-1].axes[0]
+    return axes.get_ylabel(), {str(one.get_label()): np.asarray(one.get_ydata()) for one in axes.get_lines()}
+
+
+@pytest.mark.parametrize(
+    ("head", "given", "label", "names"),
+    [
+        ("f[Hz] E'[MPa] E''[MPa]", (0, 1), "Young's modulus [Pa]", ["E' measured", "E'' measured"]),
+        ("f[Hz] G'[MPa] G''[MPa]", (0, 1), "shear modulus [Pa]", ["G' measured", "G'' measured"]),
+        ("f[Hz] E'[MPa] tan_del[-]", (0, 2), "Young's modulus [Pa]", ["E' measured", "E'' = E' tan δ measured"]),
+        ("f[Hz] G''[MPa] tan_del[-]", (1, 2), "shear modulus [Pa]", ["G' = G'' / tan δ measured", "G'' measured"]),
+    ],
+)
+def test_the_picture_shows_what_was_measured(
+    tmp_path: Path, drawn: "list[Figure]", head: str, given: tuple[int, int], label: str, names: list[str]
+) -> None:
+    """Moduli of the table itself, whatever Poisson's ratio divides Young's by, and a fit of 5 % beside them."""
+    shown, lines = moduli(tmp_path, head, given, drawn)
+    assert shown == label
+    truth = measured.complex_modulus(2 * np.pi * measured.FREQUENCIES)
+    for name, values in zip(names, (truth.real, truth.imag), strict=True):
+        np.testing.assert_allclose(lines[name], values, rtol=1e-6)
+        fitted = lines[f"{name[:3].strip()} fitted"]
+        assert np.median(fitted) == pytest.approx(np.median(values), rel=0.1)
 
 
 def test_laws_given(tmp_path: Path) -> None:

@@ -28,17 +28,16 @@ def solver(
     kernel: str = "spectral",
     tolerance: float = 1e-6,
     max_iterations: int = 500,
-    dtype: Any = np.float64,
     poisson: float = 0.5,
 ) -> ContactSolver:
     """A solver for maps of the shape of `heights`, on one rank."""
     ny, nx = heights.shape
     slab = Slab(MPI.COMM_SELF, nx, ny)
-    fft = FFT(slab, dtype=dtype)
+    fft = FFT(slab)
     half_space = HalfSpace(size, poisson, "love" if kernel == "love" else "spectral", boundary == "free")
     height = float(np.ptp(heights)) or size[0] / nx
     operator, inverse = half_space.operator(fft), half_space.inverse(fft)
-    return ContactSolver(slab, operator, inverse, height, tolerance, max_iterations, dtype)
+    return ContactSolver(slab, operator, inverse, height, tolerance, max_iterations)
 
 
 def rough(points: int, seed: int = 1) -> Map:

@@ -47,16 +47,6 @@ def test_cost_of_an_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "map bytes" not in spent
 
 
-def test_single_precision() -> None:
-    """To the default tolerance; the pressures then agree to some ten times it."""
-    h = rough(128)
-    double = solve(h, 0.4, tolerance=1e-4)
-    single = solve(h.astype(np.float32), 0.4, tolerance=1e-4, dtype=np.float32)
-    assert abs(single.iterations - double.iterations) <= 2
-    assert_allclose(single.p, double.p, atol=1e-3 * double.p.max())
-    assert_allclose(single.p.mean(), 0.4, rtol=1e-6)
-
-
 def test_preconditioner_in_single_precision() -> None:
     """It need not be exact: as many iterations, the same pressures in double precision."""
     h = rough(128)

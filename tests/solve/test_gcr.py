@@ -55,7 +55,7 @@ class Problem:
 
     def improve(self, limit: int, reduction: float = 1e-13, preconditioner: Map | None = None) -> int:
         inverse = np.eye(NX * NY) if preconditioner is None else preconditioner
-        directions = Directions(self.slab, Dense(self.A), Dense(inverse), 13, np.float64, np.float64)
+        directions = Directions(self.slab, Dense(self.A), Dense(inverse), 13, np.float64)
         return directions.improve(self.x, self.u, self.h, self.working, limit, reduction)
 
     def residual(self) -> float:

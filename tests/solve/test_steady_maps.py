@@ -32,7 +32,7 @@ def test_maps_are_made_when_they_are_needed(
     operator = HalfSpace(SIZE).operator(FFT(slab))
     before = slab.tally["map bytes"]
     solver = SteadySolver(slab, operator, Identity(), 1.0, tolerance, 1000)
-    numbers = NX, NY, np.float64, tolerance, comm.size, comm.rank
+    numbers = NX, NY, tolerance, comm.size, comm.rank
     few, most = (SteadySolver.footprint(*numbers, sets) for sets in (False, True))
 
     def held() -> int:

@@ -133,11 +133,11 @@ def test_units_of_powers_of_two_change_no_digit(tmp_path: Path) -> None:
 # -- the datum of heights ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("precision", ["double", "mixed", "single"])
+@pytest.mark.parametrize("precision", ["double", "mixed"])
 @pytest.mark.parametrize("offset", [1.0, -1.0])
 def test_a_constant_of_a_million_times_the_roughness(precision: str, offset: float, tmp_path: Path) -> None:
-    """In the file itself: the same pressures as without, to 1e-9 of the highest in double precision and to 1e-3 in
-    single precision, whose own 7 digits could not even hold both."""
+    """In the file itself: the same pressures as without, to 1e-9 of the highest in double precision, to 1e-3
+    with a preconditioner whose 7 digits could not even hold both."""
     numerics: Json = {"precision": precision, "tolerance": 1e-10 if precision == "double" else 1e-4}
     heights = noise(2.0**-20)
     constant = offset * 1e6 * 2.0**-20

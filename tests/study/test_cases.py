@@ -37,7 +37,7 @@ def test_cases(path: Path) -> None:
     _, found = refined(
         path,
         "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler], "
-        "tolerance: [1e-3, 5e-3], precision: [single, double], kernel: [love]}",
+        "tolerance: [1e-3, 5e-3], precision: [mixed, double], kernel: [love]}",
     )
     cases = found.cases()
     assert len(cases) == len(set(cases)) == 3 * 2 * 2 + 2 * 1 + 3  # of the mesh alone, half a cell on 32 points is new
@@ -48,7 +48,7 @@ def test_cases(path: Path) -> None:
     others = [case for case in cases if (case.tolerance, case.precision, case.kernel) != (5e-3, "double", "spectral")]
     assert {(case.tolerance, case.precision, case.kernel) for case in others} == {
         (1e-3, "double", "spectral"),
-        (5e-3, "single", "spectral"),
+        (5e-3, "mixed", "spectral"),
         (5e-3, "double", "love"),
     }
     assert {(case.mesh, case.cells_per_step, case.integrator) for case in others} == {(64, 2.0, "exponential")}
@@ -60,11 +60,11 @@ def test_cases(path: Path) -> None:
 def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, factor: float) -> None:
     """Twice as fine in time: each stage has twice the steps; growing ones are rounded up."""
     job, found = refined(path, "{mesh: [64, 128]}")
-    case = Case(mesh, cells, "backward-euler", 1e-3, "single", "love")
+    case = Case(mesh, cells, "backward-euler", 1e-3, "mixed", "love")
     changed = load(path, overrides(job, found.own, case))
     assert changed.grid.points == (mesh, mesh // 2)
     assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 1e-3)
-    assert (changed.numerics.precision, changed.numerics.kernel) == ("single", "love")
+    assert (changed.numerics.precision, changed.numerics.kernel) == ("mixed", "love")
     before, after = ([span.count for span in one.timeline().spans] for one in (job, changed))
     assert after[1:] == [round(count / factor) for count in before[1:]]
     assert abs(after[0] - before[0] / factor) <= 2

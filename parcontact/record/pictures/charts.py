@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
@@ -17,9 +18,12 @@ SPIKE_SHARE = 0.02  # of the abscissa, at its beginning: what stands out there o
 SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
 AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
+FEW_NAMES = 2  # of lines, for which a key finds room among them
+HEADROOM = 1.08  # of a panel over its highest point
 FRACTION = "contact area /\nnominal area"
 MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
+HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white")]  # of words that lines may cross
 LEVELS = 3  # of names above each other, before they are turned
 
 
@@ -46,7 +50,7 @@ class Axis:
 class Chart:
     """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
     are names, starts and ends over `x`; `peak`: whether the highest point is told, and so stays in the picture;
-    `headroom`: the height of the panel over that of its highest point."""
+    `beside`: whether the key is beside the panel, which then needs the whole width."""
 
     key: str
     x: Axis
@@ -59,10 +63,15 @@ class Chart:
     named: bool = False
     legend_title: str = ""
     log_x: bool = False
-    headroom: float = 1.08
+    beside: bool = False
 
     def __call__(self, axes: Axes) -> None:
         draw(self, axes)
+
+
+def with_key_beside(chart: Chart) -> Chart:
+    """A chart that stands alone: the key of many lines is beside them, where it hides none."""
+    return replace(chart, beside=sum(bool(one.name) for one in chart.series) > FEW_NAMES)
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
@@ -86,7 +95,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     _scale(axes, "x", xs, log_x)
     _scale(axes, "y", ys, log_y)
     if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        axes.set_ylim(0.0, chart.headroom * highest or 1.0)
+        axes.set_ylim(0.0, HEADROOM * highest or 1.0)
         if not highest:
             axes.set_yticks([0.0])  # a scale would be made up
     if top < math.inf:
@@ -98,7 +107,12 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     width = units.size_of(x_unit, chart.x.unit) if x_unit else 1.0
     _mark(axes, [(name, a / width, b / width) for name, a, b in chart.stages], chart.named)
     if any(one.name for one in chart.series):
-        axes.legend(title=chart.legend_title or None, title_fontsize=9, ncols=1 + (len(chart.series) > 4))
+        place: dict[str, Any] = {"ncols": 1 + (len(chart.series) > 4)}
+        legend = axes.legend(
+            title=chart.legend_title or None, title_fontsize=9, **(style.BESIDE if chart.beside else place)
+        )
+        for text in legend.get_texts():
+            text.set_path_effects(HALO)
 
 
 def _draw_errors(axes: Axes, x: Array, y: Array, share: Array, color: str) -> None:
@@ -155,6 +169,7 @@ def _tell_peak(axes: Axes, x: Array, y: Array, unit: str) -> None:
         below, aside = y[peak] < 0.0, {"left": 6, "center": 0, "right": -6}[side]
         told = f"{y[peak]:.3g} at {x[peak]:.3g} {unit}".rstrip()
         look: dict[str, Any] = {"ha": side, "va": "top" if below else "bottom", "color": style.RED, "fontsize": 9}
+        look["path_effects"] = HALO
         axes.annotate(told, (x[peak], y[peak]), (aside, -5 if below else 5), textcoords="offset points", **look)
         low, high = axes.get_ylim()
         room = 0.15 * (high - low)
@@ -167,7 +182,7 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
         axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
     if not named or len(stages) < 2:
         return
-    width = 72.0 * style.WIDTH / style.COLUMNS * AXES_SHARE
+    width = _panel_width(axes) * AXES_SHARE
     middles = [width * share for share in _shares(axes, stages)]
     levels = _levels([(x, _width(name)) for (name, *_), x in zip(stages, middles, strict=True)])
     turned = max(levels) >= LEVELS
@@ -183,6 +198,12 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
             "rotation": 90 if turned else 0,
         }
         axes.annotate(style.plain(name, MAX_NAME), (x / width, 1.0), (0, 2 + LINE * level), **place, **look)
+
+
+def _panel_width(axes: Axes) -> float:
+    """Of the panel of axes, with what is beside them [points]."""
+    place = axes.get_subplotspec()
+    return 72.0 * axes.figure.bbox.width / axes.figure.dpi / (place.get_gridspec().ncols if place else 1)
 
 
 def _width(name: str) -> float:

@@ -55,16 +55,21 @@ def _fit(compound: Compound, at: np.ndarray) -> list[np.ndarray]:
 
 
 def _moduli(axes: Axes, compound: Compound) -> None:
+    """The moduli as the table has them, Young's or of shear, and the fit beside them."""
+    measured = compound.measured
+    letter, kind = ("E", "Young's") if measured.tension else ("G", "shear")
+    size = 2.0 * (1.0 + compound.poisson) if measured.tension else 1.0
     all_at = np.concatenate([at for _, at in _reduced(compound)])
     line = np.geomspace(all_at.min(), all_at.max(), POINTS)
-    names = ("G'", "G''") if compound.measured.kind == "frequency" else ("G(t)",)
+    names = (f"{letter}'", f"{letter}''") if measured.kind == "frequency" else (f"{letter}(t)",)
+    from_tangent = {"stor": (f" = {names[-1]} / tan δ", ""), "loss": ("", f" = {names[0]} tan δ")}
+    notes = from_tangent.get(measured.derived, ("", ""))
     for k, (name, color, fitted) in enumerate(zip(names, (STORAGE, LOSS), _fit(compound, line), strict=False)):
         for number, (each, at) in enumerate(_reduced(compound)):
-            values = (each.storage, each.loss)[k]
-            label = f"{name} measured" if number == 0 else None
-            axes.plot(at, values, "os"[k], ms=3, mfc="none", color=color, label=label)
-        axes.plot(line, fitted, color=color, label=f"{name} fitted")
-    axes.set(xscale="log", yscale="log", ylabel="shear modulus [Pa]")
+            label = f"{name}{notes[k]} measured" if number == 0 else None
+            axes.plot(at, size * (each.storage, each.loss)[k], "os"[k], ms=3, mfc="none", color=color, label=label)
+        axes.plot(line, size * fitted, color=color, label=f"{name} fitted")
+    axes.set(xscale="log", yscale="log", ylabel=f"{kind} modulus [Pa]")
 
 
 def _misfit(axes: Axes, compound: Compound) -> None:
@@ -79,7 +84,7 @@ def _misfit(axes: Axes, compound: Compound) -> None:
 
 def _spectrum(axes: Axes, compound: Compound) -> None:
     axes.plot(compound.series.times, compound.series.moduli, "o", ms=4, color="black")
-    axes.set(xscale="log", yscale="log", xlabel="relaxation time [s]", ylabel="modulus of the branch [Pa]")
+    axes.set(xscale="log", yscale="log", xlabel="relaxation time [s]", ylabel="shear modulus of the branch [Pa]")
 
 
 def _shift(axes: Axes, compound: Compound) -> None:

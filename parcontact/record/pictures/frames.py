@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from ...parallel.slab import Array
@@ -22,7 +21,6 @@ class Frames:
         self.file, self.name, look = file, name, maps.LOOKS[name]
         ranges = [maps.colour_range(self._map(index)) for index in chosen]
         low, high = min(lowest for lowest, _ in ranges), max(highest for _, highest in ranges)
-        high = high if high > low else low + 1.0  # of nothing, in some unit
         label, _ = units.scaled(look.unit, np.array([low, high]))
         self.figure = Figure(figsize=size, layout="constrained")
         self.axes, self.scale = self.figure.subplots(), units.size_of(label, look.unit) if label else 1.0
@@ -55,9 +53,9 @@ class _Image:
         axes.set_facecolor(look.blank)
         axes.grid(False)
         empty = np.zeros((y.size - 1, x.size - 1))
-        self.mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=Normalize(*limits))
+        self.mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=maps.norm(limits))
         axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", aspect="equal")
-        axes.figure.colorbar(self.mesh, ax=axes, label=label)
+        maps.add_colorbar(axes, self.mesh, label, limits)
 
     def show(self, values: Array) -> None:
         self.mesh.set_array(values)
@@ -74,7 +72,10 @@ class _Line:
         length, (along,) = units.scaled("m", x if self.lies else y)
         (self.line,) = axes.plot(along, np.zeros_like(along), color=style.BLUE)
         axes.set(xlabel=f"{'x' if self.lies else 'y'} [{length}]", ylabel=label)
-        axes.set_ylim(limits[0], limits[0] + 1.05 * (limits[1] - limits[0]))
+        if limits[1] > limits[0]:
+            axes.set_ylim(limits[0], limits[0] + 1.05 * (limits[1] - limits[0]))
+        else:  # a scale would be made up
+            axes.set_yticks([limits[0]] if limits[1] == limits[0] else [0.0])
 
     def show(self, values: Array) -> None:
         self.line.set_ydata(np.nan_to_num(values[0] if self.lies else values[:, 0]))

@@ -25,16 +25,14 @@ class Curve:
     pressure: Array
 
 
-def _chosen(run: Run, fields: Fields) -> list[tuple[int, str]]:
-    """Some of the saved instants, evenly, and what tells them apart."""
-    found = []
-    for index in sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)}):
-        _, unit, load = run.load
-        time = fields.file["t"][index]
-        at = np.flatnonzero(run.column("step") == fields.steps[index])
-        value, unit = (time, "s") if run.lasts else (float(load[at[0]]) if at.size else np.nan, unit)
-        found.append((index, units.text(value, unit)))
-    return found
+def _chosen(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], str]:
+    """Some of the saved instants, evenly, and what tells them apart; and the load of all if it is one, for a title."""
+    indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
+    steps = [int(fields.steps[index]) for index in indices]
+    loads = {run.pressed(step) for step in steps}
+    if run.lasts and len(loads) == 1:
+        return [(index, units.text(float(fields.times[index]), "s")) for index in indices], f", {loads.pop()}"
+    return [(k, run.instant(step, float(fields.times[k]))) for k, step in zip(indices, steps, strict=True)], ""
 
 
 def _draw_curves(axes: Axes, curves: Sequence[Curve]) -> tuple[float, float]:
@@ -52,16 +50,18 @@ def _draw_curves(axes: Axes, curves: Sequence[Curve]) -> tuple[float, float]:
 def strips(run: Run, fields: Fields) -> Panel:
     """Pressures along the long side of a narrow map."""
     lies = fields.x.size > fields.y.size
+    chosen, load = _chosen(run, fields)
     curves = []
-    for index, name in _chosen(run, fields):
+    for index, name in chosen:
         field = fields.file["pressure"][index]
         curves.append(Curve(name, fields.x if lies else fields.y, field[0] if lies else field[:, 0]))
 
     def draw(axes: Axes) -> None:
         _draw_curves(axes, curves)
         axes.set_xlabel(("x " if lies else "y ") + axes.get_xlabel())
-        axes.set_title("pressure at some of the saved instants")
-        _legend_beside(axes)
+        some = "some of the " if len(curves) < len(fields.shown) else "the "
+        axes.set_title(f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads")
+        axes.legend(**style.BESIDE)
 
     return draw
 
@@ -70,8 +70,9 @@ def profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
     """Pressures along a line through the axis, seen from the axis, beside Hertz's under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
+    chosen, load = _chosen(run, fields)
     curves = []
-    for index, name in _chosen(run, fields):
+    for index, name in chosen:
         moved = run.moved(int(fields.steps[index]))
         x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
         line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
@@ -83,15 +84,15 @@ def profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
         length, unit = _draw_curves(axes, curves)
         if isinstance(shape, Sphere) and force > 0.0:
             r = np.linspace(-reach, reach, 401)
-            for name, modulus, style in _moduli(run.job):
+            for name, modulus, dashes in _moduli(run.job):
                 pressure = hertz.pressure(np.abs(r), force, shape.radius, modulus, run.job.material.poisson)
-                axes.plot(r / length, pressure / unit, "k" + style, lw=1.0, label=name)
+                axes.plot(r / length, pressure / unit, "k" + dashes, lw=1.0, label=name)
         axes.set_xlabel(f"{'y' if across else 'x'} from the axis {axes.get_xlabel()}")
-        axes.set_title("pressure on a line through the axis")
+        axes.set_title(f"pressure on a line through the axis{load}")
         if reach > 0.0:
             axes.set_xlim(-reach / length, reach / length)
         axes.set_ylim(bottom=0.0)
-        _legend_beside(axes)
+        axes.legend(**style.BESIDE)
 
     return draw
 
@@ -103,7 +104,3 @@ def _moduli(job: Job) -> list[tuple[str, float, str]]:
         return [("Hertz", material.shear_modulus, "--")]
     ends = [("Hertz, G(0)", material.instant_modulus, "--"), ("Hertz, G(∞)", material.long_modulus, ":")]
     return [end for end in ends if end[1] > 0.0]
-
-
-def _legend_beside(axes: Axes) -> None:
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, handlelength=1.2)

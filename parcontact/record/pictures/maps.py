@@ -1,11 +1,12 @@
 """Maps of the last saved instant."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 
@@ -60,14 +61,14 @@ def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
     rounds = [shape for shape in run.job.surface if isinstance(shape, Sphere | Cylinder)]
     if pressure is not None and len(run.job.surface) == 1 and rounds:
         yield lines.profiles(run, fields, rounds[0])
-    time = float(fields.times[fields.shown[-1]])
-    when = f" at {units.text(time, 's', 4)}" if run.lasts else ""
+    last = fields.shown[-1]
+    instant = run.instant(int(fields.steps[last]), float(fields.times[last]))
     window = _window(pressure)
     beside = displacement if gap is None else None  # one of both says enough
     found = {"pressure": pressure, "gap": gap, "displacement": beside, "height": height}
     for name, values in found.items():
         if values is not None:
-            yield _map(fields, shown(name, values, pressure), name, when, window)
+            yield _map(fields, shown(name, values, pressure), name, instant, window)
 
 
 def shown(name: str, values: Array, pressure: Array | None) -> Array:
@@ -98,12 +99,12 @@ def _map(
     fields: Fields,
     values: Array,
     name: str,
-    when: str,
+    instant: str,
     window: tuple[slice, slice],
 ) -> Panel:
     x, y, look = fields.x, fields.y, LOOKS[name]
     label, (scaled,) = units.scaled(look.unit, values)
-    title = f"{name}{when}" + (f"\n({look.note})" if look.note else "")
+    title = name + (f" ({look.note})" if look.note else "") + f"\n{instant}"
     length, (right, top) = units.scaled("m", edges(x), edges(y))
 
     def draw(axes: Axes) -> None:
@@ -111,16 +112,14 @@ def _map(
         axes.grid(False)
         part = scaled[window]
         columns, lines = slice(window[1].start, _edge(window[1])), slice(window[0].start, _edge(window[0]))
-        lowest, highest = colour_range(part)
-        colored = Normalize(lowest, highest if highest > lowest else lowest + 1.0)
-        mesh = axes.pcolormesh(right[columns], top[lines], part, cmap=look.colors, norm=colored, rasterized=True)
+        limits = colour_range(part)
+        cells = right[columns], top[lines], part
+        mesh = axes.pcolormesh(*cells, cmap=look.colors, norm=norm(limits), rasterized=True)
         axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=title, aspect="equal")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
-        if not np.isfinite(part).any():  # a gap where all is contact: there are no numbers to give colours
-            return
-        beyond = "max" if np.nanmax(part, initial=-np.inf) > highest else "neither"
-        axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{label}]", extend=beyond, shrink=0.9)
+        beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
+        add_colorbar(axes, mesh, f"{name} [{label}]", limits, extend=beyond, shrink=0.9)
 
     return draw
 
@@ -135,9 +134,27 @@ def _edge(part: slice) -> int | None:
 
 
 def colour_range(values: Array) -> tuple[float, float]:
-    """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others."""
+    """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others.
+
+    Where no point has a value the range is empty, from inf to -inf.
+    """
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return 0.0, 0.0
+        return np.inf, -np.inf
     most, highest = float(np.percentile(finite, 99.5)), float(finite.max())
     return min(float(finite.min()), 0.0), highest if highest < 1.4 * most else most
+
+
+def norm(limits: tuple[float, float]) -> Normalize:
+    """The colours of a range, which may be one number or empty."""
+    low, high = limits
+    return Normalize(low, high) if high > low else Normalize(high, high + 1.0) if high == low else Normalize(0.0, 1.0)
+
+
+def add_colorbar(axes: Axes, mesh: QuadMesh, label: str, limits: tuple[float, float], **look: Any) -> None:
+    """What colours mean: of one number that alone, of none nothing, for a scale would be made up."""
+    low, high = limits
+    if low <= high:
+        bar = axes.figure.colorbar(mesh, ax=axes, label=label, **look)
+        if low == high:
+            bar.set_ticks([low])

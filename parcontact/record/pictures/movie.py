@@ -10,9 +10,8 @@ from PIL import Image
 
 from ...errors import InputError
 from .. import files, hdf5
-from . import units
 from .frames import Frames
-from .run import Fields
+from .run import Fields, Run, frame_label
 
 FRAMES = 200  # at most: instants in between are left out
 SECONDS = 8.0  # for which it plays, unless its frames are too few
@@ -41,19 +40,18 @@ def make(directory: Path, name: str, target: Path) -> Path:
             if name not in there or not fields.saved:
                 raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
             with files.replaced(target, files.is_marked) as movie:
-                _make(fields, name, movie)
+                _make(Run(directory), fields, name, movie)
     except hdf5.FAILURES as error:
         raise InputError(f"no movie from {path}: {hdf5.reason(error)}") from error
     return target
 
 
-def _make(fields: Fields, name: str, movie: BinaryIO) -> None:
+def _make(run: Run, fields: Fields, name: str, movie: BinaryIO) -> None:
     count = min(len(fields.saved), FRAMES)
     chosen = [fields.saved[int(k)] for k in np.linspace(0, len(fields.saved) - 1, count)]
     frames = Frames(fields.file, name, chosen)
     writer = Writer(fps=min(max(round(count / SECONDS), SLOWEST), FASTEST))
     with writer.saving(frames.figure, movie.name, dpi=110):
         for index in chosen:
-            time = units.text(float(fields.file["t"][index]), "s")
-            frames.show(index, f"{name} at {time}, step {fields.steps[index]}")
+            frames.show(index, f"{name}, {frame_label(run, fields, index)}")
             writer.grab_frame()

@@ -14,6 +14,7 @@ from ...job.timeline import Timeline
 from ...parallel.slab import Array
 from .. import measures
 from ..resolved import RESOLVED, STEADY_RESOLVED, shown_job
+from . import units
 
 Panel = Callable[[Axes], None]
 
@@ -80,9 +81,26 @@ class Run:
     @property
     def stages(self) -> NDArray[np.int64]:
         """The stage of every row, -1 where the job knows of none; the initial state belongs to the first."""
-        steps = self.column("step").astype(int).tolist()
-        known = len(self.timeline)
-        return np.array([self.timeline.span(max(n, 1)).index if max(n, 1) <= known else -1 for n in steps])
+        return np.array([self._stage(n) for n in self.column("step").astype(int).tolist()])
+
+    def _stage(self, step: int) -> int:
+        step = max(step, 1)
+        return self.timeline.span(step).index if step <= len(self.timeline) else -1
+
+    def instant(self, step: int, time: float) -> str:
+        """When a map was saved and what pressed then: `2.1 ms, 100 kPa`, `150 mN`, `2.1 ms, approach 20 µm`."""
+        when = units.text(time, "s", 4) if self.lasts else ""
+        return ", ".join(filter(None, (when, self.pressed(step))))
+
+    def pressed(self, step: int) -> str:
+        """What presses after a step, as its stage prescribes it; '' where no row tells."""
+        rows, stage = np.flatnonzero(self._columns["step"] == step), self._stage(step)
+        if not rows.size:
+            return ""
+        if stage >= 0 and self.job.history[stage].control == "approach":
+            return f"approach {units.text(self._columns['approach'][rows[-1]], 'm')}"
+        pressure = self._columns["pressure"][rows[-1]]
+        return units.text(pressure * self.area, "N") if self.free else units.text(pressure, "Pa")
 
     def moved(self, step: int) -> tuple[float, float]:
         """Where the surface is after a step [m]; where it began if the job does not know of that step."""
@@ -134,6 +152,12 @@ class Fields:
         if not times[0] <= float(at) <= times[-1]:
             raise InputError(f"--at {at}: maps are saved from {times[0]:g} to {times[-1]:g} s")
         return self.saved[int(np.argmin(np.abs(times - float(at))))]
+
+
+def frame_label(run: Run, fields: Fields, index: int) -> str:
+    """What tells a saved map from the others of a run."""
+    step = int(fields.steps[index])
+    return f"{run.instant(step, float(fields.times[index]))} (step {step})".lstrip()
 
 
 def table(path: Path, names: Sequence[str]) -> dict[str, Array]:

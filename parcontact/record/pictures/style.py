@@ -37,6 +37,14 @@ RC: dict[Any, Any] = {
 }
 
 
+BESIDE: dict[str, Any] = {  # where the legend of a panel is that leaves it no room
+    "loc": "upper left",
+    "bbox_to_anchor": (1.0, 1.0),
+    "borderaxespad": 0.0,
+    "handlelength": 1.2,
+}
+
+
 @contextmanager
 def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
     """Pictures look as these settings say, and otherwise as Matplotlib's own: a matplotlibrc of others has no say."""

@@ -15,14 +15,13 @@ from .. import sweep_table
 from ..resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..sweep_table import SEED
 from . import style, units
-from .charts import FRACTION, Axis, Chart, Series
+from .charts import FRACTION, Axis, Chart, Series, with_key_beside
 
 TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "force": "N", "size": "m", "distance": "m", "duration": "s"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "shear_modulus": "Pa"}
 MAX_LINES = 3  # of a second key
 MAX_COLORS = len(style.COLORS)
-FEW_NAMES, PER_NAME = 2, 0.12  # lines that a legend finds room for; of the height of a panel that each of more needs
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 SHOWN = (("friction", "friction coefficient", ("mu_max", "mu_dyn")), ("area", FRACTION, ("contact_area",)))
 LABELS = {"mu_max": "highest", "mu_dyn": "dynamic", "contact_area": "simulation"}
@@ -50,9 +49,7 @@ def charts(directory: Path) -> list[Chart]:
             wide = values.min() > 0.0 and values.max() >= WIDE * values.min()
             word = key.split(".")[-1]
             x = Axis(word.replace("_", " "), UNITS.get(word, ""))
-            named = sum(bool(one.name) for one in series)
-            chart = Chart(panel, x, Axis(title), series, log_x=wide)
-            found.append(replace(chart, headroom=1.0 + PER_NAME * named) if named > FEW_NAMES else chart)
+            found.append(with_key_beside(Chart(panel, x, Axis(title), series, log_x=wide)))
     return found
 
 
