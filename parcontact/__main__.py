@@ -3,6 +3,7 @@
 import errno
 import gc
 import os
+import resource
 import sys
 import time
 import traceback
@@ -119,8 +120,8 @@ def _end_all(error: BaseException) -> NoReturn:
 
 def _trouble_around(error: BaseException) -> str:
     """What is wrong around the program, where that has ended it, and what to do; '' for any other error."""
-    unloaded = isinstance(error, ImportError) and "failed to map segment" in str(error)
-    if isinstance(error, MemoryError) or unloaded:
+    limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+    if isinstance(error, MemoryError) or (limited and isinstance(error, ImportError | SystemError)):
         return "out of memory; free some, allow more by ulimit -v, or take fewer points"
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return "out of open files; allow more by ulimit -n"

@@ -17,6 +17,8 @@ from conftest import WORLD, Main
 from matplotlib.figure import Figure
 
 from parcontact.command import verbs
+from parcontact.errors import InputError
+from parcontact.record import measures
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 
@@ -96,6 +98,7 @@ def test_limits_too_narrow_to_start(
     [
         (MemoryError(), "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"),
         (ImportError("libx.so: failed to map segment from shared object"), "parcontact: out of memory; "),
+        (SystemError("error return without exception set"), "parcontact: out of memory; "),
         (OSError(errno.EMFILE, "Too many open files"), "parcontact: out of open files; allow more by ulimit -n: "),
     ],
 )
@@ -104,7 +107,8 @@ def test_what_the_machine_lacks(main: Main, monkeypatch: pytest.MonkeyPatch, err
         raise error
 
     monkeypatch.setattr(verbs, "info", fail)
-    code, _, errors = main("info", "out")
+    with limited(resource.RLIMIT_AS, 1 << 45):
+        code, _, errors = main("info", "out")
     assert code == FAILED
     assert errors.startswith(said)
     assert len(errors.splitlines()) == 1
@@ -174,3 +178,15 @@ def test_what_to_cite_for_a_damaged_job(here: Path, main: Main, text: str) -> No
     code, _, said = main("cite", "out")
     assert code == BAD_INPUT
     assert said.startswith("parcontact: out/job.resolved.yaml is damaged: ")
+
+
+@pytest.mark.parametrize(("verb", "column"), [("report", "seconds"), ("report", "operator_calls"), ("info", "step")])
+def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) -> None:
+    assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
+    table = here / "out" / "measures.csv"
+    table.write_text(table.read_text().replace(column, "other", 1))
+    code, shown, said = main(verb, "out")
+    assert code == BAD_INPUT
+    assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
+    with pytest.raises(InputError, match="names no column"):
+        measures.read(table)[column]

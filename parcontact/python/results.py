@@ -35,9 +35,10 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     if not (path / "measures.csv").is_file():
         raise InputError(f"{path} holds no measures.csv: it is no output directory of a run")
     columns = measures.read(path / "measures.csv")
-    steps = np.array(columns.pop("step"), dtype=int)
+    steps, times = np.array(columns["step"], dtype=int), columns["time"]
     found: dict[str, Any] = {name: ("step", values, _units(name)) for name, values in columns.items()}
-    coordinates: dict[str, Any] = {"step": steps, "time": found.pop("time")}
+    del found["step"], found["time"]
+    coordinates: dict[str, Any] = {"step": steps, "time": ("step", times, _units("time"))}
     if (path / "fields.h5").is_file():
         _add_maps(path / "fields.h5", found, coordinates)
     return xarray.Dataset(found, coordinates)

@@ -3,8 +3,9 @@
 import math
 import os
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from ..errors import InputError
 from . import files
@@ -167,7 +168,18 @@ def _rows(path: Path) -> Iterator[list[str]]:
             yield cells
 
 
-def read(path: Path) -> dict[str, list[float]]:
+class Columns(dict[str, list[float]]):
+    """Columns by name; asking for one that the file has not raises InputError."""
+
+    def __init__(self, path: Path, found: Iterable[tuple[str, list[float]]]) -> None:
+        super().__init__(found)
+        self.path = path
+
+    def __missing__(self, name: str) -> NoReturn:
+        raise InputError(f"{self.path}, line 1, names no column {name}; mend it, or move the file away")
+
+
+def read(path: Path) -> Columns:
     """Columns of a table by name, also of one that still grows; NaN for what was not asked for.
 
     Raises InputError, which names the line, for what is no table of numbers.
@@ -183,4 +195,4 @@ def read(path: Path) -> dict[str, list[float]]:
                 values.append(float(text or "nan"))
             except ValueError:
                 raise InputError(f"{path}, line {number}: {name} is {text[:20]!r}, not a number") from None
-    return dict(zip(names, series, strict=True))
+    return Columns(path, zip(names, series, strict=True))

@@ -75,7 +75,8 @@ def _row(case: Case) -> dict[str, Any]:
     directory = case.job.output.directory
     row: dict[str, Any] = {"case": case.number, **case.settings, "state": state(case)}
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
-        columns = measures.read(directory / name) if (directory / name).is_file() else {"time": []}
+        there = (directory / name).is_file()
+        columns: dict[str, list[float]] = measures.read(directory / name) if there else {"time": []}
         if columns["time"]:
             found = slide.measure(case.job.history, columns)
             row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
