@@ -108,7 +108,8 @@ def remove(campaign: "Campaign", trial: int) -> None:
     out = campaign.where / f"remove{trial}"
     process = campaign.start(out)
     _under_way(campaign, process, out)
-    shutil.rmtree(out, ignore_errors=True)
+    gone = out.rename(f"{out}-gone")  # at once: else the run may put measures.csv back meanwhile
+    shutil.rmtree(gone, ignore_errors=True)
     _noted(campaign, "directory removed", process.wait(600))
     campaign.judge(f"remove {trial}", out)
 

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, TypeVar
 
@@ -53,10 +54,13 @@ def while_syncing(path: Path, slab: Slab, meanwhile: Callable[[], T]) -> T:
     """As `sync`; returns what was done `meanwhile`."""
     problem = ""
     with ThreadPoolExecutor(1) as pool:
-        waiting = pool.submit(sync_one, path)
+        try:
+            wait: Callable[[], None] = pool.submit(sync_one, path).result
+        except RuntimeError:  # a limit of the system leaves no room for a thread
+            wait = partial(sync_one, path)
         result = meanwhile()
         try:
-            waiting.result()
+            wait()
         except OSError as error:
             problem = f"cannot write {path}: {reason(error)}"
     raise_first(slab, problem)
