@@ -166,6 +166,11 @@ def _area(known: Known, seen: Seen, points: int) -> Parts:
     return Parts(solver, time, known.folded * open_share, mesh)
 
 
+def weight_of(slid: float, seconds: float) -> float:
+    """Return what a step counts in a mean: as far as the surface slid [m], less by far how long it lasted."""
+    return slid or seconds * AT_REST or AT_ONCE
+
+
 class Summary:
     """Budgets of many steps, each for as far as the surface slid in it; friction also in proportion to it.
 
@@ -183,7 +188,7 @@ class Summary:
 
     def add(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> None:
         """One step of so many seconds, in which the surface slid so far [m]."""
-        far = slid or seconds * AT_REST or AT_ONCE
+        far = weight_of(slid, seconds)
         for sums, parts, weight in zip(self._sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
                 sums += weight * far * np.array([1.0, *astuple(parts)])

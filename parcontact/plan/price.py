@@ -230,13 +230,10 @@ def _basis(costs: Costs) -> Iterator[str]:
     calls = sample.total("operator") / max(sample.steps, 1)
     mesh = mesh_error(sample, "friction")
     mesh = mesh_error(sample, "area") if mesh is None else mesh
-    if sample.job.steady:
-        what, errors = "state", ""
-    else:
-        what, errors = "step", f", errors of {per_cent(time_error(StageCost(0), sample))} by time steps"
-    by_mesh = "errors by the mesh unknown" if mesh is None else f"errors of {per_cent(mesh)} by the mesh"
-    points = " x ".join(map(str, sample.job.grid.points))
-    yield f"measured on {points} points: times, {calls:.3g} operator calls a {what}{errors}, {by_mesh}"
+    errors = [] if sample.job.steady else [f"errors of {per_cent(time_error(StageCost(0), sample))} by time steps"]
+    errors.append("errors by the mesh unknown" if mesh is None else f"errors of {per_cent(mesh)} by the mesh")
+    points, what = " x ".join(map(str, sample.job.grid.points)), "state" if sample.job.steady else "step"
+    yield f"measured on {points} points: times, {calls:.3g} operator calls a {what}, {', '.join(errors)}"
     yield (
         "scaled: cells by what the shortest wave or a contact spot needs, steps by the order of the integrator, "
         f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time by N log N; maps are those on 1 rank"

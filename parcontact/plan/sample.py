@@ -20,6 +20,7 @@ from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
+from ..physics.budget import weight_of
 from ..record.row import Row
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
@@ -33,7 +34,6 @@ LONG = 4  # steps that a long step costs, with what settling costs more
 FIRST = 2  # steps that are always made
 KILO = 1024  # bytes in what the system counts resident memory in
 UNDISTURBED = 0.9  # of the time a rank has a core, where nothing else is at work
-ONCE = 1e-300  # s, that a single solve weighs: something where there is nothing else
 LATE = 2.0  # times the time given: then no more steps are made
 
 
@@ -242,16 +242,17 @@ def _make_as_run(march: March, step: Step, stages: list[StageCost]) -> dict[str,
 def _make(march: March, step: Step) -> dict[str, float]:
     """Make a step; what it cost, and how wrong it is."""
     cost = _cost(march.scene.slab, partial(march.advance, step))
-    return cost | dict(_errors(march.row, step.dt))
+    return cost | dict(_errors(march.row, weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)))
 
 
-def _errors(row: Row, dt: float) -> Iterator[tuple[str, float]]:
-    """The parts of the errors of friction and area that time steps and mesh make, and what they weigh in a mean."""
+def _errors(row: Row, far: float) -> Iterator[tuple[str, float]]:
+    """The parts of the errors of friction and area that time steps and mesh make, and what they weigh in a mean, as in
+    that of a run."""
     if row.errors is None:
         return
     for name, parts, weight in (
-        ("friction", row.errors.friction, dt * row.measures.friction),
-        ("area", row.errors.area, dt or ONCE),
+        ("friction", row.errors.friction, far * row.measures.friction),
+        ("area", row.errors.area, far),
     ):
         if parts is not None:
             yield f"{name} weight", weight
