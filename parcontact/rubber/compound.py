@@ -7,10 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..errors import InputError
-from .sane import odd_moduli
 from .shift import WLF, Arrhenius, Factors, Shift
 
 if TYPE_CHECKING:
@@ -62,7 +59,9 @@ class Compound:
         return "moduli" if self.weigh == "both" else f"{self.weigh} modulus"
 
     def doubts(self) -> list[str]:
-        """What to say of a fit that misses the table by more than it scatters."""
+        """What to say of a fit that misses the table by more than it scatters, and of tables that are of no rubber."""
+        from .sane import odd_moduli  # with numpy, which is slow to import
+
         series, found = self.series, []
         if series.error > POOR:
             found.append(f"the fit misses the {self._weighed} by {series.error:.0%} (rms), more than {POOR:.0%}")
@@ -85,7 +84,7 @@ class Compound:
         sign = 1.0 if self.measured.kind == "frequency" else -1.0
         logs = [sign * self.shift.log_factor(t) for t in self.temperatures]
         ends = [
-            (float(np.log10(each.at.min())) + log, float(np.log10(each.at.max())) + log)
+            (math.log10(each.at.min()) + log, math.log10(each.at.max()) + log)
             for each, log in zip(self.measured.sets, logs, strict=True)
         ]
         for (one, mine), (other, its) in pairwise(zip(self.temperatures, ends, strict=True)):
