@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 import time
+import zlib
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -136,12 +137,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def elsewhere(item: pytest.Item) -> bool:
     """Whether a test is for other numbers of ranks than this one: it names its own, or makes groups of all smaller ones
-    from the most that tests run on."""
+    from the most that tests run on, or runs on two ranks, and on three or four as its name has it."""
     mark = item.get_closest_marker("mpi")
     if mark is None:
         return False
-    ranks = mark.args or ((MOST_RANKS,) if "communicators" in getattr(item, "fixturenames", ()) else ())
-    return bool(ranks) and WORLD.size not in ranks
+    groups = "communicators" in getattr(item, "fixturenames", ())
+    own = (MOST_RANKS,) if groups else (2, 3 + zlib.crc32(item.nodeid.encode()) % 2)
+    return WORLD.size not in (mark.args or own)
 
 
 @pytest.hookimpl(trylast=True)
