@@ -22,9 +22,7 @@ def open_numbers(path: Path) -> NDArray[Any]:
     except ValueError as error:
         if "mmap length" not in str(error):
             raise
-        raise InputError(
-            f"{path} cannot be read: it ends before the last of the values that its header tells"
-        ) from error
+        raise InputError(f"{path} cannot be read: it ends before the last of its values") from error
     refuse_no_numbers(path, values.dtype)
     return values
 

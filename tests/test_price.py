@@ -155,6 +155,20 @@ def test_what_is_offered_keeps_its_promise(accuracy: float) -> None:
     assert 1 / 1.5 < calls / found.costs.scaling.samples[0].total("operator") < 1.5
 
 
+def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
+    """Weighed by the way slid: a slow stage that lasts fifty times as long does not hide what a fast one makes."""
+    short = {**SLIDE, "distance": 2.5e-4}
+    planned = job(history=[{**short, "velocity": 0.01}, {**short, "velocity": 0.5}])
+    seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
+    budget, (_, rows) = Summary(), marched(planned)
+    for before, row in pairwise(rows):
+        assert row.errors is not None
+        budget.add(row.errors, row.measures.friction, row.time - before.time, row.distance - before.distance)
+    for name, parts in (("friction", budget.friction), ("area", budget.area)):
+        assert parts is not None
+        assert price.mesh_error(seen, name) == pytest.approx(parts.mesh, rel=1e-6)
+
+
 def test_the_table() -> None:
     """As a user reads it: one line for the job, one for each accuracy; a disturbed trial is marked."""
     seen = costs(job(), time=1e-3, mesh=8.8e-3)

@@ -126,3 +126,14 @@ def test_a_steady_start_that_does_not_last() -> None:
     assert "left" not in said([{**CLIMB, "pressure": 2.0}], table, **start)[-1]
     table["error_friction"] = [0.2, 0.2, 0.2]
     assert "left" not in said([CLIMB], table, **start)[-1]
+
+
+def test_the_area_whose_error_is_told_and_friction_that_is_all_error() -> None:
+    """The corrected area stands beside the counted one; an error of more than all of friction is said to be that."""
+    table = rows((0, 0, 3), (0.25, 0.5, 4), (0.5, 1, 4))
+    table["contact_area_corrected"] = [0.8 * area for area in table["contact_area"]]
+    table["error_friction"] = [float("nan"), 0.1, 1.1]
+    told = said([CLIMB], table)
+    assert "the mean contact area over the same is 0.391667, corrected by its edges 0.313333" in told
+    assert "largest errors of the steps of the slide: friction 110 %" in told
+    assert told[-1] == "friction of some of its steps cannot be told from no friction"

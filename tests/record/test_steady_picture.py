@@ -70,6 +70,8 @@ def test_errors_and_the_corrected_area(tmp_path: Path, drawn: list[Figure]) -> N
         (bars,) = (one for one in axes.collections if isinstance(one, LineCollection))
         ends = [(low, high) for (_, low), (_, high) in bars.get_segments()]
         assert np.allclose(ends, expected)
+    assert area.get_ylim()[1] > 0.165  # bars are not cut off, but those of more than all of a value
+    assert friction.get_ylim()[1] > 0.2
 
 
 def test_one_key_for_all_panels(tmp_path: Path, drawn: list[Figure]) -> None:
