@@ -18,9 +18,10 @@ from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
 from .physics.prony import Prony, complex_modulus
 from .physics.roughness import EDGE, Roughness
-from .record import files, hdf5, measures, theory_settings
-from .record.theory_settings import TheorySettings
 from .steady_sliding.curve import Request
+from .storage import files, hdf5, measures
+from .summary import theory_settings
+from .summary.theory_settings import TheorySettings
 from .theory import full_contact, persson, persson_rings
 from .theory.persson_history import Leg, Memory, follow
 from .theory.persson_rings import Rings
@@ -111,7 +112,7 @@ def write_steady(job: Job, wanted: Request) -> Path:
     path = job.output.directory / STEADY_FILE
     with _told_where(path):
         _write(path, SteadyInstant._fields, predict_steady(job, wanted))
-    from .record import plots  # matplotlib is slow to import, and for pictures only
+    from .plotting import plots  # matplotlib is slow to import, and for pictures only
 
     return plots.draw_steady(job.output.directory / "steady.csv")
 

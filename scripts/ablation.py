@@ -26,8 +26,8 @@ from parcontact.job import Job
 from parcontact.job.timeline import Step
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.record.fields import FieldsFile
-from parcontact.record.provenance import Link, Provenance
+from parcontact.storage.fields import FieldsFile
+from parcontact.storage.provenance import Link, Provenance
 
 ITERATIONS = 3  # of a solve: ten operator calls
 MOST = 1.35  # times the time of an elastic step for twelve branches

@@ -38,9 +38,9 @@ def measure(chosen: argparse.Namespace) -> bool:
     from parcontact.job.sections import Checkpoint
     from parcontact.parallel.slab import Slab
     from parcontact.physics.entries import Entry
-    from parcontact.record import checkpoint
-    from parcontact.record.checkpoint import Facts
-    from parcontact.record.provenance import Link, Provenance
+    from parcontact.storage import checkpoint
+    from parcontact.storage.checkpoint import Facts
+    from parcontact.storage.provenance import Link, Provenance
 
     comm = MPI.COMM_WORLD
     slab = Slab(comm, chosen.points, chosen.points)

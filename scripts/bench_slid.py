@@ -9,7 +9,7 @@ from parcontact import scene
 from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 
 def slid(planned: jobs.Job) -> tuple[March, list[Row], list[float]]:

@@ -19,8 +19,8 @@ from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
-from parcontact.record.row import Row
 from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.storage.row import Row
 
 DEFAULT, EXACT = 5e-3, 5e-5  # tolerances of a job that gives none, and of one to compare with
 LARGER = (0.1, 0.05, 0.02, 0.01)

@@ -24,11 +24,11 @@ from parcontact.errors import InputError, RunError
 from parcontact.march import loop
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import NAMES, Parts
-from parcontact.record.row import Row
 from parcontact.run.errors_so_far import ErrorsSoFar
 from parcontact.run.half_mesh import place_of
 from parcontact.steady_sliding import curve, start
 from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.storage.row import Row
 
 SHARPER = 10.0  # times the accuracy is asked of a reference
 SAME_TIME = 1e-9

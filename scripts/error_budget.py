@@ -25,7 +25,7 @@ from parcontact.march import loop
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import Parts
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 Json = dict[str, Any]
 SMALL = 1e-4

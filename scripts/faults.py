@@ -31,7 +31,7 @@ from mpi4py import MPI
 
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.record import checkpoint
+from parcontact.storage import checkpoint
 
 BIN = Path(sys.executable).parent
 PATIENCE = 60.0  # seconds after which a run that was hit hangs

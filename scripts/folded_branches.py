@@ -24,7 +24,7 @@ from parcontact import job, scene
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, ZenerBody
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 JOB = Path(__file__).parents[1] / "jobs" / "velocity_step.yaml"
 SLIDE = "history=[{pressure: 1.0e5, velocity: 3.0, distance: 5.0e-4, cells_per_step: 1}]"

@@ -19,7 +19,7 @@ from parcontact.errors import InputError
 from parcontact.job import Initial, load
 from parcontact.parallel.mpi import MPI
 from parcontact.parallel.slab import Slab
-from parcontact.record import sweep_table
+from parcontact.summary import sweep_table
 from parcontact.theory.persson import GAMMA
 
 JOB = Path(__file__).resolve().parents[1] / "jobs" / "paper" / "fig09_velocities.yaml"

@@ -22,7 +22,7 @@ from paper_panels import WIDTH, MissingError, columns, explain, moduli, over_dis
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import load, load_cases
 from parcontact.physics.prony import complex_modulus
-from parcontact.record.pictures import style
+from parcontact.plotting import style
 from parcontact.theory import hertz
 
 JOBS = Path(__file__).resolve().parents[1] / "jobs" / "paper"

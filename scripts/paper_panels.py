@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import Job
-from parcontact.record import measures, sweep_table, theory_settings
-from parcontact.record.pictures import style
+from parcontact.plotting import style
+from parcontact.storage import measures
+from parcontact.summary import sweep_table, theory_settings
 
 QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
 WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm

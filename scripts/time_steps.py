@@ -21,9 +21,9 @@ from parcontact import job as jobs
 from parcontact.job.table import plain
 from parcontact.march import loop
 from parcontact.parallel.slab import Slab
-from parcontact.record.row import Row
-from parcontact.record.slide import mean_over_end
 from parcontact.steady_sliding import start
+from parcontact.storage.row import Row
+from parcontact.summary.slide import mean_over_end
 
 Json = dict[str, Any]
 ACCURACIES = (0.05, 0.01, 0.003)

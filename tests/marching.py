@@ -15,8 +15,8 @@ from parcontact.job import Job, load
 from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.record.row import Row
 from parcontact.steady_sliding import start
+from parcontact.storage.row import Row
 
 # the paper's Hertz material as one Maxwell branch beside the long-term spring: modulus 2.75 MPa at once, a tenth of it
 # in the end, relaxation time 1 ms, creep time 10 ms

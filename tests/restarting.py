@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from parcontact import job
 from parcontact.parallel.slab import Slab
-from parcontact.record import marker
 from parcontact.run import runner
+from parcontact.storage import marker
 
 ROUGH = {
     "shape": "rough",

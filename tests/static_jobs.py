@@ -10,7 +10,7 @@ from parcontact import job, scene
 from parcontact.march.loop import run as run_march
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 Fields = dict[str, NDArray[Any]]
 

@@ -13,9 +13,9 @@ from parcontact import job as jobs
 from parcontact.errors import InputError
 from parcontact.march.loop import run as run_march
 from parcontact.parallel.slab import Slab
-from parcontact.record.measures import read
 from parcontact.steady_sliding import start as steadystart
 from parcontact.steady_sliding.curve import request
+from parcontact.storage.measures import read
 from parcontact.theory import full_contact
 
 WAVE = """\

@@ -14,10 +14,10 @@ from conftest import WORLD
 
 from parcontact import __main__
 from parcontact.job import load_cases
-from parcontact.record import sweep_table
-from parcontact.record.measures import read
 from parcontact.solve import kernels
 from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.storage.measures import read
+from parcontact.summary import sweep_table
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")
 

@@ -11,8 +11,8 @@ from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
 from mpi4py import MPI
 
 from parcontact.parallel.slab import Slab
-from parcontact.record import fields, measures
 from parcontact.run import journey, runner
+from parcontact.storage import fields, measures
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from static_jobs import run
 
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 from parcontact.theory import hertz, jgh, westergaard
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml

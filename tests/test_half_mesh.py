@@ -15,10 +15,10 @@ from parcontact.errors import JobError, RunError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER, ErrorBudget, Parts, compared_with_half_mesh
-from parcontact.record import measures
 from parcontact.run import half_mesh, runner
 from parcontact.run.half_mesh import HalfMesh, place_of
 from parcontact.run.journey import AGAIN
+from parcontact.storage import measures
 
 Json = dict[str, Any]
 Series = NDArray[np.float64]

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from parcontact.command import verbs
 from parcontact.errors import InputError
-from parcontact.record import measures
+from parcontact.storage import measures
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 

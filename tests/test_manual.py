@@ -25,9 +25,10 @@ from parcontact.effects.interface import InterfaceColumns
 from parcontact.errors import InputError
 from parcontact.job import keys, yamltext
 from parcontact.manual import reference, texts
-from parcontact.record import citations, fields, measures, sweep_table
 from parcontact.steady_sliding import table as steady_table
+from parcontact.storage import fields, measures
 from parcontact.study import table as study_table
+from parcontact.summary import citations, sweep_table
 
 PAGES = texts.names()
 NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from parcontact import prediction
 from parcontact.job import Job, load, load_cases
 from parcontact.parallel.slab import Slab
-from parcontact.record import slide, sweep_table
-from parcontact.record.slide import Slide
+from parcontact.summary import slide, sweep_table
+from parcontact.summary.slide import Slide
 from parcontact.theory import hertz
 
 SMALL = ["grid.points=128", "surface.0.short_wavelength=1.25e-4"]  # 16 cells per shortest wave, as in the paper

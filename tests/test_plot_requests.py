@@ -26,8 +26,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from parcontact.__main__ import main
-from parcontact.record import measures
-from parcontact.record.pictures import style
+from parcontact.plotting import style
+from parcontact.storage import measures
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
 CURVE = "velocity,pressure,friction,contact_area\n"

@@ -10,8 +10,8 @@ from drawing import ELASTIC, KINDS, LOADS, SLIDE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
-from parcontact.record import plots, theory_settings
-from parcontact.record.pictures import units
+from parcontact.plotting import plots, units
+from parcontact.summary import theory_settings
 
 
 @pytest.mark.parametrize("kind", KINDS)

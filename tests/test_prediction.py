@@ -18,8 +18,8 @@ from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.record import info_directory, theory_settings
-from parcontact.record.theory_settings import TheorySettings
+from parcontact.summary import info_directory, theory_settings
+from parcontact.summary.theory_settings import TheorySettings
 from parcontact.theory import full_contact
 
 ROUGH: dict[str, Any] = {

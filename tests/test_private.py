@@ -16,7 +16,7 @@ from mpi4py import MPI
 from parcontact import private
 from parcontact.job import load
 from parcontact.parallel.slab import Slab
-from parcontact.record import wisdom
+from parcontact.storage import wisdom
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
 ROOT = Path(__file__).parents[1]

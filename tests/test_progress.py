@@ -9,7 +9,7 @@ from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 
 from parcontact import progress
 from parcontact.__main__ import main
-from parcontact.record.pictures.run import Run
+from parcontact.plotting.run import Run
 from parcontact.report import browse
 
 

@@ -9,8 +9,9 @@ import pytest
 from mpi4py import MPI
 from restarting import FASTER, SCENES, SLIDE, Bench, cut, rows, same
 
-from parcontact.record import checkpoint, info, measures
-from parcontact.record.provenance import read_budget
+from parcontact.storage import checkpoint, measures
+from parcontact.storage.provenance import read_budget
+from parcontact.summary import info
 
 
 def cut_anywhere(bench: Bench, data: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from restarting import ELASTIC, FASTER, PRESS, ROUGH, SLIDE, TOUCH, Bench, cut, part_way, rows
 
 from parcontact.errors import InputError
-from parcontact.record import checkpoint
+from parcontact.storage import checkpoint
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"grid": {"points": [20, 16]}}, "grid.points was [20, 14], is [20, 16]"),

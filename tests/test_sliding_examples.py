@@ -8,7 +8,7 @@ import pytest
 from marching import JOBS, column, example, marched
 from numpy.testing import assert_allclose
 
-from parcontact.record import measures
+from parcontact.storage import measures
 
 if TYPE_CHECKING:
     from conftest import RunParcontact

@@ -11,7 +11,7 @@ from sliding import FAST, PRESS, WAVELENGTH, Json, rough, slide, wave
 
 from parcontact.march.step import March
 from parcontact.physics.prony import Integrator
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 
 def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> Row:

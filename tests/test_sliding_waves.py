@@ -11,7 +11,7 @@ from rubbers import relaxation
 from sliding import CELL, FAST, HEIGHT, MEAN, WAVELENGTH, K, wave
 
 from parcontact.physics.prony import Integrator
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 from parcontact.theory import full_contact
 
 INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")

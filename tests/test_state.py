@@ -11,9 +11,9 @@ from parcontact.job.table import plain
 from parcontact.march.failure import StepError
 from parcontact.march.loop import run
 from parcontact.march.step import March
-from parcontact.record import checkpoint
-from parcontact.record.checkpoint import Facts
-from parcontact.record.provenance import Link, Provenance
+from parcontact.storage import checkpoint
+from parcontact.storage.checkpoint import Facts
+from parcontact.storage.provenance import Link, Provenance
 
 FIELDS = ("pressure", "displacement", "gap", "height")
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1e-4, "rms_slope": 0.02}

@@ -15,7 +15,7 @@ from parcontact.march.loop import run
 from parcontact.march.rest import SHARE, remaining, steps_to_make
 from parcontact.march.step import March
 from parcontact.physics.body import ZenerBody
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
 DWELL = {"name": "dwell", "pressure": 1e4, "duration": 0.1, "time_step": {"first": 1e-4, "growth": 1.2}}

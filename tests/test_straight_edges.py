@@ -5,7 +5,7 @@ import pytest
 from marching import marched
 
 from parcontact.job import Job
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 FINER = 16
 

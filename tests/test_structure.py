@@ -19,7 +19,9 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"physics", "road"},
     {"theory", "solve"},
     {"effects"},
-    {"record"},
+    {"storage"},
+    {"summary"},
+    {"plotting"},
     {"rigid_surface"},
     {"scene"},
     {"march", "sanity"},
@@ -33,7 +35,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
-KNOW_MPI = {"python", "parallel", "record", "report", "command"}
+KNOW_MPI = {"python", "parallel", "storage", "summary", "report", "command"}
 
 
 def room(module: str) -> str:
@@ -83,7 +85,7 @@ def test_only_some_rooms_know_mpi(module: str) -> None:
     assert not [name for name in imports_that_run(module) if room(name) == "mpi4py" or name.startswith("parallel.mpi")]
 
 
-COMPARE = {"doctor", "record", "prediction", "command"}  # rooms that set theory beside results
+COMPARE = {"doctor", "plotting", "prediction", "command"}  # rooms that set theory beside results
 
 
 def test_theory_stands_alone() -> None:

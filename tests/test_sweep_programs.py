@@ -15,9 +15,10 @@ from parcontact.__main__ import main
 from parcontact.errors import TakenError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.record import directory, sweep_table
-from parcontact.record.directory import Directory
 from parcontact.run import sweep
+from parcontact.storage import directory
+from parcontact.storage.directory import Directory
+from parcontact.summary import sweep_table
 
 AGAIN = "has been taken by another run meanwhile; run again to go on with it"
 

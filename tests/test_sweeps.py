@@ -14,8 +14,8 @@ from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.plan import side_by_side, trial
-from parcontact.record import info_directory, sweep_table
 from parcontact.run import sweep, watch
+from parcontact.summary import info_directory, sweep_table
 
 JOB = """\
 grid: {points: 34, size: 1.0e-3}

@@ -12,10 +12,10 @@ from parcontact import job as jobs
 from parcontact import prediction, scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.record.measures import read
-from parcontact.record.pictures import steady
+from parcontact.plotting import steady
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.storage.measures import read
 from parcontact.theory import full_contact
 
 C1, C2, REFERENCE = 17.4, 51.6, 20.0

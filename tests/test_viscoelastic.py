@@ -9,7 +9,7 @@ from marching import PRONY, SLS, column, example, marched
 from numpy.testing import assert_allclose
 
 from parcontact.march.step import March
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 from parcontact.theory import lee_radok, westergaard
 
 Json = dict[str, Any]

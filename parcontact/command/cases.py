@@ -26,7 +26,7 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     Of cases that are done side by side only the beginning and the end are told.
     """
     from ..parallel.slab import Slab
-    from ..record.console import always
+    from ..storage.console import always
 
     cases, chosen = on_root(world, lambda: cases_of(options))
     if not cases[0].settings:

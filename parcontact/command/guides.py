@@ -65,7 +65,7 @@ def schema(options: argparse.Namespace) -> int:
 
 @root_alone
 def cite(options: argparse.Namespace) -> int:
-    from ..record import citations
+    from ..summary import citations
 
     print(citations.describe(options.directory))
     return DONE

@@ -137,7 +137,7 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
     from .. import prediction
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..record.theory_settings import TheorySettings
+    from ..summary.theory_settings import TheorySettings
 
     def write() -> Path:
         rows = prediction.predict(job, Slab(MPI.COMM_SELF, *job.grid.points), options.gamma, options.waves)
@@ -153,7 +153,7 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
 def fit(options: argparse.Namespace) -> int:
     from .. import job as jobs
     from ..effects.folded_branches import excited_band
-    from ..record import compounds
+    from ..plotting import compounds
     from ..rubber import compound
     from ..rubber.shift import given
 
@@ -189,7 +189,8 @@ def surface(options: argparse.Namespace) -> int:
     from .. import sanity, scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..record import measured_maps, surfaces
+    from ..plotting import surfaces
+    from ..summary import measured_maps
 
     given = Path(options.job)
     picture, options.out = Path(options.out or f"{given.stem}-surface.png"), None
@@ -216,7 +217,7 @@ def surface(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     world = ranks.start()
-    from ..record import info as about
+    from ..summary import info as about
 
     text, sound = on_root(world, lambda: about.describe_all(options.file))
     if world.rank == 0:
@@ -226,7 +227,7 @@ def info(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     world = ranks.start()
-    from ..record import plots
+    from ..plotting import plots
 
     names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
     wanted = plots.Options(**{name: getattr(options, name) for name in names})

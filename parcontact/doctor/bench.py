@@ -13,8 +13,8 @@ from ..job import Job
 from ..job.timeline import Step
 from ..march.step import March
 from ..parallel.slab import Array, Slab
-from ..record.row import Row
 from ..steady_sliding import start
+from ..storage.row import Row
 
 if TYPE_CHECKING:
     from mpi4py import MPI

@@ -10,9 +10,9 @@ from ..errors import InputError
 from ..parallel.slab import Array
 from ..physics.entries import Entry, MapCount, Saved
 from ..physics.units import Units
-from ..record.checkpoint import Contents, read
-from ..record.row import Row
 from ..scene import Scene
+from ..storage.checkpoint import Contents, read
+from ..storage.row import Row
 
 FURTHER = 2  # pressures before the earlier one that are kept for starts, of three and of four steps ago
 MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these

@@ -16,11 +16,11 @@ from ..physics.body import Trial, ZenerBody
 from ..physics.energy import Pressed
 from ..physics.entries import Entry
 from ..physics.measures import Measures
-from ..record.checkpoint import Contents
-from ..record.row import Row
 from ..scene import Scene, solver_in_double, solver_on
 from ..solve import cold, retry
 from ..solve.contact import Approach, Contact, ContactSolver, MeanPressure
+from ..storage.checkpoint import Contents
+from ..storage.row import Row
 from . import failure, state
 from .errors import Errors, Estimate
 from .failure import StepError

@@ -7,8 +7,8 @@ from pathlib import Path
 from .. import progress
 from ..job import Job
 from ..parallel.slab import Slab
-from ..record import wisdom
 from ..steady_sliding.curve import request
+from ..storage import wisdom
 from . import machine, other_ranks, price, report, trial
 from .report import Costs
 from .sample import Sample, sample

@@ -21,10 +21,10 @@ from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
 from ..physics.budget import weight_of
-from ..record.row import Row
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
 from ..steady_sliding.sliding import Point, SteadySliding
+from ..storage.row import Row
 from . import trial
 
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from ..record import fields, hdf5, measures
+from ..storage import fields, hdf5, measures
 from .jobs import path_of
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..record import measures
-from ..record.row import Row as Recorded
+from ..storage import measures
+from ..storage.row import Row as Recorded
 
 
 class Row(Mapping[str, float]):

@@ -22,12 +22,12 @@ from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics.entries import Entry
-from ..record import checkpoint, heights, marker, wisdom
-from ..record.checkpoint import Contents, Facts, Table
-from ..record.fields import UNITS
 from ..run import restart, runner
 from ..run.errors_so_far import ErrorsSoFar
 from ..steady_sliding import start
+from ..storage import checkpoint, heights, marker, wisdom
+from ..storage.checkpoint import Contents, Facts, Table
+from ..storage.fields import UNITS
 from .jobs import Given, agree, all_ranks, path_of, read, warn_of
 from .row import Row
 

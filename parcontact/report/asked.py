@@ -5,8 +5,8 @@ from pathlib import Path
 from .. import job as jobs
 from ..errors import InputError
 from ..job import Job, table
-from ..record import files
-from ..record.resolved import shown_job
+from ..storage import files
+from ..storage.resolved import shown_job
 from .parts import Section, Table
 
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # told by other sections

@@ -10,10 +10,10 @@ import numpy as np
 from PIL import Image
 
 from .. import progress
-from ..record import hdf5
-from ..record.pictures import style, units
-from ..record.pictures.frames import Frames
-from ..record.pictures.run import Fields, Run, box, frame_label
+from ..plotting import style, units
+from ..plotting.frames import Frames
+from ..plotting.run import Fields, Run, box, frame_label
+from ..storage import hdf5
 from .parts import RC, Browser, uri_of
 
 MAPS = ("pressure", "gap", "displacement", "height")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from ..record.slide import ERRORS
+from ..summary.slide import ERRORS
 from .log import Estimate
 from .parts import Section, Table
 

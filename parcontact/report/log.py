@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..record import files
-from ..record.console import STAMP, WARNING
-from ..record.curve_points import LOG
+from ..storage import files
+from ..storage.console import STAMP, WARNING
+from ..storage.curve_points import LOG
 
 LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "

@@ -12,7 +12,7 @@ from ..effects.measured_range import excited_bands
 from ..effects.relaxation import relaxation_of
 from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
-from ..record.pictures import style, units
+from ..plotting import style, units
 from .parts import Section, Table, of_panel
 
 DECADES = 1.5  # that a picture shows beyond the relaxation times

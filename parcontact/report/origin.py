@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 
 from ..job import Job
-from ..record import hdf5, provenance
+from ..storage import hdf5, provenance
 from . import log
 from .parts import Section, Table
 

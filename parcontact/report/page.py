@@ -8,8 +8,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from .. import progress
 from ..errors import InputError
-from ..record import files, hdf5
-from ..record.provenance import PROGRAM
+from ..storage import files, hdf5
+from ..storage.provenance import PROGRAM
 from . import readable
 from .chapters import chapter, together
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ..record import files
-from ..record.pictures import style
-from ..record.pictures.charts import Chart, draw, with_key_beside
-from ..record.pictures.run import Panel
+from ..plotting import style
+from ..plotting.charts import Chart, draw, with_key_beside
+from ..plotting.run import Panel
+from ..storage import files
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
 PHONE_COLUMNS = 2  # of a table that is shown as one on a phone

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..job import yamltext
-from ..record import hdf5
+from ..storage import hdf5
 
 READ = (  # in an output directory, each before what is below it
     *("*.csv", "*.h5", "*.yaml", "*.png", "*.log", "study.txt", "checkpoint", "checkpoint/*.h5"),

@@ -5,9 +5,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ..record import files, measures, slide, sweep_table, theory_settings
-from ..record.pictures import histories, steady, sweep
-from ..record.pictures.run import Run
+from ..plotting import histories, steady, sweep
+from ..plotting.run import Run
+from ..storage import files, measures
+from ..summary import slide, sweep_table, theory_settings
 from . import browse
 from .parts import Picture, Section, Table, of_chart, uri_of
 

@@ -8,7 +8,7 @@ from ..job import Job, table
 from ..parallel.fft import FFT
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
-from ..record.pictures import surface, units
+from ..plotting import surface, units
 from ..road import statistics
 from .parts import Section, Table, of_panel
 

@@ -11,7 +11,7 @@ from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.timeline import Timeline
 from ..physics.budget import Summary
 from ..physics.entries import Entry
-from ..record.row import Row
+from ..storage.row import Row
 from .half_mesh import HalfMesh, place_of
 
 NAME = "budget/sums"  # in a checkpoint

@@ -24,8 +24,8 @@ from ..job.table import plain
 from ..job.timeline import Timeline
 from ..parallel.slab import Slab
 from ..physics.budget import ErrorBudget, compared_with_half_mesh
-from ..record import measures
-from ..record.row import Row
+from ..storage import measures
+from ..storage.row import Row
 
 DIRECTORY = "half_mesh"  # below that of the run
 COLUMNS = ("time", "friction", "contact_area_corrected", "error_friction")

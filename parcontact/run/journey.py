@@ -15,11 +15,12 @@ from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..physics.entries import Entry
-from ..record import checkpoint, measures, slide, wisdom
-from ..record.checkpoint import Facts
-from ..record.console import always
-from ..record.directory import Directory
-from ..record.recorder import Recorder
+from ..storage import checkpoint, measures, wisdom
+from ..storage.checkpoint import Facts
+from ..storage.console import always
+from ..storage.directory import Directory
+from ..storage.recorder import Recorder
+from ..summary import slide
 from .errors_so_far import ErrorsSoFar, chosen_by_accuracy
 from .restart import Origin
 from .watch import Watch

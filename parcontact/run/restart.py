@@ -15,10 +15,10 @@ from ..job import Job, Stage
 from ..job.chosen import reached
 from ..job.timeline import Step, Timeline
 from ..parallel.slab import Slab
-from ..record import checkpoint, marker
-from ..record.checkpoint import Contents
-from ..record.directory import ADVICE, Directory
-from ..record.marker import Claim
+from ..storage import checkpoint, marker
+from ..storage.checkpoint import Contents
+from ..storage.directory import ADVICE, Directory
+from ..storage.marker import Claim
 
 SAME = ("grid", "surface", "material", "initial")  # sections that must not change
 SAME_NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))

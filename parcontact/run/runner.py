@@ -15,16 +15,16 @@ from ..job.timeline import Timeline
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import header, heights, marker, measures, wisdom
-from ..record.checkpoint import Contents, Facts, Table
-from ..record.console import Console, Silence, always
-from ..record.directory import Directory
-from ..record.marker import Claim
-from ..record.provenance import Link, Provenance, extended
-from ..record.recorder import Recorder
-from ..record.stopfile import StopFile
 from ..scene import Scene
 from ..steady_sliding import start as steadystart
+from ..storage import header, heights, marker, measures, wisdom
+from ..storage.checkpoint import Contents, Facts, Table
+from ..storage.console import Console, Silence, always
+from ..storage.directory import Directory
+from ..storage.marker import Claim
+from ..storage.provenance import Link, Provenance, extended
+from ..storage.recorder import Recorder
+from ..storage.stopfile import StopFile
 from . import half_mesh, restart, watch
 from .errors_so_far import ErrorsSoFar
 from .half_mesh import HalfMesh

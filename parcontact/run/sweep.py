@@ -13,9 +13,10 @@ from ..parallel.groups import Groups
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import marker, stopfile, sweep_table
-from ..record.directory import BESIDE, SHOWN
-from ..record.stopfile import StopFile
+from ..storage import marker, stopfile
+from ..storage.directory import BESIDE, SHOWN
+from ..storage.stopfile import StopFile
+from ..summary import sweep_table
 from . import watch
 from .journey import AGAIN, DONE
 from .sweep_warnings import SweepWarnings, warn

@@ -14,8 +14,8 @@ from pathlib import Path
 from ..job import Checkpoint
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import stopfile
-from ..record.stopfile import StopFile
+from ..storage import stopfile
+from ..storage.stopfile import StopFile
 
 LOOK_SECONDS = 0.2  # between two looks for the stop file
 RESERVE_SECONDS = 5.0  # of wall time for what is not measured: ending MPI, closing files

@@ -12,12 +12,12 @@ from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
-from ..record import curve_points, hdf5, marker, stopfile
-from ..record.console import always
-from ..record.directory import ADVICE, Directory
-from ..record.provenance import Link, Provenance
-from ..record.steady_maps import SteadyMaps
-from ..record.stopfile import StopFile
+from ..storage import curve_points, hdf5, marker, stopfile
+from ..storage.console import always
+from ..storage.directory import ADVICE, Directory
+from ..storage.provenance import Link, Provenance
+from ..storage.steady_maps import SteadyMaps
+from ..storage.stopfile import StopFile
 from .sliding import SteadySliding
 from .table import CurveTable
 

@@ -9,9 +9,9 @@ from ..march.state import State
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..physics.body import ZenerBody
-from ..record.checkpoint import Contents
 from ..scene import Frame, build, frame
 from ..solve.steady import SteadyContact
+from ..storage.checkpoint import Contents
 from .sliding import Point, SteadySliding, branch_maps
 
 

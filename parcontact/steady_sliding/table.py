@@ -8,10 +8,10 @@ from typing import Any
 from .. import progress
 from ..effects.interface import InterfaceColumns, interface_of
 from ..job.sample import describe_sample
-from ..record import curve_points, files, measures
-from ..record.console import Console, always
-from ..record.curve_points import LOG
-from ..record.growing import GrowingTable
+from ..storage import curve_points, files, measures
+from ..storage.console import Console, always
+from ..storage.curve_points import LOG
+from ..storage.growing import GrowingTable
 from .missed import describe_missed
 from .sliding import Point, SteadySliding
 
@@ -110,7 +110,7 @@ class CurveTable:
         self.warn(list(describe_missed(self._points, self._job.numerics.accuracy)))
         if self._points and (text := describe_sample(self._job, slides=True)):
             self.say(text)
-        from ..record import plots  # matplotlib is slow to import, and for pictures only
+        from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
         picture = plots.draw_steady(self.path)
         self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")

@@ -13,8 +13,8 @@ from ..march import loop
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..parallel.tally import Tally
-from ..record.row import Row
 from ..steady_sliding import start
+from ..storage.row import Row
 
 FIRST_STEPS = 2
 LAST_SHARE = 0.25  # of the last stage that slides (or lasts): its mean is taken for what has settled

@@ -8,9 +8,9 @@ from ..errors import RunError
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..record import files, marker, stopfile
-from ..record.directory import Directory
-from ..record.pictures import study as study_plots
+from ..plotting import study as study_plots
+from ..storage import files, marker, stopfile
+from ..storage.directory import Directory
 from . import outcome, table, verdict
 from .cases import Case, Ladders, about_chosen_steps, ladders, overrides
 from .outcome import Outcome

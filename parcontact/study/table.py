@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..job import AUTO
-from ..record import files
+from ..storage import files
 from . import cases, outcome
 from .cases import Case
 from .outcome import QUANTITIES, Outcome

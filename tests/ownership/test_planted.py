@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from parcontact.record import files
+from parcontact.storage import files
 
 from .jobs import BAD_INPUT, DONE, Main, contents
 

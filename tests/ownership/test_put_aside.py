@@ -8,7 +8,7 @@ import pytest
 
 import parcontact as pc
 from parcontact import __main__
-from parcontact.record import files
+from parcontact.storage import files
 
 from .jobs import DONE, JOB, write_job
 

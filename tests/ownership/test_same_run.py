@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from parcontact.record.directory import Directory
+from parcontact.storage.directory import Directory
 
 from .jobs import BAD_INPUT, DONE, STEPS, Contents, Main, contents, steps, write_job
 
@@ -149,7 +149,7 @@ def test_another_job_that_left_no_checkpoint(main: Main, tmp_path: Path) -> None
 
 def test_loser_of_a_race_writes_nothing(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Who finds a new directory taken, when it comes to write, leaves the winner's job as it is."""
-    monkeypatch.setattr("parcontact.record.directory.MAX_SECONDS_TO_RELEASE", 0.1)
+    monkeypatch.setattr("parcontact.storage.directory.MAX_SECONDS_TO_RELEASE", 0.1)
     out, winner = tmp_path / "out", Contents()
     make = Directory.make
 

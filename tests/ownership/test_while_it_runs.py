@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from parcontact.record import checkpoint
+from parcontact.storage import checkpoint
 
 from .jobs import AGAIN, DONE, FAILED, STEPS, Main, contents, steps
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from parcontact import job as jobs
-from parcontact.record import compounds
+from parcontact.plotting import compounds
 from parcontact.rubber import compound
 
 ROAD = Path(__file__).resolve().parents[2] / "jobs" / "road"

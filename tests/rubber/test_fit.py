@@ -9,7 +9,7 @@ import pytest
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.record.pictures import compound as pictures
+from parcontact.plotting import compound as pictures
 from parcontact.rubber import compound
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, given
 

@@ -15,7 +15,7 @@ from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import ZenerBody
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 Json = dict[str, Any]
 EPS = float(np.finfo(float).eps)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from parcontact.march.failure import StepError
 from parcontact.march.step import March
 from parcontact.parallel.slab import Array, Slab
-from parcontact.record.row import Row
 from parcontact.solve import kernels
+from parcontact.storage.row import Row
 
 from . import twins
 from .scenes import Sketch

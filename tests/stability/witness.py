@@ -12,7 +12,7 @@ from parcontact.job.timeline import Step
 from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Array
-from parcontact.record.row import Row
+from parcontact.storage.row import Row
 
 EPS = float(np.finfo(float).eps)
 SHALLOW = 0.05  # of the surface's height: less than this the length of a certificate rarely is

@@ -8,7 +8,7 @@ import pytest
 from drawing import outside, touching
 from matplotlib.figure import Figure
 
-from parcontact.record.pictures import study
+from parcontact.plotting import study
 
 QUANTITIES = ("mu_max", "mu_dyn", "area_corrected")
 

@@ -1,0 +1,1 @@
+"""Every picture, panel by panel."""

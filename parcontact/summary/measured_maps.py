@@ -1,0 +1,74 @@
+"""A measured map without a job: as a job to look at, and one to start from."""
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import job as jobs
+from ..errors import InputError, RunError
+from ..job import Job, Topography, yamltext
+from ..job.table import plain
+from ..storage import files
+
+JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps
+MANY_POINTS = 2**20  # of a job to start from, at most
+UNSAID = ("give unit", "give size")  # in messages about maps that do not say all
+HOW = "here as --set surface.unit=um and --set surface.size=[1e-3,1e-3]"
+LOAD = {"pressure": 1.0e5}
+
+
+def is_map(path: Path) -> bool:
+    """Whether a name is that of a measured map, not of a job."""
+    return path.suffix.lower() not in JOBS
+
+
+def load(path: Path, overrides: Sequence[str]) -> Job:
+    """The job of a whole map on its own points, with some keys changed. Raises InputError."""
+    try:
+        return jobs.load(_job_of(str(path)), overrides)
+    except InputError as error:
+        raise InputError(f"{error}; {HOW}") if any(text in str(error) for text in UNSAID) else error from None
+
+
+def refuse_taken(target: Path | None) -> None:
+    """Raise InputError where there is a file of the name of a job to start from already."""
+    if target is not None and os.path.lexists(target):
+        raise InputError(f"--job: {target} is there already; give another name")
+
+
+def start(job: Job, path: Path, target: Path | None) -> Iterator[str]:
+    """Write a job to start from to a file, or say it; maps of very many points are thinned out. Raises RunError."""
+    directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
+    found = _job_of(os.path.relpath(path, directory))
+    found["surface"] |= {key: value for key, value in plain(job.surface[0]).items() if _is_given(job.surface[0], key)}
+    coarser = math.ceil(math.sqrt(grid.nx * grid.ny / MANY_POINTS))
+    if coarser > 1:
+        found["grid"]["points"] = [grid.nx // coarser, grid.ny // coarser]
+    found["history"].append({"name": "slide", **LOAD, "velocity": 0.1, "distance": float(f"{grid.lx / 4:.3g}")})
+    text = yamltext.dump(found)
+    if target is None:
+        yield f"\na job to start from, which --job FILE writes:\n\n{text.rstrip()}"
+        return
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        files.write(target, text)
+    except OSError as error:
+        raise RunError(f"{target} cannot be written: {error}") from error
+    yield f"job: {target}"
+
+
+def _job_of(path: str) -> dict[str, Any]:
+    return {
+        "title": Path(path).name,
+        "grid": {"points": "from surface", "size": "from surface"},
+        "surface": {"shape": "topography", "path": path},
+        "material": {"include": "synthetic_tyre"},
+        "history": [{"name": "press", **LOAD, "duration": 1.0e-3}],
+        "output": {"fields": ["pressure", "gap"], "every": 64},
+    }
+
+
+def _is_given(part: Any, key: str) -> bool:
+    return key != "path" and getattr(part, key) != Topography.model_fields[key].default

@@ -1,0 +1,163 @@
+"""sweep.csv: what the cases of a sweep have come to, a row each; sweep_mean.csv: their means over seeds."""
+
+import csv
+import fcntl
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from io import StringIO
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Any
+
+from ..errors import InputError
+from ..job import Case, Steady
+from ..storage import curve_points, files, measures
+from . import slide
+
+TABLE = "sweep.csv"
+RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
+COLUMNS = ("state", *RESULTS, "residual", *slide.ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
+NUMBERS = frozenset(COLUMNS) - {"state"}
+MEND = "run the sweep again, which writes the table anew"
+MEANS = "mean", "std", "sem"
+SEED = "seed"  # the last word of keys over whose values means are taken
+FAILURE = ".failure"  # why a case has failed
+
+
+def write(directory: Path, cases: Sequence[Case]) -> None:
+    """Both tables in the directory of a sweep, from what its cases have left in theirs; root only.
+
+    Several programs, each with a case, may do so at a time.
+    """
+    with _alone(directory):
+        rows = [_row(case) for case in cases]
+        keys = list(cases[0].settings)
+        save(directory / TABLE, ["case", *keys, *COLUMNS], rows)
+        if any(key.split(".")[-1] == SEED for key in keys):
+            save(directory / "sweep_mean.csv", *_means(rows, keys))
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """The rows of a table, numbers as such, an empty field as nan. Raises InputError for what is no such table."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        names, *rows = list(csv.reader(StringIO(text, newline=""))) or [[]]
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if names[:1] != ["case"] or "state" not in names:
+        raise InputError(f"{path} is damaged: its first line must name the columns of a sweep, from case to state on")
+    for number, cells in enumerate(rows, 2):
+        if len(cells) != len(names) or not (cells[0].isdecimal() and len(cells[0]) < 10):
+            raise InputError(
+                f"{path}, line {number}: the number of a case and {len(names) - 1} values more were expected, got "
+                f"{','.join(cells)[:60]!r}"
+            )
+        for name, cell in zip(names, cells, strict=True):
+            if name in NUMBERS and not isinstance(_number(cell), float):
+                raise InputError(f"{path}, line {number}: {name} is {cell[:20]!r}, not a number; {MEND}")
+    if not text.endswith("\n"):
+        raise InputError(f"{path} ends within line {len(rows) + 1}; {MEND}")
+    return [dict(zip(names, map(_number, cells), strict=True)) for cells in rows]
+
+
+def fail(case: Case, reason: str) -> None:
+    """Leave in the directory of a case why it has failed, or that it has not; root only."""
+    path = case.job.output.directory / FAILURE
+    with suppress(OSError):
+        if reason:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{reason}\n")
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _row(case: Case) -> dict[str, Any]:
+    directory = case.job.output.directory
+    row: dict[str, Any] = {"case": case.number, **case.settings, "state": state(case)}
+    for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
+        there = (directory / name).is_file()
+        columns: dict[str, list[float]] = measures.read(directory / name) if there else {"time": []}
+        if columns["time"]:
+            found = slide.measure(case.job.history, columns)
+            row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
+            row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
+        if columns["time"] and not prefix:
+            row["seconds"] = math.fsum(columns["seconds"])
+            row["residual"] = slide.largest(columns["residual"])
+            row |= slide.errors(case.job.history, columns)
+    return row
+
+
+def state(case: Case) -> str:
+    """How far a case has come: done | failed | begun | -"""
+    directory = case.job.output.directory
+    if (directory / FAILURE).is_file():
+        return "failed"
+    table = directory / ("measures.csv" if case.job.history else "steady.csv")
+    if not table.is_file():
+        return "-"
+    columns = measures.read(table)
+    if not case.job.history:
+        return "begun" if _points_lack(case.job.steady, columns) else "done"
+    steps = [int(step) for step in columns["step"]]
+    timeline = case.job.timeline().follow(dict(zip(steps, columns["time"], strict=True)))
+    return "done" if steps and steps[-1] >= len(timeline) else "begun"
+
+
+def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
+    """Whether a friction curve has not all points that its job asks for."""
+    asked = (
+        curve_points.asked(section.velocities, section.pressures or (), section.temperatures or ()) if section else ()
+    )
+    return bool(curve_points.lacking(asked, curve_points.of_table(columns)))
+
+
+def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:
+    """Mean, standard deviation of a single case, standard error of the mean, and number, over the cases that differ by
+    their seeds only."""
+    kept = [key for key in keys if key.split(".")[-1] != SEED]
+    names = [name for name in COLUMNS if name in RESULTS or name.startswith("theory_")]
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault(repr([row[key] for key in kept]), []).append(row)
+    table = []
+    for group in groups.values():
+        out = {key: group[0][key] for key in kept} | {"number": sum(row["state"] == "done" for row in group)}
+        for name in names:
+            values = [row[name] for row in group if row["state"] == "done" and name in row]
+            if values:
+                std = stdev(values) if len(values) > 1 else math.nan
+                numbers = fmean(values), std, std / math.sqrt(len(values))
+                out |= {f"{name}_{what}": number for what, number in zip(MEANS, numbers, strict=True)}
+        table.append(out)
+    return [*kept, "number", *(f"{name}_{what}" for name in names for what in MEANS)], table
+
+
+def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+    """Replace a table by these rows."""
+    text = StringIO()
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({key: _text(value) for key, value in row.items()} for row in rows)
+    files.write(path, text.getvalue())
+
+
+def _text(value: Any) -> Any:
+    return ("" if value != value else repr(value)) if isinstance(value, float) else value
+
+
+def _number(text: str) -> Any:
+    with suppress(ValueError):
+        return float(text or "nan")
+    return text
+
+
+@contextmanager
+def _alone(directory: Path) -> Iterator[None]:
+    """One at a time, where the file system knows locks: the last one to write has seen what all others left."""
+    directory.mkdir(parents=True, exist_ok=True)
+    with (directory / ".sweep.lock").open("w") as file:
+        with suppress(OSError):
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,135 @@
+"""Maps in pictures, films and reports: one look, told when and under what load, and no scale that is made up."""
+
+import io
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from drawing import ELASTIC, LOADS, SPHERE, STRIP, WAVE, ZENER, ran
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from parcontact.plotting import frames, maps, movie, plots
+from parcontact.plotting.run import Fields, Run, frame_label
+from parcontact.report import browse
+
+ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
+CREEP = "history: [{pressure: 1.0e3, duration: 2.0e-3, time_step: 2.0e-3}]\n"
+UNLOAD = (
+    "history: [{force: 0.1, duration: 1.0e-3, time_step: 1.0e-3}, {force: 0, duration: 1.0e-3, time_step: 1.0e-3}]\n"
+)
+
+
+def mesh(axes: Axes) -> QuadMesh:
+    (found,) = (one for one in axes.collections if isinstance(one, QuadMesh))
+    return found
+
+
+def values(found: QuadMesh) -> NDArray[np.float64]:
+    return np.ma.filled(np.ma.asarray(found.get_array()), np.nan).ravel()
+
+
+def maps_of(figure: Figure) -> dict[str, Axes]:
+    """By their titles."""
+    return {
+        axes.get_title(): axes
+        for axes in figure.axes
+        if any(isinstance(one, QuadMesh) for one in axes.collections) and axes.get_xlabel()
+    }
+
+
+def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Films and reports draw one map after the other as pictures do: the same colours of the same numbers, the same
+    points without a value, in the same colour."""
+    out = ran(tmp_path, WAVE + ELASTIC + LOADS + ALL)
+    plots.plot([out])
+    found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
+    assert set(found) == {"pressure", "gap", "height"}
+    assert all(vars(drawing)["Frames"] is frames.Frames for drawing in (browse, movie))
+    assert browse.of_run(Run(out))[0].labels == ["1 kPa (step 1)", "2 kPa (step 2)"]
+    with h5py.File(out / "fields.h5") as file:
+        for name, axes in found.items():
+            film = frames.Frames(file, name, [1])
+            film.show(1, "")
+            ours, theirs = mesh(film.axes), mesh(axes)
+            assert ours.get_cmap().name == theirs.get_cmap().name == maps.LOOKS[name].colors
+            assert film.axes.get_facecolor() == axes.get_facecolor()
+            assert (ours.norm.vmin, ours.norm.vmax) == (theirs.norm.vmin, theirs.norm.vmax)
+            np.testing.assert_array_equal(values(ours), values(theirs))
+            assert np.isnan(values(ours)).any() == (name != "height")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (WAVE + ELASTIC + LOADS, "2 kPa"),
+        (WAVE + ZENER + CREEP, "2 ms, 1 kPa"),
+        (SPHERE + ELASTIC + "history: [{force: 0.1}]\n", "100 mN"),
+        (SPHERE + ELASTIC + "history: [{approach: 1.0e-5}]\n", "approach 10 µm"),
+    ],
+)
+def test_when_and_under_what_load(tmp_path: Path, drawn: list[Figure], text: str, told: str) -> None:
+    """Time if there is any, and what is prescribed, in titles of maps as in those of films and reports."""
+    out = ran(tmp_path, text + ALL)
+    plots.plot([out])
+    assert set(maps_of(drawn[0])) == {
+        f"pressure\n{told}",
+        f"gap (contact black)\n{told}",
+        f"height (up is into the body)\n{told}",
+    }
+    run = Run(out)
+    with h5py.File(out / "fields.h5") as file:
+        fields = Fields(file)
+        last = fields.saved[-1]
+        assert frame_label(run, fields, last) == f"{told} (step {fields.steps[last]})"
+
+
+def test_lines_are_told_apart(tmp_path: Path, drawn: list[Figure]) -> None:
+    """By time and load if both change; a load that all have is in the title."""
+    (tmp_path / "strip").mkdir()
+    plots.plot([ran(tmp_path, SPHERE + ZENER + UNLOAD + ALL), ran(tmp_path / "strip", STRIP + ZENER + CREEP + ALL)])
+    titled = {axes.get_title(): axes for figure in drawn for axes in figure.axes}
+    line, strip = titled["pressure on a line through the axis"], titled["pressure at the saved instants, 1 kPa"]
+    assert {"1 ms, 100 mN", "2 ms, 0 N"} < {str(one.get_label()) for one in line.get_lines()}
+    assert [str(one.get_label()) for one in strip.get_lines()][-1] == "2 ms"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "ticks"),
+    [
+        ("gap", WAVE + ELASTIC + "history: [{pressure: 1.0e5}]\n", None),
+        ("pressure", SPHERE + ELASTIC + "history: [{force: 0.1}, {force: 0}]\n", None),
+        ("displacement", SPHERE + ELASTIC + "history: [{force: 0.1}, {force: 0}]\n", [0.0]),
+    ],
+)
+def test_no_scale_of_nothing(
+    tmp_path: Path, drawn: list[Figure], name: str, text: str, ticks: list[float] | None
+) -> None:
+    """A gap where all is closed and pressures where nothing presses have no numbers; a displacement of zero has one."""
+    out = ran(tmp_path, text + f"output: {{fields: [pressure, {name if name != 'pressure' else 'gap'}]}}\n")
+    plots.plot([out])
+    (axes,) = (axes for title, axes in maps_of(drawn[0]).items() if title.startswith(name))
+    with h5py.File(out / "fields.h5") as file:
+        film = frames.Frames(file, name, [len(file["step"]) - 1])
+        film.show(len(file["step"]) - 1, "")
+        for found in (mesh(axes), mesh(film.axes)):
+            assert (found.colorbar is None) == (ticks is None)
+            if found.colorbar is not None:
+                assert list(found.colorbar.get_ticks()) == ticks
+
+
+def test_rare_colours_stay() -> None:
+    """A map of nearly one value leaves the colours of its scale as they are, to 2 %."""
+    scale = np.vstack([np.linspace(0.3, 1.0, 256)] * 500 + [np.linspace(0.0, 1.0, 256)])
+    colors = (255 * colormaps["viridis"](scale)[..., :3]).round().astype(np.uint8)
+    colors[:200] = 255  # the paper, and grey around letters
+    colors[:2] = np.arange(256)[None, :, None]
+    file = io.BytesIO()
+    Image.fromarray(colors).save(file, "png")
+    found = np.asarray(Image.open(io.BytesIO(browse.fewer_colours(file))).convert("RGB"))
+    assert np.abs(found.astype(int) - colors).max() <= 0.02 * 255

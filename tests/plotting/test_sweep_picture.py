@@ -1,0 +1,99 @@
+"""Charts of a sweep, as numbers: which key is along x, which rows are a line, where the theory is."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drawing import ELASTIC, LOADS, WAVE, outside, touching
+from matplotlib.figure import Figure
+
+from parcontact import job
+from parcontact.plotting import sweep
+from parcontact.plotting.plots import Options, plot
+
+SIZES = (1e-3, 2e-3, 3e-3)
+HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "state", "mu_max", "mu_dyn", "contact_area")
+
+
+def saved(directory: Path, *rows: tuple[Any, ...], head: tuple[str, ...] = (*HEAD, "theory_mu_max")) -> Path:
+    with (directory / "sweep.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([head, *rows])
+    return directory
+
+
+def case(velocity: float, seed: int, friction: float | str, size: float = 1.0, theory: float = 0.5) -> tuple[Any, ...]:
+    return (0, velocity, velocity, seed, size, "done", friction, 0.1, 0.2, theory)
+
+
+def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
+    """Cases that are not done yet are left out; keys that move together are one."""
+    rows = [case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(20.0, 1, 7.0, theory=0.7), case(20.0, 2, "", theory=0.7)]
+    friction, area = sweep.charts(saved(tmp_path, *rows))
+    assert (friction.key, friction.x.name, friction.x.unit, friction.log_x) == ("friction", "velocity", "m/s", True)
+    highest, cases, theory, *dynamic = friction.series
+    assert highest.y.tolist() == [4.0, 7.0]
+    assert cases.y.tolist() == [3.0, 5.0, 7.0]
+    assert theory.y.tolist() == [0.5, 0.7]
+    assert {one.look["color"] for one in (highest, cases, theory)} == {highest.look["color"]}
+    assert [one.name for one in (highest, theory, *dynamic)] == ["highest", "theory", "dynamic", ""]
+    assert np.allclose(area.series[0].y, 0.2)
+
+
+def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
+    rows = [case(v, 1, 10 * v + size, size) for v in (1.0, 2.0) for size in (1e-3, 2e-3)]
+    friction, _ = sweep.charts(saved(tmp_path, *rows))
+    lines = [one for one in friction.series if one.name.startswith("highest")]
+    assert [(one.name, one.y.tolist()) for one in lines] == [
+        ("highest, 1 mm", [10.001, 20.001]),
+        ("highest, 2 mm", [10.002, 20.002]),
+    ]
+    assert not friction.log_x
+
+
+@pytest.mark.parametrize("rows", [[], [case(1.0, 1, 3.0), case(1.0, 2, 3.0)], [case(1.0, 1, ""), case(2.0, 1, "")]])
+def test_nothing_to_draw(tmp_path: Path, rows: list[tuple[Any, ...]]) -> None:
+    found = sweep.charts(saved(tmp_path, *rows))
+    assert [chart.key for chart in found] in ([], ["friction", "area"])
+    assert all(np.isfinite(one.y).all() for chart in found for one in chart.series)
+
+
+def test_the_picture(tmp_path: Path) -> None:
+    (picture,) = plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))], Options())
+    assert picture == tmp_path / "picture.png"
+    assert picture.stat().st_size > 10_000
+
+
+def test_the_title_is_that_of_the_job(tmp_path: Path, drawn: list[Figure]) -> None:
+    """As the first case has it; without a case that of the directory."""
+    saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))
+    plot([tmp_path], Options())
+    (tmp_path / "cases" / "000").mkdir(parents=True)
+    (tmp_path / "job.yaml").write_text(f"title: A road at several speeds\n{WAVE}{ELASTIC}{LOADS}")
+    (tmp_path / "cases" / "000" / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    plot([tmp_path], Options())
+    assert [figure.get_suptitle() for figure in drawn] == [tmp_path.name, "A road at several speeds"]
+
+
+def test_dots_of_cases_have_a_key(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Once: those of every line look alike. None where each case is a point of the line."""
+    plot([saved(tmp_path, case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(2.0, 1, 7.0))], Options())
+    plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 7.0))], Options())
+    legends = [figure.axes[0].get_legend() for figure in drawn]
+    names = [[text.get_text() for text in legend.get_texts()] for legend in legends if legend is not None]
+    assert names == [["highest", "each case", "theory", "dynamic"], ["highest", "theory", "dynamic"]]
+    assert not touching(drawn[0])
+
+
+def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Three values of a second key, means, cases and theories: thirteen names on the page, and none over a line."""
+    rows = [case(v, seed, v * seed + 1e3 * size, size) for v in (1.0, 2.0) for seed in (1, 2) for size in SIZES]
+    plot([saved(tmp_path, *rows)], Options())
+    (figure,) = drawn
+    assert not touching(figure)
+    assert not outside(figure)
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        assert legend is not None
+        assert legend.get_window_extent().x0 >= axes.get_window_extent().x1

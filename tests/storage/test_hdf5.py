@@ -1,0 +1,133 @@
+"""Files that all ranks write together: the same bytes whichever way, and one error for all."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact.errors import RunError
+from parcontact.parallel.slab import Array, Slab
+from parcontact.storage import hdf5, layout
+from parcontact.storage.hdf5 import Part
+
+pytestmark = pytest.mark.mpi
+
+
+def field(slab: Slab, seed: int = 0) -> Array:
+    """This rank's rows of a map that does not depend on the number of ranks."""
+    return np.random.default_rng(seed).standard_normal((slab.ny, slab.nx))[slab.rows]
+
+
+def make(path: Path, slab: Slab, names: tuple[str, ...] = ("a", "group/b")) -> None:
+    def build(file: h5py.File) -> None:
+        for name in names:
+            layout.fixed(file, name, (slab.ny, slab.nx), np.float64)
+        layout.fixed(file, "stack", (3, slab.ny, slab.nx), np.float64)
+        layout.fixed(file, "t", (3,), np.float64)
+        file.attrs["text"] = np.bytes_("x")
+
+    layout.lay_out(path, slab, build)
+
+
+@pytest.mark.parametrize("ny", [1, 2, 7, 16])  # with 3 and 4 ranks, some have no rows
+@pytest.mark.parametrize(("writes", "reads"), [(False, False), (False, True), (True, False)])
+def test_both_ways_are_interchangeable(
+    communicators: list[MPI.Intracomm], shared_path: Path, ny: int, writes: bool, reads: bool
+) -> None:
+    """`in_turn` or not, on any number of ranks: what one writes, all others read."""
+    for writer in communicators:
+        slab = Slab(writer, 5, ny)
+        path = shared_path / f"{writer.size}.h5"
+        make(path, slab)
+        a, b = field(slab, 1), field(slab, 2)
+        hdf5.write(path, slab, [Part("a", (), a), Part("group/b", (), b), Part("stack", (2,), a)], in_turn=writes)
+        for reader in communicators:
+            if reader.size > writer.size:
+                continue  # ranks that have not come to this file yet
+            other = Slab(reader, 5, ny)
+            found = [np.full(other.shape, np.nan) for _ in range(3)]
+            names: tuple[tuple[str, tuple[int, ...]], ...] = (("a", ()), ("group/b", ()), ("stack", (2,)))
+            hdf5.read(path, other, [Part(*n, rows) for n, rows in zip(names, found, strict=True)], in_turn=reads)
+            for rows, seed in zip(found, (1, 2, 1), strict=True):
+                assert np.array_equal(rows, field(other, seed))
+
+
+def test_same_bytes(comm: MPI.Intracomm, shared_path: Path) -> None:
+    slab = Slab(comm, 6, 9)
+    for name, in_turn in (("together.h5", False), ("in turn.h5", True)):
+        make(shared_path / name, slab)
+        hdf5.write(shared_path / name, slab, [Part("a", (), field(slab)), Part("stack", (1,), field(slab))], in_turn)
+    comm.Barrier()
+    assert (shared_path / "together.h5").read_bytes() == (shared_path / "in turn.h5").read_bytes()
+
+
+def test_writing_leaves_all_else_alone(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Structure, attributes and other maps keep their bytes: the file is readable while it is written."""
+    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
+    make(path, slab)
+    comm.Barrier()
+    before = path.read_bytes()
+    comm.Barrier()
+    hdf5.write(path, slab, [Part("a", (), field(slab))])
+    comm.Barrier()
+    after = path.read_bytes()
+    with h5py.File(path) as file:
+        start, length = file["a"].id.get_offset(), file["a"].nbytes
+    assert len(before) == len(after)
+    assert before[:start] == after[:start]
+    assert before[start + length :] == after[start + length :]
+
+
+@pytest.mark.parametrize("in_turn", [False, True])
+def test_one_error_for_all(comm: MPI.Intracomm, shared_path: Path, in_turn: bool) -> None:
+    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
+    with pytest.raises(RunError, match=r"cannot open .*absent\.h5: No such file"):
+        hdf5.write(shared_path / "absent.h5", slab, [Part("a", (), field(slab))], in_turn)
+    make(path, slab)
+    with pytest.raises(RunError, match=r"cannot write .*file\.h5"):
+        hdf5.write(path, slab, [Part("a", (), field(slab)), Part("absent", (), field(slab))], in_turn)
+    with pytest.raises(RunError, match=r"cannot make .*: No such file"):
+        make(shared_path / "absent" / "file.h5", slab)
+
+
+def test_error_of_one_rank(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """A rank whose rows do not fit fails, and all of them say why."""
+    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
+    make(path, slab)
+    rows = field(slab)
+    if comm.rank == comm.size - 1:
+        rows = np.zeros((slab.shape[0] + 50, 6))
+    with pytest.raises(RunError, match="cannot write"):
+        hdf5.write(path, slab, [Part("a", (), rows), Part("group/b", (), field(slab))])
+
+
+def test_change_keeps_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
+    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
+    make(path, slab)
+    hdf5.write(path, slab, [Part("a", (), field(slab))])
+    layout.change(path, slab, lambda file: file.attrs.modify("text", np.bytes_("y")))
+    with pytest.raises(RunError, match="its length may not change"):
+        layout.change(path, slab, lambda file: file.attrs.create("more", "z" * 100_000))
+    hdf5.on_root(slab, lambda: layout.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
+    rows = np.empty(slab.shape)
+    hdf5.read(path, slab, [Part("a", (), rows)])
+    assert np.array_equal(rows, field(slab))
+    with h5py.File(path) as file:
+        assert file.attrs["text"] == b"y"
+        assert np.array_equal(file["t"][...], [1.0, 2.0, np.nan], equal_nan=True)
+
+
+def test_regions_and_what_is_outside(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Together they are every byte of a file once."""
+    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
+    make(path, slab)
+    with h5py.File(path) as file:
+        found = layout.regions(file)
+    size = path.stat().st_size
+    covered = np.zeros(size, dtype=int)
+    for start, stop in [*found, *layout.outside(size, found)]:
+        covered[start:stop] += 1
+    assert (covered == 1).all()
+    assert sum(stop - start for start, stop in found) == (2 + 3) * 6 * 9 * 8

@@ -1,0 +1,139 @@
+"""Highest and dynamic friction of a slide, from made-up rows."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from parcontact.job import Job, Stage
+from parcontact.summary.slide import describe, mean_over_end, measure, ripple
+
+REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
+CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}
+SETTLE = {"pressure": 1.0, "velocity": 2.0, "distance": 3.0, "cells_per_step": 1}
+SLOW = {**CLIMB, "velocity": 0.5}
+BACK = {**CLIMB, "velocity": -2.0}
+
+
+def stages(*data: dict[str, Any]) -> list[Stage]:
+    return [Stage.model_validate(one) for one in data]
+
+
+def said(history: list[dict[str, Any]], table: dict[str, list[float]], cell: float = 0.1, **more: Any) -> list[str]:
+    """The sentences about the slide of a job with such a history, on cells of so many metres."""
+    data = {"grid": {"points": 8, "size": 8 * cell}, "surface": {"shape": "wave", "amplitude": 1e-9, "waves": [1, 1]}}
+    material = {"model": "elastic", "shear_modulus": 1e6}
+    return list(describe(Job.model_validate({**data, "material": material, "history": history, **more}), table))
+
+
+def rows(*rows: tuple[float, float, float]) -> dict[str, list[float]]:
+    """Time, distance, friction; the area is one tenth of friction."""
+    time, distance, friction = (list(column) for column in zip(*rows, strict=True))
+    area = [value / 10 for value in friction]
+    return {"time": time, "distance": distance, "friction": friction, "contact_area": area}
+
+
+def test_mean_over_the_last_share() -> None:
+    """Of a line over uneven steps, the value in the middle of the share; what was before does not matter."""
+    x = np.array([1.0, 1.1, 1.7, 2.9, 3.0, 5.0])
+    assert mean_over_end(x, 2.0 * x) == pytest.approx(2.0 * 3.5, rel=1e-14)
+    assert mean_over_end(x, np.where(x < 2.0, 9.0, 1.0), 0.25) == pytest.approx(1.0, rel=1e-14)
+
+
+def test_all_stages_at_one_velocity_are_one_slide() -> None:
+    """From the last row before it; what friction was before, higher or not, is not of the slide."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
+    found = measure(stages(REST, CLIMB, SETTLE), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_max_distance) == (4.0, 1.0)
+    assert found.mu_dyn == pytest.approx((3.0 * 1 + 2.0 * 2) / 3, rel=1e-14)  # over the last 3 of 4 m
+    assert found.contact_area == pytest.approx(found.mu_dyn / 10, rel=1e-14)
+
+
+@pytest.mark.parametrize("before", [SLOW, BACK])
+def test_another_velocity_before_is_another_slide(before: dict[str, Any]) -> None:
+    table = rows((0, 0, 9), (0.5, 1, 8), (0.6, 1.2, 3), (1.0, 2.0, 3))
+    found = measure(stages(before, CLIMB), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_max_distance, found.mu_dyn) == (3.0, pytest.approx(0.2), pytest.approx(3.0))
+
+
+def test_what_comes_after_the_slide_is_not_of_it() -> None:
+    table = rows((0, 0, 2), (0.25, 0.5, 2), (0.5, 1, 2), (1.0, 1, 5), (1.5, 1, 5))
+    found = measure(stages(CLIMB, REST), table)
+    assert found is not None
+    assert (found.mu_max, found.mu_dyn) == (2.0, pytest.approx(2.0))
+
+
+@pytest.mark.parametrize(
+    ("history", "table"),
+    [
+        ([REST], rows((0, 0, 1), (1, 0, 1))),
+        ([REST, CLIMB], rows((0, 0, 1), (1, 0, 1))),  # it has not come so far
+        ([CLIMB], rows((0, 0, 1))),
+    ],
+)
+def test_no_slide(history: list[dict[str, Any]], table: dict[str, list[float]]) -> None:
+    assert measure(stages(*history), table) is None
+
+
+def test_sentences_about_a_slide() -> None:
+    """Each number with what it is; errors as far as they are known, the largest of the slide alone."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
+    table["error_friction"] = [float("nan"), 0.5, 0.02, 0.03, float("nan"), 0.01]
+    assert said([REST, CLIMB, SETTLE], table) == [
+        "mu_max, the highest friction of the slide, is 4 +- 0.12, after 1 m of it",
+        "mu_dyn, the mean friction over the last three quarters of its 4 m, is 2.33333",
+        "the mean contact area over the same is 0.233333",
+        "largest errors of the steps of the slide: friction 3 %",
+    ]
+    assert not said([REST], table)
+
+
+def test_sentences_about_a_slide_that_others_follow() -> None:
+    """As long as the last slide has not begun; then the sentences are about that one."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2))
+    history = [REST, CLIMB, REST, {**CLIMB, "velocity": 3.0}]
+    told = said(history, table)
+    assert told[0] == "the last slide has not begun; what follows is of the one before it, which ends with history.1"
+    assert told[1:] == said(history[:2], table)
+    assert measure(stages(*history), table) is None
+    assert len(said([REST, CLIMB, SETTLE], rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)))) == 3
+    begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
+    assert said(history, begun)[0] == "mu_max, the highest friction of the slide, is 7, after 1.5 m of it"
+
+
+def test_mu_max_on_a_ripple() -> None:
+    """Of a height of 1 and the period of the cell, in steps of an eighth of it: its mean over a cell is 1 less, by
+    trapezoids to round-off. Steps of a cell do not show it."""
+    x = np.arange(0.0, 4.0 + 1e-9, 0.125)
+    friction = 5.0 + np.cos(2 * np.pi * x)
+    assert ripple(x, friction, 16, 1.0) == pytest.approx(1.0, rel=1e-12)
+    assert ripple(x[::8], friction[::8], 2, 1.0) == 0.0
+    table = rows(*zip(x / 2.0, x, friction, strict=True))
+    told = said([{**CLIMB, "duration": 2.0}], table, 1.0)[0]
+    assert "is 6 +- 1 (1 of it a ripple with the period of a cell), after" in told
+
+
+def test_a_steady_start_that_does_not_last() -> None:
+    """The slide that goes on from it has the same friction; a difference beyond the errors of both is told, one within
+    them is not, nor one to a slide under another load."""
+    start: Any = {"initial": {"state": "steady", "velocity": 2.0, "pressure": 1.0}}
+    table = rows((0, 0, 3), (0.25, 0.5, 4), (0.5, 1, 4))
+    table["error_friction"] = [0.1, 0.1, 0.1]  # of 3, and of the slide's 3.92
+    text = "friction left the 3 of the steady start by 0.92, more than the errors of both, 0.69: "
+    assert said([CLIMB], table, **start)[-1].startswith(text)
+    assert "left" not in said([{**CLIMB, "pressure": 2.0}], table, **start)[-1]
+    table["error_friction"] = [0.2, 0.2, 0.2]
+    assert "left" not in said([CLIMB], table, **start)[-1]
+
+
+def test_the_area_whose_error_is_told_and_friction_that_is_all_error() -> None:
+    """The corrected area stands beside the counted one; an error of more than all of friction is said to be that."""
+    table = rows((0, 0, 3), (0.25, 0.5, 4), (0.5, 1, 4))
+    table["contact_area_corrected"] = [0.8 * area for area in table["contact_area"]]
+    table["error_friction"] = [float("nan"), 0.1, 1.1]
+    told = said([CLIMB], table)
+    assert "the mean contact area over the same is 0.391667, corrected by its edges 0.313333" in told
+    assert "largest errors of the steps of the slide: friction 110 %" in told
+    assert told[-1] == "friction of some of its steps cannot be told from no friction"
