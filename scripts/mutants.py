@@ -25,8 +25,8 @@ LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
 SURFACE = ("tests/physics/test_surface.py", "tests/physics/test_surface_forces.py")
 CONTACT = tuple(f"tests/solve/test_contact{part}.py" for part in ("", "_symmetries", "_cost", "_failures"))
-VISCOELASTIC = ("tests/test_viscoelastic.py", "tests/test_viscoelastic_scales.py")
-SLIDING = tuple(f"tests/test_sliding_{part}.py" for part in ("waves", "runs", "examples", "cost"))
+VISCOELASTIC = ("tests/scenarios/test_viscoelastic.py", "tests/scenarios/test_viscoelastic_scales.py")
+SLIDING = tuple(f"tests/scenarios/test_sliding_{part}.py" for part in ("waves", "runs", "examples", "cost"))
 PARTS = {  # files of the program, and the tests that answer for them
     "physics/body.py": ("tests/physics/test_material.py", *VISCOELASTIC),
     "physics/energy.py": ("tests/physics/test_energy.py",),
@@ -44,7 +44,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "physics/time_error.py": ("tests/physics/test_budget.py",),
     "parallel/fft.py": ("tests/parallel/test_fft.py",),
     "parallel/slab.py": ("tests/parallel/test_slab.py",),
-    "solve/contact.py": (*CONTACT, "tests/stability/test_descent.py"),
+    "solve/contact.py": (*CONTACT, "tests/robustness/test_descent.py"),
     "solve/kernels.py": ("tests/solve/test_kernels.py", *CONTACT),
     "solve/steady.py": ("tests/test_steady_states.py",),
     "solve/projected.py": ("tests/solve/test_projected.py", "tests/test_steady_states.py"),
@@ -53,7 +53,11 @@ PARTS = {  # files of the program, and the tests that answer for them
     "solve/active_set.py": ("tests/solve/test_active_set.py", "tests/test_retry.py"),
     "march/choosing.py": ("tests/test_choosing.py", "tests/test_chosen_steps.py", "tests/test_steps_after_a_jump.py"),
     "march/starts.py": ("tests/test_starts.py",),
-    "march/errors.py": ("tests/test_sliding_waves.py", "tests/test_chosen_steps.py", "tests/test_half_mesh.py"),
+    "march/errors.py": (
+        "tests/scenarios/test_sliding_waves.py",
+        "tests/test_chosen_steps.py",
+        "tests/test_half_mesh.py",
+    ),
     "march/step.py": (*VISCOELASTIC, *SLIDING, "tests/test_retry.py"),
     "march/rest.py": ("tests/test_stationary.py",),
     "job/timeline.py": ("tests/test_clock.py", *VISCOELASTIC),

@@ -6,9 +6,9 @@
     .venv/bin/python scripts/random_scenes.py --mixed [--scenes 250] [--seed 77]
 
 Each scene is marched twice, the second time told in another way (raised, in other units, mirrored, transposed), until
-there are at least so many scenes and steps. Every step is checked as in tests/stability/witness.py. A solve that asks
+there are at least so many scenes and steps. Every step is checked as in tests/robustness/witness.py. A solve that asks
 for more digits than double precision has may fail, and is counted; no other may. `--long` marches one small scene back
-and forth for so many steps and looks for drift, as tests/stability/test_long.py does for fewer. Ends with 0 if all
+and forth for so many steps and looks for drift, as tests/robustness/test_long.py does for fewer. Ends with 0 if all
 held; a scene that did not is made again by `--from ITS_NUMBER --scenes 1 --steps 0` with the same seed.
 `--mixed` counts in how many scenes mixed precision fails, or gives a contact area off by more than 1 %, where double
 precision solves them, all at the default tolerance.
@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from stability import histories
-from stability.scenes import Sketch, sketch
-from stability.trial import Trial, trial
+from robustness import histories
+from robustness.scenes import Sketch, sketch
+from robustness.trial import Trial, trial
 
 from parcontact.errors import RunError
 from parcontact.job import Numerics

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from marching import begun
-from test_cli import JOB
+from short_job import JOB
 
 from parcontact.__main__ import main
 from parcontact.march.failure import StepError

@@ -19,7 +19,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.storage import wisdom
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
 as_others = pytest.mark.skipif(os.geteuid() != 0, reason="only root can be somebody else")
 

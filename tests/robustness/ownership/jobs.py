@@ -4,12 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import short_job
 import yaml
 
 JOB: dict[str, Any] = {
-    "grid": {"points": [16, 12], "size": [1e-3, 7.5e-4]},
-    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
-    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    **short_job.JOB,
     "history": [{"pressure": 1e4, "velocity": 0.1, "distance": 6.25e-4, "cells_per_step": 1}],
     "output": {"fields": ["pressure"]},
     "checkpoint": {"every": 1, "keep": 100},

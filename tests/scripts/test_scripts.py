@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "scripts").glob("*.py"))
 SCRIPTS = [path for path in FILES if "__main__" in path.read_text()]  # the others serve them
 
@@ -51,11 +51,11 @@ SMALL = {
         ["--trials", "1", "--around", "1", "--flips", "4", "--backs", "1", "--fills", "0", "--shorter", "4"], r""
     ),
     "fuzz_jobs": Small(["--jobs", "40", "--processes", "1"], r"(?m)^40 jobs: 0 with faults; "),
-    "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/test_disturbed.py
+    "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^2\d pages in pages"),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
-    "paper_claims": Small(["--from", "nowhere"], r"", (1,)),  # it reads sweeps: tests/test_paper.py has some
+    "paper_claims": Small(["--from", "nowhere"], r"", (1,)),  # it reads sweeps: tests/scenarios/test_paper.py has some
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "profile_solve": Small(["128"], r"(?m)^FFTs .*%"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"0 violations, 0 failed solves"),

@@ -10,7 +10,7 @@ import pytest
 
 from parcontact.__main__ import main
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 NOTE = "{{ printf '%s|' {0} \"$@\"; echo; }} >> said"
 STUBS = {
     "squeue": "date --iso-8601=seconds --date @2000000000",
