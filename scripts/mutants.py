@@ -63,7 +63,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "job/timeline.py": ("tests/test_clock.py", *VISCOELASTIC),
     "job/chosen.py": ("tests/test_chosen_steps.py", "tests/test_choosing.py"),
     "storage/checkpoint.py": ("tests/storage/test_checkpoint.py",),
-    "plan/memory.py": ("tests/test_plan_memory.py", "tests/test_steady_memory.py"),
+    "plan/memory.py": ("tests/plan/test_memory.py", "tests/test_steady_memory.py"),
 }
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Add: ast.Sub,

@@ -6,7 +6,6 @@ from itertools import pairwise
 import pytest
 from marching import begun, marched
 from mpi4py import MPI
-from planned import CELLS, JOBS, MACHINE, SLIDE, TWO, Json, job
 
 from parcontact import scene
 from parcontact.command import words
@@ -17,6 +16,8 @@ from parcontact.plan.planning import try_job
 from parcontact.plan.sample import Sample, StageCost, chosen, sample
 from parcontact.plan.scaling import Scaling
 from parcontact.steady_sliding.sliding import SteadySliding
+
+from .planned import CELLS, JOBS, MACHINE, SLIDE, TWO, Json, job
 
 
 @pytest.mark.mpi(2, 3)

@@ -15,7 +15,7 @@ from mpi4py import MPI
 import parcontact as pc
 from parcontact.__main__ import main
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 JOB: dict[str, Any] = {
     "grid": {"points": [16, 12], "size": [1e-3, 7.5e-4]},
     "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from marching import marched
 from mpi4py import MPI
-from planned import JOBS, MACHINE, ROUGH, job
 
 from parcontact.parallel import pyramid
 from parcontact.parallel.slab import Slab, deal
@@ -15,6 +14,8 @@ from parcontact.plan import memory, report, trial
 from parcontact.plan.report import Costs
 from parcontact.plan.sample import sample
 from parcontact.plan.scaling import Scaling
+
+from .planned import JOBS, MACHINE, ROUGH, job
 
 
 @pytest.mark.mpi(2, 3)

@@ -4,13 +4,14 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
-from planned import MACHINE, SWEEP, job
 
 from parcontact.job import load_cases
 from parcontact.job.table import plain
 from parcontact.plan import other_ranks, whole_sweep
 from parcontact.plan.sample import Sample, StageCost
 from parcontact.plan.scaling import Machine, Scaling
+
+from .planned import MACHINE, SWEEP, job
 
 
 def test_stages_not_tried_are_like_the_others() -> None:

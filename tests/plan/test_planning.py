@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import yaml
 from mpi4py import MPI
-from planned import CELLS, MACHINE, SWEEP, TWO, job
 
 import parcontact as pc
 from parcontact import __main__, private
@@ -20,6 +19,8 @@ from parcontact.plan.planning import only_steady_states
 from parcontact.plan.report import Costs
 from parcontact.plan.sample import Sample, StageCost, sample
 from parcontact.plan.scaling import Scaling
+
+from .planned import CELLS, MACHINE, SWEEP, TWO, job
 
 
 def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

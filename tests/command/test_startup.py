@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from conftest import RunParcontact
 
-JOBS = Path(__file__).parents[1] / "jobs"
+JOBS = Path(__file__).parents[2] / "jobs"
 SLOW = ("mpi4py.MPI", "numba", "numpy", "scipy", "pyfftw", "matplotlib", "h5py", "pydantic", "yaml", "xarray")
 WATCHED = """
 import sys
