@@ -32,7 +32,7 @@ from .physics.surface import Surface
 from .physics.units import Units
 from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
 from .solve.contact import ContactSolver
-from .solve.surround import grids_for
+from .solve.preconditioner.extension import grids_for
 
 
 @dataclass

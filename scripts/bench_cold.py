@@ -16,8 +16,8 @@ from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
-from parcontact.solve import cold
 from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
+from parcontact.solve.fallback import cold_start
 
 LOAD = 0.05  # mean pressure over E*, for 11 % of contact at a slope of 1
 MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
@@ -83,7 +83,7 @@ class Cold:
     def start(self, solver: ContactSolver) -> Map:
         """From nested grids."""
         start, load = np.zeros_like(self.heights), MeanPressure(self.load * MODULUS)
-        cold.prepare(solver, self.heights, load, start, lambda slab, tolerance: self.solver(tolerance, slab=slab))
+        cold_start.prepare(solver, self.heights, load, start, lambda slab, tolerance: self.solver(tolerance, slab=slab))
         return start
 
     def go_on(self, solver: ContactSolver, start: Map) -> Contact:

@@ -13,7 +13,7 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.prony import Prony
-from parcontact.solve import proximal
+from parcontact.solve.nonsymmetric import proximal
 from parcontact.steady_sliding.sliding import SteadySliding
 
 RATIO, MODULUS, TIME = 1000.0, 1.0e6, 1.0e-3  # G0/G_inf, G_inf [Pa], relaxation time [s]

@@ -9,7 +9,7 @@ from parcontact import scene
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory, report
-from parcontact.solve import steady
+from parcontact.solve.nonsymmetric import steady
 from parcontact.steady_sliding import start
 from parcontact.steady_sliding.sliding import SteadySliding
 

@@ -14,8 +14,8 @@ from steady_scenes import CREEP_TIME, G0, RADIUS, certificate, sliding
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Array
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve import projected, steady
-from parcontact.solve.steady import SteadyContact, SteadySolver
+from parcontact.solve.nonsymmetric import projected, steady
+from parcontact.solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from parcontact.steady_sliding import sliding as steady_sliding
 from parcontact.steady_sliding.sliding import Point, SteadySliding, branch_maps
 from parcontact.theory import full_contact

@@ -17,8 +17,8 @@ from ..physics.energy import Pressed
 from ..physics.entries import Entry
 from ..physics.measures import Measures
 from ..scene import Scene, solver_in_double, solver_on
-from ..solve import cold, retry
 from ..solve.contact import Approach, Contact, ContactSolver, MeanPressure
+from ..solve.fallback import cold_start, retry
 from ..storage.checkpoint import Contents
 from ..storage.row import Row
 from . import failure, state
@@ -174,7 +174,7 @@ class March:
         start = self.starts.make(step, self.state, trial.alpha, self._next_pressure)
         self._elastic_displacement = None
         if self.state.alpha == 0.0:  # nothing has been solved before
-            cold.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
+            cold_start.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
         contact, remark = self.scene.solver.solve(trial.effective, control, start), ""
         if contact.failure:
             in_double = solver_in_double(self.scene.frame)

@@ -26,8 +26,8 @@ from ..physics.halfspace import HalfSpace
 from ..physics.lowest import shape_of
 from ..rigid_surface import highest_waves
 from ..solve.contact import ContactSolver
-from ..solve.steady import SteadySolver
-from ..solve.surround import grids_for
+from ..solve.nonsymmetric.steady import SteadySolver
+from ..solve.preconditioner.extension import grids_for
 from ..steady_sliding.sliding import tolerance_of
 
 TRANSFORMS = "transforms"  # that every job has

@@ -9,7 +9,7 @@ iteration, with `R` = keep the values on the working set and put 0 elsewhere, `C
 
 1. the working set is the contact (p > 0) and the points that penetrate (g < 0): these enter by the search direction;
 2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on beyond
-   the set (`surround`);
+   the set (`preconditioner`);
 3. direction `t = C R (z + beta t)` with a beta that makes it conjugate to the last one and makes up for what the last
    step fell short of or went too far; or `t = z` where that is much less of a descent, or where much of the last step
    was cut off;
@@ -39,9 +39,9 @@ from . import kernels
 from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
 from .local_load import LEAST, LocalLoad
-from .operator import Operator
 from .precision import precision_of_directions
-from .surround import Surround
+from .preconditioner.extension import ExtendedPreconditioner
+from .problem import Operator
 
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
@@ -91,11 +91,11 @@ class Contact:
 
 class ContactSolver:
     """Loop for contacts on one grid, and the maps that it works in: a pressure, two displacements, the direction, which
-    is in single precision where the tolerance is loose, a byte per point, and those of `Surround`.
+    is in single precision where the tolerance is loose, a byte per point, and those of `ExtendedPreconditioner`.
 
     Parameters: `slab`, who owns which rows; `operator` A and `preconditioner` K; `height` of the surface from its
     lowest to its highest point, in the unit of h; `tolerance` on the certificate; `max_iterations`; `grids` of
-    larger cells by which a residual is extended (`surround.grids_for`); `kept`, the type of displacements, single
+    larger cells by which a residual is extended (`extension.grids_for`); `kept`, the type of displacements, single
     precision where the operator has no more digits.
     """
 
@@ -116,7 +116,7 @@ class ContactSolver:
         self._other = slab.zeros()
         self._t = slab.zeros(precision_of_directions(tolerance))
         self._working = slab.zeros(np.bool_)
-        self._surround = Surround(slab, preconditioner, most=grids)
+        self._extended = ExtendedPreconditioner(slab, preconditioner, most=grids)
         self._rough_inverse = grids == 0 or min(slab.nx, slab.ny) == 1  # K E is no more than roughly the inverse
         self._local_load = LocalLoad(slab)
 
@@ -134,7 +134,7 @@ class ContactSolver:
         rows = dealt_to(ny, ranks, rank)
         maps = np.float64, kept, kept, precision_of_directions(tolerance)
         bytes_of_point = 1 + sum(np.dtype(each).itemsize for each in maps)
-        cells = Surround.footprint(nx, ny, ranks, rank, grids)
+        cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, grids)
         return bytes_of_point * (rows.stop - rows.start) * nx + cells
 
     def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
@@ -233,7 +233,7 @@ class ContactSolver:
         """
         z = reused(free, free.shape, self._t.dtype)
         kernels.residual(self._working, self._u, h, level, z)
-        self._surround.apply(self._working, z)
+        self._extended.apply(self._working, z)
         sums = kernels.products(self._working, self._u, h, level, self._w, z, self._t)
         sum_z, sum_t, sum_change, r_z, change_z, r_t = self.slab.sum(*sums)
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)

@@ -21,10 +21,11 @@ from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.seen import Seen
 from ..scene import Frame
-from ..solve import kernels, nested, proximal
+from ..solve import kernels, nested
 from ..solve.certificate import Certificate
-from ..solve.proximal import Proximal
-from ..solve.steady import SteadyContact, SteadySolver
+from ..solve.nonsymmetric import proximal
+from ..solve.nonsymmetric.proximal import Proximal
+from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 
 COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
 LOOSE, SHARE = 1e-3, 0.6  # so much of a tolerance above LOOSE leaves the contact area as right as in a march
@@ -39,7 +40,7 @@ class Point:
 
     `friction` is the power that the body dissipates, over load and velocity, and what an interface adds; that of
     `measures` is by the slopes of the rigid surface. They differ by the mesh, and `errors` is the budget of the former.
-    `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did (`solve.steady`).
+    `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did.
     `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box).
     """
 

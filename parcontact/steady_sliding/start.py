@@ -10,7 +10,7 @@ from ..march.step import March
 from ..parallel.slab import Slab
 from ..physics.body import ZenerBody
 from ..scene import Frame, build, frame
-from ..solve.steady import SteadyContact
+from ..solve.nonsymmetric.steady import SteadyContact
 from ..storage.checkpoint import Contents
 from .sliding import Point, SteadySliding, branch_maps
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from static_jobs import run
 
 from parcontact.errors import RunError
-from parcontact.solve import cold
+from parcontact.solve.fallback import cold_start
 
 BUMPS = """
 grid: {points: [48, 40], size: [1.0e-3, 8.0e-4]}
@@ -131,10 +131,10 @@ def test_only_the_first_solve_of_a_large_job_starts_on_coarser_grids(
     """With the limit lowered: its pressure is the same to the tolerance, at fewer calls; later steps start as ever."""
     words = ("grid.points=64", "surface.short_wavelength=1.25e-4", "history=[{pressure: 5.0e3}, {pressure: 6.0e3}]")
     (small, fields), (small_after, _) = run(bumps, *words)
-    monkeypatch.setattr(cold, "WORTHWHILE", 64 * 64)
+    monkeypatch.setattr(cold_start, "WORTHWHILE", 64 * 64)
     grids = list[int]()
-    start = cold.start_on_coarse_grids
-    monkeypatch.setattr(cold, "start_on_coarse_grids", lambda *all: grids.append(start(*all)))
+    start = cold_start.start_on_coarse_grids
+    monkeypatch.setattr(cold_start, "start_on_coarse_grids", lambda *all: grids.append(start(*all)))
     (large, expected), (large_after, _) = run(bumps, *words)
     assert grids == [2]
     assert_allclose(fields["pressure"], expected["pressure"], rtol=0, atol=1e-7 * expected["pressure"].max())

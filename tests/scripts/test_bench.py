@@ -13,7 +13,8 @@ from mpi4py import MPI
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
-from parcontact.solve import kernels, surround
+from parcontact.solve import kernels
+from parcontact.solve.preconditioner import extension
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +35,8 @@ def peers() -> ModuleType:
         (kernels.scale, {"p": 2}),
         (loops.travel, {"p": 1, "p_old": 1, "out": 1}),
         (loops.commit, {"displacement": 1, "buffer": 2, "u": 2, "heights": 1}),
-        (surround._add_up_back, {"cells": 1, "beside": 1, "points": 2}),  # rows of maps, picked by a function
-        (surround._interpolate_back, {"known": 1, "known_beside": 1, "points": 1, "beside": 1, "cells": 1}),
+        (extension._add_up_back, {"cells": 1, "beside": 1, "points": 2}),  # rows of maps, picked by a function
+        (extension._interpolate_back, {"known": 1, "known_beside": 1, "points": 1, "beside": 1, "cells": 1}),
     ],
     ids=lambda value: value.py_func.__name__ if hasattr(value, "py_func") else "",
 )

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.gcr import Directions, residual
+from parcontact.solve.nonsymmetric.gcr import Directions, residual
 
 Map = NDArray[np.float64]
 NX, NY = 5, 4

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.projected import Projected
+from parcontact.solve.nonsymmetric.projected import Projected
 
 Map = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve import retry
-from parcontact.solve.cold import start_on_coarse_grids
 from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
+from parcontact.solve.fallback import retry
+from parcontact.solve.fallback.cold_start import start_on_coarse_grids
 
 from .bodies import Map, rough, solver
 

@@ -7,8 +7,8 @@ from mpi4py import MPI
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve import steady
-from parcontact.solve.steady import SteadySolver
+from parcontact.solve.nonsymmetric import steady
+from parcontact.solve.nonsymmetric.steady import SteadySolver
 
 NX, NY = 24, 20
 SIZE = (1.2, 1.0)

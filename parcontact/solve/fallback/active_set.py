@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parallel.slab import Array
-from . import kernels
-from .contact import Approach, Contact, ContactSolver, MeanPressure
+from ...parallel.slab import Array
+from .. import kernels
+from ..contact import Approach, Contact, ContactSolver, MeanPressure
 
 SETS = 40  # guesses after which to give up
 BUDGET = 4  # times max_iterations, for all sets together: nothing is left to be tried after this

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import loop
-from ..parallel.slab import Array, Slab
-from .operator import Operator
+from ...compiled import loop
+from ...parallel.slab import Array, Slab
+from ..problem import Operator
 
 
 class Directions:

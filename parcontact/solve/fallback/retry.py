@@ -11,10 +11,10 @@ from itertools import islice
 
 import numpy as np
 
-from ..parallel.slab import Array
+from ...parallel.slab import Array
+from ..contact import Contact, ContactSolver
 from . import active_set
-from .cold import Control, SolverOn, start_on_coarse_grids
-from .contact import Contact, ContactSolver
+from .cold_start import Control, SolverOn, start_on_coarse_grids
 
 SHORT = 0.5  # length of a safeguarded step over the exact one
 

@@ -11,32 +11,33 @@ help, and the caller has to notice. Restoring the load from all points alike may
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import loop
-from ..parallel.slab import Array, Slab
+from ...compiled import loop
+from ...parallel.slab import Array, Slab
+from ..local_load import LEAST, LocalLoad
+from ..preconditioner.extension import ExtendedPreconditioner
+from ..problem import Operator
 from .gcr import centre, gaps_on, residual, sum_on
-from .local_load import LEAST, LocalLoad
-from .operator import Operator
-from .surround import Surround
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
-WIDE, NARROW = (5, 0.5), (4, 1.0)  # grids and floor of `Surround`: the latter take a fifth more calls, but where a body
-# is far stiffer at once, as on a line of points, larger cells or a smaller floor may make sets of points come and go
+WIDE, NARROW = (5, 0.5), (4, 1.0)  # tuning: grids and floor of `ExtendedPreconditioner`; the latter take a fifth more
+# calls, but where a body is far stiffer at once, as on a line of points, larger cells or a smaller floor may make sets
+# of points come and go
 
 
-def surround_on(nx: int, ny: int, narrow: bool = False) -> tuple[int, float]:
-    """The grids and the floor of `Surround` on so many points."""
+def extension_on(nx: int, ny: int, narrow: bool = False) -> tuple[int, float]:
+    """The grids and the floor of `ExtendedPreconditioner` on so many points."""
     return NARROW if narrow or 1 in (nx, ny) else WIDE
 
 
 class Projected:
-    """Holds DIRECTIONS maps t and as many of their images w, and those of `Surround`."""
+    """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`."""
 
     def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, narrow: bool = False) -> None:
         self.slab, self.operator = slab, operator
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
-        grids, floor = surround_on(slab.nx, slab.ny, narrow)
-        self.surround = Surround(slab, preconditioner, floor, grids)
+        grids, floor = extension_on(slab.nx, slab.ny, narrow)
+        self.extended = ExtendedPreconditioner(slab, preconditioner, floor, grids)
         self.local_load = LocalLoad(slab)
 
     def lend(self) -> list[tuple[Array, Array]]:
@@ -54,7 +55,7 @@ class Projected:
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
         residual(working, u, h, level, t)
-        self.surround.apply(working, t)
+        self.extended.apply(working, t)
         _, mean = self.slab.sum(*sum_on(working, t))
         centre(working, mean / members, t)
         self.operator.apply(t, self.w[0])

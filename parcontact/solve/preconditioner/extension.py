@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import loop
-from ..parallel import pyramid
-from ..parallel.slab import Array, Slab
-from .operator import Operator
+from ...compiled import loop
+from ...parallel import pyramid
+from ...parallel.slab import Array, Slab
+from ..problem import Operator
 
 FLOOR = 0.3  # of the points of a cell: so many count as having the value of the larger cell
 LONG = 16.0  # times its width: with points further apart along one direction, square cells are worse than none
@@ -34,7 +34,7 @@ def grids_for(dx: float, dy: float) -> int | None:
     return 0 if max(dx, dy) > LONG * min(dx, dy) else None
 
 
-class Surround:
+class ExtendedPreconditioner:
     """K on a set, extended as above; two maps in single precision on each grid of larger cells.
 
     `known` is `w/(w + f)` of each cell, for points the set itself.

@@ -21,16 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import loop
-from ..parallel.slab import Array, Slab, dealt_to
-from . import kernels
-from .certificate import Certificate
+from ...compiled import loop
+from ...parallel.slab import Array, Slab, dealt_to
+from .. import kernels
+from ..certificate import Certificate
+from ..iterate import certify, weigh
+from ..precision import precision_of_directions
+from ..preconditioner.extension import ExtendedPreconditioner
+from ..problem import Operator
 from .gcr import Directions, gaps_on
-from .iterate import certify, weigh
-from .operator import Operator
-from .precision import precision_of_directions
-from .projected import DIRECTIONS, Projected, surround_on
-from .surround import Surround
+from .projected import DIRECTIONS, Projected, extension_on
 
 MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
@@ -66,9 +66,9 @@ class SteadyContact:
 
 
 class SteadySolver:
-    """Loop on one grid, and the maps that it works in: seven, a byte per point, and those of `Surround`; where the
-    active set goes on, one more and two for each linear step on a set beyond the third, in single precision where the
-    tolerance is loose.
+    """Loop on one grid, and the maps that it works in: seven, a byte per point, and those of its preconditioner; where
+    the active set goes on, one more and two for each linear step on a set beyond the third, in single precision where
+    the tolerance is loose.
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate; `max_steps` of the linear solves in all; `directions` kept in each; whether residuals are carried on in
@@ -101,8 +101,8 @@ class SteadySolver:
         rows, kept = dealt_to(ny, ranks, rank), precision_of_directions(tolerance, LOOSE)
         bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * 8 + 1
         bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
-        surround = Surround.footprint(nx, ny, ranks, rank, surround_on(nx, ny)[0])
-        return bytes_of_maps * (rows.stop - rows.start) * nx + surround
+        cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, extension_on(nx, ny)[0])
+        return bytes_of_maps * (rows.stop - rows.start) * nx + cells
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution

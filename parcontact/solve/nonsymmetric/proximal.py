@@ -15,8 +15,8 @@ error of a wave falls to `PULL/(1 + PULL^2)^(1/2)` of it or less.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parallel.slab import Array
-from .operator import Operator
+from ...parallel.slab import Array
+from ..problem import Operator
 from .steady import SteadyContact, SteadySolver
 
 Symbol = NDArray[np.inexact]

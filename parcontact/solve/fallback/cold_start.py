@@ -7,9 +7,9 @@ three applications of the operator there.
 
 from collections.abc import Callable
 
-from ..parallel.slab import Array, Slab
-from . import nested
-from .contact import Approach, ContactSolver, MeanPressure
+from ...parallel.slab import Array, Slab
+from .. import nested
+from ..contact import Approach, ContactSolver, MeanPressure
 
 LOOSE = 0.03  # tolerance on the coarse grids, whose pressure is only a start
 WORTHWHILE = 256 * 256  # points: on fewer, making coarser grids takes longer than what they save

@@ -1,0 +1,1 @@
+"""Further attempts at a contact whose solve has failed."""

@@ -1,0 +1,1 @@
+"""Contact with operators that are not symmetric: steady sliding."""
