@@ -13,8 +13,8 @@ from . import job as jobs
 from . import scene
 from .effects.relaxation import relaxation_of, time_factor_of
 from .errors import InputError
+from .history.timeline import Span, Timeline
 from .job import Job
-from .job.timeline import Span, Timeline
 from .parallel.slab import Slab
 from .physics.prony import Prony, complex_modulus
 from .physics.roughness import EDGE, Roughness
@@ -46,11 +46,11 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
 
     The waves are those of the job's spectrum as an unbounded surface has them (`continuum`), or those of the very
     surface in the box (`lattice`). Stages that choose their steps have those of the run in the job's directory, before
-    it a ladder of steps that double up to one cell (`job.chosen`). Raises InputError for jobs that the theory does not
-    know.
+    it a ladder of steps that double up to one cell (`history.chosen`). Raises InputError for jobs that the theory does
+    not know.
     """
     _refuse_unknown(job)
-    timeline = job.timeline().follow(_times_of_run(job))
+    timeline = Timeline.of(job).follow(_times_of_run(job))
     rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
     memory = Memory(rings, _material(job))
     if job.initial.state == "steady":
@@ -61,7 +61,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
 def _times_of_run(job: Job) -> dict[int, float]:
     """When the steps of a run ended that the job has made, by their numbers; none before its run."""
     path = job.output.directory / "measures.csv"
-    if not job.timeline().chooses or not path.is_file():
+    if not Timeline.of(job).chooses or not path.is_file():
         return {}
     columns = measures.read(path)
     return dict(zip(map(int, columns["step"]), columns["time"], strict=True))

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from . import job as jobs
-from .job import Grid, Job, meaning
+from .job import Grid, Job
+from .job.checks import meaning
 from .parallel.fft import FFT, Spectrum
 from .parallel.root import on_root
 from .parallel.slab import Array

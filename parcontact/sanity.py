@@ -1,6 +1,6 @@
 """Whether a scene means something, seen from its heights before a run and from its contacts during it.
 
-What a job alone tells is in `job/meaning.py`. All is judged from sums over all points: every rank says the same.
+What a job alone tells is in `job/checks/meaning.py`. All is judged from sums over all points: every rank says the same.
 """
 
 import math
@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .errors import InputError, RunError
-from .job import Job, OnOneMesh, advice, meaning, size
-from .job.timeline import Timeline
+from .history.timeline import Timeline
+from .job import Job, OnOneMesh
+from .job.checks import advice, meaning, size
 from .parallel import rows
 from .parallel.slab import Array, Slab
 from .physics.measures import Measures
@@ -30,7 +31,7 @@ STRICT = "an error with numerics.strict"
 
 def refuse_impossible(job: Job, timeline: Timeline) -> None:
     """Raise InputError for a run that cannot begin here: too many points for the memory, or too many instants."""
-    for text in (size.beyond_memory(job.grid), size.beyond_file(timeline, job.output), _endless(timeline)):
+    for text in (size.beyond_memory(job.grid), size.beyond_file(timeline.count, job.output), _endless(timeline)):
         if text:
             raise InputError(text)
 

@@ -15,6 +15,7 @@ from .effects.effect import Decision, Effect, effects_that_follow, values_of
 from .effects.folded_branches import describe_folded_branches, fold_branches_of
 from .effects.interface import interface_of
 from .effects.relaxation import relaxation_of
+from .history.chosen import describe_steps
 from .job import Job, extension
 from .parallel.fft import FFT
 from .parallel.slab import Slab
@@ -178,7 +179,7 @@ def facts(built: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
     found = built.frame.roughness
     told = [*built.frame.told, *describe_folded_branches(built.folded, relaxation_of(built.job))]
-    if steps := built.job.about_steps:
+    if steps := describe_steps(built.job):
         told.append(f"time steps that are chosen: {steps}")
     if found is None:
         return told

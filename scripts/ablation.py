@@ -22,8 +22,8 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import scene
+from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
-from parcontact.job.timeline import Step
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.storage.fields import FieldsFile
@@ -141,7 +141,7 @@ def stepper(case: Case, points: int, directory: Path) -> Callable[[], None]:
 
 def endless(planned: Job) -> Iterator[Step]:
     """The steps of a job; a single solve is repeated under loads that go up and down."""
-    steps = planned.timeline()
+    steps = Timeline.of(planned)
     first = next(iter(steps))
     yield from steps
     for number in itertools.count(2):

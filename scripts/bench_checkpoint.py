@@ -35,7 +35,7 @@ def measure(chosen: argparse.Namespace) -> bool:
     import numpy as np
     from mpi4py import MPI
 
-    from parcontact.job.sections import Checkpoint
+    from parcontact.job.sections.settings import Checkpoint
     from parcontact.parallel.slab import Slab
     from parcontact.physics.entries import Entry
     from parcontact.storage import checkpoint

@@ -21,6 +21,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from parcontact import job, scene
+from parcontact.history.timeline import Timeline
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, ZenerBody
@@ -41,7 +42,7 @@ def sliding(points: int, allowed: float, tolerance: float) -> March:
 
 def together(runs: list[March]) -> list[list[Row]]:
     """The rows of runs that take their steps in turn."""
-    timeline = runs[0].scene.job.timeline()
+    timeline = Timeline.of(runs[0].scene.job)
     return [list(rows) for rows in zip(*([run.advance(step) for run in runs] for step in timeline), strict=True)]
 
 

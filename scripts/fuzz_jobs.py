@@ -40,7 +40,8 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact import sanity, scene
 from parcontact.errors import InputError, RunError
-from parcontact.job import yamltext
+from parcontact.history.timeline import Timeline
+from parcontact.job.text import yamltext
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 
@@ -75,7 +76,7 @@ def drive(path: Path) -> tuple[str, jobs.Job | None]:
     again = jobs.Job.model_validate(yamltext.parse(job.resolved(), "resolved").data, context=None)
     assert again.material == job.material or job.included, "the resolved job is another one"
     assert again.title == job.title, "the resolved job has another title"
-    timeline = job.timeline()
+    timeline = Timeline.of(job)
     _ = job.warnings, [timeline[n] for n in {1, timeline.count // 2, timeline.count} if 1 <= n <= timeline.count]
     try:
         sanity.refuse_impossible(job, timeline)
@@ -90,9 +91,9 @@ def drive(path: Path) -> tuple[str, jobs.Job | None]:
 
 
 def march(job: jobs.Job, built: scene.Scene) -> str:
-    marching, watch = March(built), sanity.ContactWatch(job, job.timeline())
+    marching, watch = March(built), sanity.ContactWatch(job, Timeline.of(job))
     try:
-        for step, _ in zip(job.timeline(), range(STEPS), strict=False):
+        for step, _ in zip(Timeline.of(job), range(STEPS), strict=False):
             m = marching.advance(step).measures
             watch.judge(step.number, m)
             values = (m.pressure, m.force_x, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
@@ -183,7 +184,7 @@ def trial(seed: int, number: int, counts: Counter[str], processes: bool) -> list
         faults = (
             [f"wrote {listing(Path(name)) - before}"] if ended == "refused" and listing(Path(name)) != before else []
         )
-        small = job is not None and job.timeline().count <= 200
+        small = job is not None and Timeline.of(job).count <= 200
         if processes and (ended == "refused" or small):
             counts["as processes"] += 1
             faults += [fault for ranks in (1, 2) for fault in run_process(path, ranks)]

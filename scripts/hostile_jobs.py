@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 from SurfaceTopography import Topography
 
-from parcontact.job import yamltext
+from parcontact.job.text import yamltext
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1.25e-4, "rms_slope": 0.1}
 ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]}

@@ -60,8 +60,8 @@ PARTS = {  # files of the program, and the tests that answer for them
     ),
     "march/step.py": (*VISCOELASTIC, *SLIDING, "tests/test_retry.py"),
     "march/rest.py": ("tests/test_stationary.py",),
-    "job/timeline.py": ("tests/test_clock.py", *VISCOELASTIC),
-    "job/chosen.py": ("tests/test_chosen_steps.py", "tests/test_choosing.py"),
+    "history/timeline.py": ("tests/test_clock.py", *VISCOELASTIC),
+    "history/chosen.py": ("tests/test_chosen_steps.py", "tests/test_choosing.py"),
     "storage/checkpoint.py": ("tests/storage/test_checkpoint.py",),
     "plan/memory.py": ("tests/plan/test_memory.py", "tests/test_steady_memory.py"),
 }

@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact.job.table import plain
+from parcontact.job.sections.listing import plain
 from parcontact.march import loop
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact import sanity, scene
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
@@ -47,7 +48,7 @@ def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.flo
 def run(job: Job, steps: int | None = None) -> list[str]:
     """What is said of the contacts of a job's steps."""
     march = March(scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points)))
-    watch, said = sanity.ContactWatch(job, job.timeline()), []
-    for step in list(job.timeline())[:steps]:
+    watch, said = sanity.ContactWatch(job, Timeline.of(job)), []
+    for step in list(Timeline.of(job))[:steps]:
         said += watch.judge(step.number, march.advance(step).measures)
     return said

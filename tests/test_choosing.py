@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from marching import SLS, begun
 
+from parcontact.history.chosen import most_cells
+from parcontact.history.timeline import Step
 from parcontact.job import Grid
-from parcontact.job.chosen import most_cells
-from parcontact.job.surface import Flat, HeightFile, Rough, Sphere, Wave
-from parcontact.job.timeline import Step
+from parcontact.job.sections.geometry import Flat, HeightFile, Rough, Sphere, Wave
 from parcontact.march.choosing import MOST_GROWTH, REJECTED, SAFETY, StepChooser
 from parcontact.march.step import March
 

@@ -11,8 +11,9 @@ import pytest
 from marching import SLS, begun, column, marched
 from mpi4py import MPI
 
+from parcontact.history.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
-from parcontact.job.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
 from parcontact.march.rest import steps_to_make
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
@@ -43,7 +44,7 @@ def test_it_is_what_a_stage_does_that_says_nothing() -> None:
     silent, told, given = job(PRESS), job({**PRESS, "time_step": "auto"}), job({**PRESS, "time_step": 1e-3})
     assert silent == told
     assert "time_step: auto" in silent.resolved()
-    assert (silent.timeline().chooses, given.timeline().chooses) == (True, False)
+    assert (Timeline.of(silent).chooses, Timeline.of(given).chooses) == (True, False)
     assert job({"pressure": 1e4}).history[0].time_step is None
 
 
@@ -122,7 +123,7 @@ def test_an_elastic_body_needs_no_choice() -> None:
     assert not [name for name in march.entries() if name in ChosenSteps().numbers()]
     assert len(rows) == 1 + 1 + 11
     ramp = job({**PRESS, "pressure": {"from": 0.0, "to": 1e4}}, material={"model": "elastic", "shear_modulus": 1e6})
-    assert ramp.timeline().count == 16
+    assert Timeline.of(ramp).count == 16
 
 
 def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
@@ -138,9 +139,9 @@ def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
 def test_timeline_is_read_from_the_times_of_rows() -> None:
     march, rows = marched(data())
     times = {row.step: row.time for row in rows}
-    found = job().timeline().follow(times)
+    found = Timeline.of(job()).follow(times)
     assert [span.last for span in found.spans] == [span.last for span in march.timeline().spans]
-    partly = job().timeline().follow({n: t for n, t in times.items() if n < 8})
+    partly = Timeline.of(job()).follow({n: t for n, t in times.items() if n < 8})
     ends = partly.spans[0].ends
     assert isinstance(ends, ChosenEnds)
     assert len(ends.made) == 6
@@ -186,11 +187,11 @@ def test_creep_after_a_jump_while_hardly_sliding() -> None:
 def test_times_of_rows_long_after_the_start() -> None:
     """A stage ends where it should also where the instants have fewer digits than its steps."""
     late = job({**PRESS, "duration": 1e6}, {**SLIDE, "distance": 6 * CELL})
-    timeline = late.timeline()
+    timeline = Timeline.of(late)
     assert timeline.chosen is not None
     timeline.chosen.ends = {0: [1e6], 1: [k * CELL / 0.1 for k in range(1, 7)]}
     times = {n: timeline[n].time for n in range(1, timeline.count + 1)}
-    found = late.timeline().follow(times)
+    found = Timeline.of(late).follow(times)
     assert found.count == timeline.count == 8
 
 
@@ -246,7 +247,7 @@ def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communica
 
 def test_going_on_beyond_the_end(tmp_path: Path) -> None:
     """The end of the history is hit, and then the instant asked for; the fields of both are there."""
-    end = job().timeline().end
+    end = Timeline.of(job()).end
     rows = run(tmp_path, MPI.COMM_SELF, "beyond", 1.5 * end)
     times = [float(row["time"]) for row in rows]
     assert times[-1] == pytest.approx(1.5 * end, rel=1e-12)

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from parcontact.history.cells import first_between_cells
+from parcontact.history.chosen import ChosenSteps, reached
+from parcontact.history.division import divided
+from parcontact.history.timeline import Timeline
 from parcontact.job import Grid, Stage
-from parcontact.job.cells import first_between_cells
-from parcontact.job.chosen import ChosenSteps, reached
-from parcontact.job.division import divided
-from parcontact.job.timeline import Timeline
 
 GRID = Grid(points=(16, 12), size=(1e-3, 7.5e-4))
 SLIDE = {"pressure": 1e4, "velocity": 0.1, "cells_per_step": 1}

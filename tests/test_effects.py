@@ -30,6 +30,7 @@ from counting import (
 from marching import begun, marched
 
 from parcontact import scene
+from parcontact.history.timeline import Timeline
 from parcontact.march import step
 from parcontact.solve import contact as contact_solver
 from parcontact.solve.contact import Approach
@@ -230,7 +231,7 @@ def test_displacement_control() -> None:
     assert row(planned, "displacement control").on
     assert not row(job(), "displacement control").on
     march = begun(planned)
-    march.advance(next(iter(planned.timeline())))
+    march.advance(next(iter(Timeline.of(planned))))
     solver, slab = march.scene.solver, march.scene.slab
     spent = slab.tally["allreduce"]
     heights = march.scene.motion.at((0.0, 0.0)).base

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from parcontact import job as jobs
 from parcontact.errors import JobError, RunError
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER, ErrorBudget, Parts, compared_with_half_mesh
@@ -156,7 +157,7 @@ def test_loads_without_duration_are_compared_one_by_one(tmp_path: Path) -> None:
     assert run(data(material=elastic, history=loads), tmp_path / "run") == 0
     (area,) = columns(tmp_path / "run", "contact_area_corrected")
     (half,) = columns(tmp_path / "run" / half_mesh.DIRECTORY, "contact_area_corrected")
-    timeline = Job.model_validate(data(history=loads)).timeline()
+    timeline = Timeline.of(Job.model_validate(data(history=loads)))
     assert [place_of(timeline, step) for step in range(4)] == [0, 1, 2, 3]
     (error,) = columns(tmp_path / "run", "error_area")
     apart = np.abs(area - half)[1:] / area[1:]
@@ -239,4 +240,4 @@ def test_half_of_a_line() -> None:
     assert half.output.directory == line.output.directory / "half_mesh"
     assert (half.surface, half.material) == (line.surface, line.material)
     assert [stage.cells_per_step for stage in half.history] == [None, 0.5]
-    assert [step.dt for step in half.timeline()] == [step.dt for step in line.timeline()]
+    assert [step.dt for step in Timeline.of(half)] == [step.dt for step in Timeline.of(line)]

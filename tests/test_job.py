@@ -17,7 +17,7 @@ from parcontact.job import (
     describe,
     log_range,
 )
-from parcontact.job.advice import cells_per_wave
+from parcontact.job.checks.advice import cells_per_wave
 
 CONTRACT = """
 title: Rubber pressed on a road, then sliding      # free text

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.errors import RunError
+from parcontact.history.timeline import Timeline
 from parcontact.march.failure import StepError
 from parcontact.march.loop import run
 from parcontact.march.step import March
@@ -188,7 +189,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
         assert np.array_equal(march.field(name), old)
     march.scene.solver.max_iterations = 500
     job = march.scene.job
-    run(march, [], islice(job.timeline(), 7, None))
+    run(march, [], islice(Timeline.of(job), 7, None))
     for name in ("pressure", "displacement", "gap"):
         assert np.array_equal(march.field(name), smooth.field(name))
     assert march.row.dissipated == smooth.row.dissipated

@@ -14,9 +14,10 @@ from mpi4py import MPI
 
 from parcontact import sanity, scene
 from parcontact.errors import InputError, RunError
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job, JobError, load
-from parcontact.job import size as size_advice
-from parcontact.job.advice import cells_per_wave
+from parcontact.job.checks import size as size_advice
+from parcontact.job.checks.advice import cells_per_wave
 from parcontact.parallel.slab import Slab
 
 SMALL = """\
@@ -229,9 +230,9 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(size_advice, "_memory", lambda: 64e9)
     large = job_of(WAVE, [PRESS], grid={"points": 200_000, "size": 1e-3})
     with pytest.raises(InputError, match=r"need at least 2\.88e\+03 GB of memory"):
-        sanity.refuse_impossible(large, large.timeline())
+        sanity.refuse_impossible(large, Timeline.of(large))
     monkeypatch.setenv("SLURM_JOB_NUM_NODES", "64")
-    sanity.refuse_impossible(large, large.timeline())
+    sanity.refuse_impossible(large, Timeline.of(large))
     long = job_of(WAVE, [{**PRESS, "duration": 5e8, "time_step": 1e-3}], output={"fields": ["gap"], "every": 64})
     with pytest.raises(InputError, match=r"7\.812e\+09 instants of fields .* use every: 500000 or more"):
-        sanity.refuse_impossible(long, long.timeline())
+        sanity.refuse_impossible(long, Timeline.of(long))

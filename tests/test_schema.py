@@ -10,7 +10,8 @@ import yaml
 from marching import ROOT
 
 from parcontact import __main__
-from parcontact.job import keys, schema, yamltext
+from parcontact.job import keys, schema
+from parcontact.job.text import yamltext
 
 JOBS = sorted((ROOT / "jobs").rglob("*.yaml"))
 RIGHT = """

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from marching import SLS, begun, marched
 
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.march.rest import steps_to_make
 from parcontact.march.starts import FORGET, NAME
@@ -45,7 +46,7 @@ def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> No
     modulus is that of the step before."""
     chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
     march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
-    given = Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / parts}]}).timeline()
+    given = Timeline.of(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / parts}]}))
     pressures = list[Array]()
     for step in itertools.islice(given, 8):
         start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
@@ -63,7 +64,7 @@ def test_the_last_two_pressures_are_the_start_where_that_took_fewer_iterations()
     cell is none; to rounding."""
     chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
     march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
-    given = Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / 3}]}).timeline()
+    given = Timeline.of(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / 3}]}))
     for step in itertools.islice(given, 7):
         march.starts.restore({NAME: np.array([3.0, 2.0, 5.0])})
         start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from marching import begun, marched
 
-from parcontact.job.table import plain
+from parcontact.history.timeline import Timeline
+from parcontact.job.sections.listing import plain
 from parcontact.march.failure import StepError
 from parcontact.march.loop import run
 from parcontact.march.step import March
@@ -74,7 +75,7 @@ def test_to_save_a_run_does_not_change_it(tmp_path: Path, precision: str, integr
     for count in (1, 3):
         material = {"model": "zener", "modulus_inf": 1e6, "branches": branches[:count]}
         whole, saved = (begun(job(material, history, surface=wave, numerics=numerics)) for _ in range(2))
-        for step in whole.scene.job.timeline():
+        for step in Timeline.of(whole.scene.job):
             whole.advance(step)
             saved.advance(step)
             written(saved, tmp_path / "step.h5")
@@ -98,7 +99,7 @@ def test_a_start_from_steady_sliding_is_a_state_like_any_other(material: dict[st
 def test_a_failed_step_is_none(material: dict[str, Any], history: list[dict[str, Any]]) -> None:
     """The state, and every field of it, are those before the step; the next one is what it would have been."""
     march, smooth = begun(job(material, history)), begun(job(material, history))
-    first, second = list(march.scene.job.timeline())[:2]
+    first, second = list(Timeline.of(march.scene.job))[:2]
     for each in (march, smooth):
         each.advance(first)
     state = march.state

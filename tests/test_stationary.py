@@ -10,6 +10,7 @@ import pytest
 from marching import begun, column, marched
 from restarting import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, same
 
+from parcontact.history.timeline import Timeline
 from parcontact.march import rest
 from parcontact.march.loop import run
 from parcontact.march.rest import SHARE, remaining, steps_to_make
@@ -35,7 +36,7 @@ def job(*history: dict[str, Any], material: Any = ZENER, **changes: Any) -> dict
 def all_steps(data: dict[str, Any]) -> tuple[March, list[Row]]:
     """Without passing any over."""
     march, found = begun(data), list[Row]()
-    run(march, [lambda now: found.append(now.row)], march.scene.job.timeline())
+    run(march, [lambda now: found.append(now.row)], Timeline.of(march.scene.job))
     return march, found
 
 
@@ -48,7 +49,7 @@ def test_an_elastic_body_is_solved_once() -> None:
     once, _ = marched(job(push, material=ELASTIC))
     calls = once.scene.slab.tally["operator"]
     march, found = marched(job(DWELL, {**DWELL, "pressure": 1e4}, material=ELASTIC))
-    steps = len(march.scene.job.timeline())
+    steps = len(Timeline.of(march.scene.job))
     assert [row.step for row in found] == [0, 1, 1 + (steps - 1) // 2, steps]
     assert march.scene.slab.tally["operator"] == calls + 2
     assert [row.iterations for row in found[2:]] == [0, 0]
@@ -67,7 +68,7 @@ def test_a_relaxed_body_jumps_to_the_end(monkeypatch: pytest.MonkeyPatch) -> Non
     for share in (1e-2, 1e-4):
         monkeypatch.setattr(rest, "SHARE", share / TIGHT)
         march, found = marched(job(DWELL, numerics={"tolerance": TIGHT}))
-        total = len(march.scene.job.timeline())
+        total = len(Timeline.of(march.scene.job))
         assert [row.step for row in found[:-1]] == list(range(len(found) - 1))
         assert found[-1].step == total
         assert found[-1].time == pytest.approx(0.1, rel=1e-12)
@@ -92,7 +93,7 @@ NEVER: list[tuple[str, dict[str, Any]]] = [
 def test_all_steps_are_made(why: str, data: dict[str, Any]) -> None:
     march, found = marched(data)
     assert [row.step for row in found] == list(range(len(found)))
-    assert len(found) == len(march.scene.job.timeline()) + 1
+    assert len(found) == len(Timeline.of(march.scene.job)) + 1
 
 
 def test_nothing_is_asked_where_nothing_can_be_passed_over() -> None:
@@ -130,7 +131,7 @@ def test_what_remains_is_bounded(boundary: str, surface: Any, material: Any, con
             predicted.append(scale * remaining(now, body, 0.051 - now.row.time))
             seen.append(body.u.copy())
 
-    run(march, [look], march.scene.job.timeline())
+    run(march, [look], Timeline.of(march.scene.job))
     largest = np.abs(seen[-1]).max()
     factor = 2.0 if control == "pressure" else 1.0
     for instant in range(len(seen)):
@@ -201,7 +202,7 @@ def test_restarts_bit_for_bit(bench: Bench) -> None:
 def test_until_stops_within_a_dwell(bench: Bench) -> None:
     """At the step that reaches it, as without passing over; then it goes on to the end."""
     data, out = dwelling(bench, output={"fields": []}), bench.where / "out"
-    timeline = begun(data).scene.job.timeline()
+    timeline = Timeline.of(begun(data).scene.job)
     assert bench.run(data, out, until=0.06) == 0
     assert int(rows(out)[-1]["step"]) == timeline.first_reaching(0.06)
     assert bench.run(data, out) == 0
@@ -221,7 +222,7 @@ def test_a_checkpoint_is_not_passed_over(bench: Bench) -> None:
 def test_steps_are_decided_on_one_by_one() -> None:
     """When the last one was made. One that stands for others takes all their time; nothing is extrapolated to it."""
     march = begun(job(DWELL, material=ELASTIC))
-    timeline = march.scene.job.timeline()
+    timeline = Timeline.of(march.scene.job)
     steps = steps_to_make(march, timeline)
     first = next(steps)
     assert first == timeline[1]
@@ -238,7 +239,7 @@ def test_branches_without_a_map_relax_first() -> None:
     march, found = marched(job(DWELL, material=fast))
     assert isinstance(march.scene.material, ZenerBody)
     assert not march.scene.material.kept
-    assert [row.step for row in found] == [0, 1, 2, len(march.scene.job.timeline())]
+    assert [row.step for row in found] == [0, 1, 2, len(Timeline.of(march.scene.job))]
     assert found[1].measures.contact_area < 0.9 * found[2].measures.contact_area
     assert found[2].measures.contact_area == found[3].measures.contact_area
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from marching import begun, column, example, marched
 
+from parcontact.history.timeline import Step
 from parcontact.job import Job
-from parcontact.job.timeline import Step
 from parcontact.march.choosing import LEAST_WAY, cells_per_step
 from parcontact.march.rest import steps_to_make
 

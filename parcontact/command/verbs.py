@@ -58,14 +58,15 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
 @ranks.root_alone
 def check(options: argparse.Namespace) -> int:
     from .. import job as jobs
+    from ..history.chosen import describe_steps
 
     cases, chosen = cases_of(options)
     job = chosen[0].job
     print(jobs.describe(job))
     if job.included:
         print(f"\n{job.included}")
-    if job.about_steps:
-        print(f"\ntime steps that are chosen: {job.about_steps}")
+    if steps := describe_steps(job):
+        print(f"\ntime steps that are chosen: {steps}")
     each = [case.job for case in chosen]
     doubts = [text for job in each for text in (*job.warnings, *_doubts(job))]
     for warning in dict.fromkeys(doubts):
@@ -78,7 +79,7 @@ def check(options: argparse.Namespace) -> int:
 
 def _doubts(job: Job) -> list[str]:
     """What only a look at heights and measured moduli tells."""
-    from ..job import meaning
+    from ..job.checks import meaning
 
     if meaning.says_all(job.surface) and not job.measured:
         return []

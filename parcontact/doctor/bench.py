@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..history.timeline import Step, Timeline
 from ..job import Job
-from ..job.timeline import Step
 from ..march.step import March
 from ..parallel.slab import Array, Slab
 from ..steady_sliding import start
@@ -75,7 +75,7 @@ class Bench:
         """A march at the end of a job, and the row of every instant, the initial one first; collective."""
         march = self.begin(data)
         job, rows = march.scene.job, [march.row]
-        for step in job.timeline():
+        for step in Timeline.of(job):
             rows.append(march.advance(step))
             self._note(march.row)
             self._always(march, step)

@@ -6,8 +6,10 @@ decision. An effect that is off allocates nothing, calls nothing and writes noth
 
 from collections.abc import Callable
 
+from ..history.cells import first_between_cells
+from ..history.chosen import describe_steps
+from ..history.timeline import Timeline
 from ..job import Job, Spectral
-from ..job.cells import first_between_cells
 from ..solve.precision import LOOSE, VERY_LOOSE
 from . import folded_branches, relaxation
 from .effect import Decision
@@ -21,7 +23,7 @@ def isolated(job: Job) -> Decision:
 
 def sliding(job: Job) -> Decision:
     """A surface that moves."""
-    moves = job.timeline().moves
+    moves = Timeline.of(job).moves
     return Decision("sliding", moves, "the surface moves" if moves else "the surface stands in all stages")
 
 
@@ -37,7 +39,7 @@ def _part_cells(job: Job) -> tuple[bool, str]:
         return True, "a free box is not cyclic: the heights are made anew"
     if along_x(job) and further_starts(job).on:
         return True, "stages that choose their own steps begin with parts of a cell where they must"
-    step = first_between_cells(job.timeline(), job.grid)
+    step = first_between_cells(Timeline.of(job), job.grid)
     if step is None:
         return False, "every step is of whole cells along x"
     return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
@@ -45,19 +47,19 @@ def _part_cells(job: Job) -> tuple[bool, str]:
 
 def along_x(job: Job) -> bool:
     """Whether the surface slides along x on a periodic box, where whole cells are an index offset."""
-    spans = [span for span in job.timeline().spans if span.moves]
+    spans = [span for span in Timeline.of(job).spans if span.moves]
     return bool(spans) and job.grid.boundary == "periodic" and not any(span.stage.velocity[1] for span in spans)
 
 
 def lasting(job: Job) -> Decision:
     """The last pressure but one, from which the next one is extrapolated."""
-    lasts = job.timeline().lasts
+    lasts = Timeline.of(job).lasts
     return Decision("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
 
 
 def further_starts(job: Job) -> Decision:
     """The two pressures before that: with thirds and quarters of a cell the next one starts from a whole cell ago."""
-    timeline = job.timeline()
+    timeline = Timeline.of(job)
     on = timeline.chooses and any(span.moves and span.stage.chooses for span in timeline.spans)
     why = "the surface slides in steps that are chosen" if on else "the surface slides in no steps that are chosen"
     return Decision("starts from whole cells ago", on, why)
@@ -65,13 +67,13 @@ def further_starts(job: Job) -> Decision:
 
 def chosen_steps(job: Job) -> Decision:
     """Time steps that follow the error of the last one (`march.choosing`)."""
-    why = job.about_steps
+    why = describe_steps(job)
     return Decision("chosen time steps", bool(why) and job.remembers, why or "every stage says in which steps")
 
 
 def short_rest(job: Job) -> Decision:
     """Once nothing changes any more at rest, one step ends the stage (`stationary.py`)."""
-    stage = next((span.stage.name for span in job.timeline().spans if span.rests), None)
+    stage = next((span.stage.name for span in Timeline.of(job).spans if span.rests), None)
     why = "no stage stands under a constant load with growing time steps"
     return Decision(
         "rest cut short", stage is not None, f"stage {stage!r} stands under a constant load" if stage else why

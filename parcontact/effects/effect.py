@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Protocol
 from numpy.typing import DTypeLike
 
 from ..errors import InputError
+from ..history.timeline import Step
 from ..job import Job, extension
-from ..job.part import Part
-from ..job.timeline import Step
+from ..job.sections.part import Part
 from ..parallel.slab import Array
 from ..physics.entries import Remembers
 from ..physics.measures import Measures

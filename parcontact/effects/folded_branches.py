@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from .. import job as jobs
+from ..history.chosen import ChosenEnds
+from ..history.timeline import Span, Timeline
 from ..job import Grid, Job
-from ..job.chosen import ChosenEnds
-from ..job.timeline import Span
 from ..physics.folding import Band, FoldedBranches, Phase, fold_branches, keep_all
 from ..physics.prony import Prony
 from .effect import Decision
@@ -59,7 +59,7 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
 
 def phases(job: Job, until: float = 0.0) -> Iterator[Phase]:
     """The stages of a job as phases of one velocity; the last one goes on to `until` [s]."""
-    for span in job.timeline(until).spans:
+    for span in Timeline.of(job, until).spans:
         first, last = _first_and_last(span)
         duration = span.ends[span.count] * span.stage.seconds if span.count else 0.0
         yield Phase(duration, first, last, span.stage.velocity, span.jumps)

@@ -10,9 +10,9 @@ from numpy.typing import DTypeLike
 from pydantic import Field
 
 from ..job import Job
-from ..job.fault import Fault
-from ..job.part import Part, Rule
-from ..job.values import Positive
+from ..job.sections.part import Part, Rule
+from ..job.sections.values import Positive
+from ..job.text.fault import Fault
 from ..physics.entries import Entry
 from ..physics.interface import InterfaceFriction
 from ..physics.measures import Measures

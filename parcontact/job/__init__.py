@@ -1,16 +1,17 @@
 """A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
 
 from ..errors import JobError
-from .heights import HeightArray
-from .history import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
-from .material import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe
 from .reading import Case, choose, load, load_cases
-from .sections import Checkpoint, Grid, Numerics, Output
-from .study import Study
-from .surface import Cylinder, Flat, HeightFile, OnOneMesh, Rough, Spectral, Sphere, Wave
-from .topography import RoughSpectrum, Topography
-from .values import log_range
+from .sections.geometry import Cylinder, Flat, HeightFile, OnOneMesh, Rough, Spectral, Sphere, Wave
+from .sections.height_arrays import HeightArray
+from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
+from .sections.part import Part
+from .sections.refinements import Study
+from .sections.settings import Checkpoint, Grid, Numerics, Output
+from .sections.stages import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
+from .sections.topography import RoughSpectrum, Topography
+from .sections.values import Positive, log_range
 
 __all__ = [
     "AUTO",
@@ -31,6 +32,8 @@ __all__ = [
     "Numerics",
     "OnOneMesh",
     "Output",
+    "Part",
+    "Positive",
     "PronyBranch",
     "Ramp",
     "Rough",

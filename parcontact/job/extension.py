@@ -16,8 +16,8 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from .fault import Fault, refuse
-from .part import Part
+from .sections.part import Part
+from .text.fault import Fault, refuse
 
 GROUP = "parcontact.effects"
 OURS: dict[str, str] = {

@@ -11,10 +11,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from . import extension
-from .fault import choices
 from .model import Job
-from .part import Part, literal_words
-from .surface import Rough
+from .sections.geometry import Rough
+from .sections.part import Part, literal_words
+from .text.fault import choices
 
 FILLED: dict[type[Part], tuple[str, ...]] = {Rough: ("rolloff_wavelength",)}  # their defaults depend on other keys
 KINDS = ("shape", "model", "law")  # keys that say which kind of part it is

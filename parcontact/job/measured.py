@@ -8,11 +8,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from .mapping import is_array
-from .part import Context
-from .source import Mistake, Source
-from .topography import Topography
-from .values import FROM_SURFACE
+from .sections.part import Context
+from .sections.topography import Topography
+from .sections.values import FROM_SURFACE
+from .text.python_data import is_array
+from .text.source import Mistake, Source
 
 KEYS = ("points", "size")
 READER = EntryPoint("extent", "parcontact.road.extent:of", "")  # what reads maps; jobs that name none do without

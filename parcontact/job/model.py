@@ -7,27 +7,26 @@ everywhere. No MPI and no maps here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from . import advice, extension, heights, imprint, limits, meaning, size, table
-from .chosen import ChosenSteps, most_cells
-from .chosen import describe as describe_steps
-from .fault import Fault
-from .history import Initial, Stage, Steady
-from .loading import Included
-from .mapping import is_array
-from .material import Dma, Elastic, Material, Zener, heated
-from .part import Context, Part, Rule
-from .sections import Checkpoint, Grid, Numerics, Output
-from .study import Study
-from .surface import OnOneMesh, Rough, Shape
-from .timeline import Timeline
-from .yamltext import dump
+from . import extension
+from .checks import advice, imprint, limits, meaning, size
+from .sections import height_arrays, listing
+from .sections.geometry import OnOneMesh, Rough, Shape
+from .sections.materials import Dma, Elastic, Material, Zener, heated
+from .sections.part import Context, Part, Rule
+from .sections.refinements import Study
+from .sections.settings import Checkpoint, Grid, Numerics, Output
+from .sections.stages import Initial, Stage, Steady
+from .text.fault import Fault
+from .text.overrides import Included
+from .text.python_data import is_array
+from .text.yamltext import dump
 
 
 def _kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
@@ -123,7 +122,7 @@ class Job(Part):
         Rule(("grid", "numerics"), _kernel_fits),
         Rule(("surface",), _some_shape),
         Rule(("grid", "surface"), _waves_fit),
-        Rule(("grid", "surface"), heights.fit),
+        Rule(("grid", "surface"), height_arrays.fit),
         Rule(("grid", "surface", "output"), _half_mesh_fits),
         Rule(("history", "steady"), _some_history),
         Rule(("history", "initial"), _some_load),
@@ -140,7 +139,7 @@ class Job(Part):
     def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
         """Numbers unnamed stages, chooses the kernel by the boundary, and names the output after the job file."""
         if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
-            data["surface"] = heights.with_shapes(data["surface"])
+            data["surface"] = height_arrays.with_shapes(data["surface"])
         if isinstance(data.get("history"), list):
             data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
         free = isinstance(data.get("grid"), dict) and data["grid"].get("boundary") == "free"
@@ -210,7 +209,7 @@ class Job(Part):
             *advice.resolution(*scene, self.numerics),
             *meaning.warnings(*scene, self.initial, self.steady),
             *imprint.returns(*scene, self.initial),
-            *size.warnings(self.grid, self.timeline(), self.output),
+            *size.warnings(self.grid, limits.count_steps(self.grid, self.history), self.output),
         )
 
     @property
@@ -227,25 +226,6 @@ class Job(Part):
         """The section that an effect has added, None if this job has not given it."""
         return getattr(self, name, None)
 
-    def timeline(self, until: float = 0.0, chosen: ChosenSteps | None = None) -> Timeline:
-        """All steps of the history; its last stage goes on to `until` [s] if that is later than its end.
-
-        `chosen` are the steps that stages have chosen so far; those to come are guessed.
-        """
-        record = (chosen or self.chosen_steps()) if self.remembers else None
-        return Timeline(self.history, self.grid, until, self.initial.pressure, record)
-
-    def chosen_steps(self, saved: Mapping[str, Any] | None = None) -> ChosenSteps:
-        """The steps that stages had chosen when a checkpoint with these numbers was written; none without."""
-        none = ChosenSteps(most_cells(self.grid, self.surface))
-        return none.restored(saved) if saved is not None else none
-
-    @property
-    def about_steps(self) -> str:
-        """Which stages choose their own time steps, how, and why; '' if none does."""
-        cells = most_cells(self.grid, self.surface)
-        return describe_steps(self.history, self.numerics.accuracy, self.remembers, cells)
-
     @property
     def remembers(self) -> bool:
         """Whether the body has a memory, and time steps an error: an elastic one has neither."""
@@ -253,7 +233,7 @@ class Job(Part):
 
     def resolved(self) -> str:
         """YAML text with every default filled in; it loads back to an equal job, where the files that it names are."""
-        return dump(table.plain(self))
+        return dump(listing.plain(self))
 
 
 SEPARATOR = ":"  # of sections in the name of an extended job, by which other ranks find its class
@@ -292,8 +272,8 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
 
 def describe(job: Job) -> str:
     """A table of the job with every default and its unit; times and cells that follow from it come last."""
-    rows = list(table.rows(job))
-    rows.append(("cell", table.text((job.grid.dx, job.grid.dy)), "m"))
+    rows = list(listing.rows(job))
+    rows.append(("cell", listing.text((job.grid.dx, job.grid.dy)), "m"))
     seconds = math.fsum(stage.seconds for stage in job.history)
-    rows.append(("time", table.text(seconds), "s"))
-    return table.layout(rows)
+    rows.append(("time", listing.text(seconds), "s"))
+    return listing.layout(rows)

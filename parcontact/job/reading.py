@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from ..errors import InputError, JobError
-from .fault import faults_of
-from .loading import read_job
-from .mapping import NOWHERE, numbers_for_texts, source_of
 from .measured import take_grid
 from .model import Job, Origin
-from .part import Context
-from .source import Key, Mistake, Place, Source, shorten
-from .sweep import Sweep
+from .sections.part import Context
+from .text.fault import faults_of
+from .text.overrides import read_job
+from .text.python_data import NOWHERE, numbers_for_texts, source_of
+from .text.source import Key, Mistake, Place, Source, shorten
+from .text.sweep_cases import Sweep
 
 MANY_MISTAKES = 40  # more are not shown one by one
 SHOWN_MISTAKES = 20  # of so many

@@ -17,12 +17,12 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from . import extension, keys
-from .heights import Heights
-from .history import Ramp, numbers
-from .material import Material
 from .model import Job
-from .part import Part
-from .values import along_x, both, listed
+from .sections.height_arrays import Heights
+from .sections.materials import Material
+from .sections.part import Part
+from .sections.stages import Ramp, numbers
+from .sections.values import along_x, both, listed
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

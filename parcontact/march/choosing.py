@@ -21,9 +21,9 @@ steps of two fifths, too (`starts`).
 import math
 from dataclasses import dataclass
 
-from ..job.chosen import Bounds, ChosenEnds, ChosenSteps, reached
-from ..job.limits import one_cell
-from ..job.timeline import Span, Step
+from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, reached
+from ..history.timeline import Span, Step
+from ..job.checks.limits import one_cell
 from ..physics.body import ZenerBody
 from ..physics.time_error import TIME_ORDER
 from ..scene import Scene

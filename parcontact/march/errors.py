@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..history.timeline import Step
 from ..job import Cylinder, Flat, Rough, Wave
-from ..job.timeline import Step
 from ..physics.body import Trial, ZenerBody
 from ..physics.budget import ErrorBudget, estimate
 from ..physics.embedded import Embedded, Look

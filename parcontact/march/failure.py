@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from ..errors import RunError
-from ..job.timeline import Step
+from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.measures import Measures
 from ..scene import Scene

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
-from ..job.timeline import Step
+from ..history.timeline import Step
 from .rest import steps_to_make
 from .step import March
 

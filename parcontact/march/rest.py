@@ -15,7 +15,7 @@ Only stages whose time steps grow are ended so: who gives one time step asks for
 import math
 from collections.abc import Iterator
 
-from ..job.timeline import Span, Step, Timeline
+from ..history.timeline import Span, Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import ZenerBody
 from .choosing import StepChooser

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..job.timeline import Step
+from ..history.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from ..effects.effect import Instant, values_of
-from ..job.chosen import SYMBOLS
-from ..job.timeline import Step, Timeline
+from ..history.chosen import SYMBOLS, ChosenSteps
+from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import Trial, ZenerBody
 from ..physics.energy import Pressed
@@ -50,7 +50,7 @@ class March:
         self._errors = Errors(scene)
         self.starts = Starts(scene)
         self._elastic_displacement: Array | None = None  # of the solver: until its next solve
-        self.chosen = scene.job.chosen_steps() if scene.job.timeline().chooses else None
+        self.chosen = ChosenSteps.of(scene.job) if Timeline.of(scene.job).chooses else None
 
     @property
     def row(self) -> Row:
@@ -58,8 +58,8 @@ class March:
         return self.state.row
 
     def timeline(self, until: float = 0.0) -> Timeline:
-        """All steps of the history, as `Job.timeline`, with those that have been chosen so far."""
-        return self.scene.job.timeline(until, self.chosen)
+        """All steps of the history, as `Timeline.of` has them, with those that have been chosen so far."""
+        return Timeline.of(self.scene.job, until, self.chosen)
 
     def advance(self, step: Step) -> Row:
         """Make the next state, or with a shorter step if its judge asks for it; collective.
@@ -114,7 +114,7 @@ class March:
         self._errors.restore(contents.numbers)
         self.starts.restore(contents.numbers)
         if self.chosen is not None:
-            self.chosen = self.scene.job.chosen_steps(contents.numbers)
+            self.chosen = ChosenSteps.of(self.scene.job, contents.numbers)
         self.begin_with(replace(restored, row=self._complete(restored.row)))
 
     def begin_with(self, begun: State) -> None:

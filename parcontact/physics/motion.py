@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from ..job.cells import SAME_PLACE
+from ..history.cells import SAME_PLACE
 from .body import Heights
 from .surface import Surface
 

@@ -2,7 +2,7 @@
 
 Nothing more is tried. All parts of the error budget together keep the accuracy: the mesh may have MESH_SHARE of it,
 time steps TIME_SHARE, the solver the rest; steps that are chosen make CHOSEN_SHARE, whatever the mesh makes. The mesh
-has the cells per shortest wave that this takes (`job.advice.cells_per_wave`); where no wave is given the part that the
+has the cells per shortest wave that this takes (`advice.cells_per_wave`); where no wave is given the part that the
 mesh makes, which the trial saw, goes with the power of the cell that the budget knows (`physics.budget`). Heights from
 a file stay on their mesh. The part that time steps make, seen too, goes with the power 1.7 of the step for the
 exponential integrator, with the first for backward Euler; where a slide has cells per step they are one, a half, a
@@ -17,11 +17,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..history.chosen import ChosenEnds
+from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
-from ..job.advice import STEPS_PER_WAVE, cells_per_wave
-from ..job.chosen import ChosenEnds
-from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
-from ..job.table import plain
+from ..job.checks.advice import STEPS_PER_WAVE, cells_per_wave
+from ..job.sections.listing import plain
+from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
 from ..physics.budget import SPOTS_ORDER, per_cent
 from ..physics.time_error import TIME_ORDER
 from .report import MARK, Costs, duration_text, ranks_text, unit_of
@@ -149,7 +150,7 @@ def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
     order = TIME_ORDER if own.numerics.integrator == "exponential" else 1.0
     waves = (shortest_wave(sample.job) or 1.0) / (shortest_wave(own) or 1.0)
     stages = []
-    for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), own.timeline().spans, strict=True):
+    for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), Timeline.of(own).spans, strict=True):
         share = CHOSEN_SHARE if isinstance(span.ends, ChosenEnds) else TIME_SHARE
         error = time_error(cost, sample) / (share * job.numerics.accuracy)
         more = max(error ** (1.0 / order) * tried * waves, 1.0 / LONGER)
@@ -160,7 +161,7 @@ def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
 
 def _tried_counts(sample: Sample, own: Job) -> Iterator[float]:
     """Steps of each stage on the grid of the sample, over those on the own one."""
-    for tried, span in zip(sample.job.timeline().spans, own.timeline().spans, strict=True):
+    for tried, span in zip(Timeline.of(sample.job).spans, Timeline.of(own).spans, strict=True):
         yield tried.count / max(span.count, 1)
 
 

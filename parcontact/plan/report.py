@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from .. import scene
 from ..effects import decisions
+from ..history.timeline import Timeline
 from ..job import Job
 from . import machine, memory
 from .scaling import SUMS_PER_STEP, Scaling
@@ -38,7 +39,7 @@ class Costs:
 
     def marching(self, ranks: int) -> float:
         """Seconds of all steps, or steady states; with those on half the mesh, which comes first."""
-        part = HALF_MESH_CHOSEN if self.job.timeline().chooses else HALF_MESH
+        part = HALF_MESH_CHOSEN if Timeline.of(self.job).chooses else HALF_MESH
         beside = part if self.job.history and decisions.mesh_check(self.job).on else 0.0
         return self.scaling.steps * self.scaling.step(ranks) * (1.0 + beside)
 

@@ -15,8 +15,8 @@ from itertools import islice
 
 from .. import scene
 from ..errors import InputError, RunError
+from ..history.timeline import Step, Timeline
 from ..job import Job
-from ..job.timeline import Step, Timeline
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
@@ -97,7 +97,7 @@ class Sample:
         """What this says of the same job on another grid: its number of steps may be another one in each stage."""
         if job.grid == self.job.grid or not job.history:
             return self
-        spans = job.timeline().spans
+        spans = Timeline.of(job).spans
         stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(self.stages, spans, strict=True))
         return replace(self, stages=tuple(stages))
 
@@ -134,7 +134,7 @@ def _warm_up(job: Job, slab: Slab) -> None:
             SteadySliding(scene.frame(small, own)).solve((wanted.points[0][0], 0.0), wanted.points[0][1])
             return
         march = start.first(small, own)
-        for step in islice(steps_to_make(march, small.timeline()), FIRST):
+        for step in islice(steps_to_make(march, Timeline.of(small)), FIRST):
             march.advance(step)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..job import Job
-from ..job.size import machines
+from ..job.checks.size import machines
 from . import memory, trial
 
 MOST_POINTS = 2**20  # of a small case

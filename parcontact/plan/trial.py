@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from ..effects import decisions
 from ..job import Job
-from ..job.table import plain
+from ..job.sections.listing import plain
 from . import memory
 
 PER_POINT = 1.2e-8  # seconds of an operator call per point, and of what belongs to it: enough to choose a grid by

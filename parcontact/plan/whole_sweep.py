@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from ..history.timeline import Timeline
 from ..job import Case, Job
 from ..parallel.slab import Slab
 from ..steady_sliding.curve import request
@@ -66,7 +67,7 @@ def places_to_try(count: int) -> list[int]:
 def work(job: Job) -> float:
     """Of a case, in proportion."""
     points = job.grid.nx * job.grid.ny
-    steps = job.timeline().count if job.history else len(request(job).points)
+    steps = Timeline.of(job).count if job.history else len(request(job).points)
     return max(steps, 1) * points * math.log(points + 1)
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..job.timeline import Timeline
+from ..history.timeline import Timeline
 from ..parallel.slab import Array
 from ..storage import measures
 from ..storage.resolved import RESOLVED, STEADY_RESOLVED, shown_job
@@ -76,7 +76,7 @@ class Run:
     def timeline(self) -> Timeline:
         """What the job says about each step."""
         steps, times = self._columns["step"].astype(int).tolist(), self._columns["time"].tolist()
-        return self.job.timeline(times[-1]).follow(dict(zip(steps, times, strict=True)))
+        return Timeline.of(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
     def stages(self) -> NDArray[np.int64]:

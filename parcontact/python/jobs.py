@@ -15,6 +15,7 @@ from .. import job as jobs
 from .. import sanity
 from ..effects.measured_range import describe_beyond
 from ..errors import InputError, JobError
+from ..history.timeline import Timeline
 from ..job import Job
 from ..parallel.meeting import meet
 from ..parallel.mpi import MPI
@@ -47,7 +48,7 @@ def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intra
 
 
 def _sound(job: Job) -> Job:
-    sanity.refuse_impossible(job, job.timeline())
+    sanity.refuse_impossible(job, Timeline.of(job))
     return job
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job
-from ..job.yamltext import parse
+from ..job.text.yamltext import parse
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.meeting import meet

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..job import yamltext
+from ..job.text import yamltext
 from ..storage import hdf5
 
 READ = (  # in an output directory, each before what is below it

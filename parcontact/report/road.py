@@ -4,7 +4,8 @@ from functools import partial
 
 from .. import rigid_surface
 from ..errors import InputError
-from ..job import Job, table
+from ..job import Job
+from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
@@ -17,7 +18,7 @@ MOST_POINTS = 2**22  # of a surface that is made anew for a report
 
 def section(job: Job) -> Section:
     """Of the surface of a job, made anew; where its files are gone or it is too large, of what the job says."""
-    shapes = Table(("shape",), [(table.line(part),) for part in job.surface], "shapes, whose heights add up")
+    shapes = Table(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
     if job.grid.nx * job.grid.ny > MOST_POINTS:
         return Section("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
     slab = Slab(MPI.COMM_SELF, *job.grid.points)

@@ -6,9 +6,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from ..history.timeline import Timeline
 from ..job import Job
-from ..job.sections import BRANCH_SHARE, TOLERANCE_SHARE
-from ..job.timeline import Timeline
+from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
 from ..physics.budget import Summary
 from ..physics.entries import Entry
 from ..storage.row import Row

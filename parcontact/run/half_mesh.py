@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from ..history.chosen import SAME_TIME
+from ..history.timeline import Timeline
 from ..job import Job, Rough
-from ..job.chosen import SAME_TIME
-from ..job.table import plain
-from ..job.timeline import Timeline
+from ..job.sections.listing import plain
 from ..parallel.slab import Slab
 from ..physics.budget import ErrorBudget, compared_with_half_mesh
 from ..storage import measures
@@ -38,7 +38,7 @@ def job_on_half_mesh(job: Job) -> Job:
     data["grid"]["points"] = [max(n // 2, 1) for n in job.grid.points]
     data["output"] = {"directory": str(job.output.directory / DIRECTORY)}
     data["numerics"]["strict"] = False
-    if job.timeline().chooses:
+    if Timeline.of(job).chooses:
         data["numerics"]["accuracy"] = min(LOOSER * job.numerics.accuracy, max(LOOSEST, job.numerics.accuracy))
     for stage in data["history"]:
         if "cells_per_step" in stage:
@@ -69,7 +69,7 @@ class HalfMesh:
         found = measures.read(job.output.directory / "measures.csv") if slab.root else {}
         times, friction, area, errors = slab.agree([found.get(name, []) for name in COLUMNS])
         waves = any(isinstance(shape, Rough) for shape in job.surface)
-        return cls(times, friction, area, waves, errors if job.timeline().chooses else ())
+        return cls(times, friction, area, waves, errors if Timeline.of(job).chooses else ())
 
     def judge(self, row: Row, place: int) -> ErrorBudget | None:
         """The error budget of a row of the run; it is the row number `place` of those at its time, from 0."""

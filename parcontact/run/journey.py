@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from .. import sanity, scene
 from ..errors import InputError, RunError
-from ..job.chosen import reached
-from ..job.sample import describe_sample
-from ..job.timeline import Timeline
+from ..history.chosen import reached
+from ..history.timeline import Timeline
+from ..job.checks.sample import describe_sample
 from ..march import loop
 from ..march.failure import StepError
 from ..march.rest import steps_to_make

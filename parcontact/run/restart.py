@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..errors import InputError
+from ..history.chosen import ChosenSteps, reached
+from ..history.timeline import Step, Timeline
 from ..job import Job, Stage
-from ..job.chosen import reached
-from ..job.timeline import Step, Timeline
 from ..parallel.slab import Slab
 from ..storage import checkpoint, marker
 from ..storage.checkpoint import Contents
@@ -160,7 +160,7 @@ def find_changed_step(contents: Contents, job: Job) -> str:
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
     old, new = (
-        each.timeline(until, each.chosen_steps(contents.numbers))
+        Timeline.of(each, until, ChosenSteps.of(each, contents.numbers))
         for each in (job.model_copy(update={"history": history}), job)
     )
     count = min(number, len(old), len(new))

@@ -9,9 +9,9 @@ from ..effects import decisions
 from ..effects.effect import columns_of
 from ..effects.measured_range import describe_beyond
 from ..errors import InputError, RunError
+from ..history.chosen import ChosenSteps, reached
+from ..history.timeline import Timeline
 from ..job import Job, Rough, RoughSpectrum
-from ..job.chosen import reached
-from ..job.timeline import Timeline
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -73,11 +73,11 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
         plain = marker.plain_job(job) if slab.root else {}
-        timeline = job.timeline(options.until or 0.0)
+        timeline = Timeline.of(job, options.until or 0.0)
         finished = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
         origin, warnings = (None, []) if finished else restart.choose(job, plain, slab, directory, options.restart)
         if origin:
-            timeline = job.timeline(options.until or 0.0, job.chosen_steps(origin.contents.numbers))
+            timeline = Timeline.of(job, options.until or 0.0, ChosenSteps.of(job, origin.contents.numbers))
         _refuse_no_end(timeline, options.until)
         sanity.refuse_impossible(job, timeline)
         reason = _nothing_to_do(origin, timeline, options.until) if origin else finished

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from .. import sanity, scene
 from ..effects.measured_range import describe_beyond
 from ..errors import InputError, RunError
+from ..history.timeline import Timeline
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
@@ -101,7 +102,7 @@ def run(
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
-        sanity.refuse_impossible(job, job.timeline())
+        sanity.refuse_impossible(job, Timeline.of(job))
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
@@ -178,7 +179,7 @@ class _Curve:
         self.directory, self.signals, self.slab = directory, signals, sliding.base.slab
         job = sliding.base.job
         self.shows, self.others_file = shows, others_file
-        self.watch, self.failures = sanity.ContactWatch(job, job.timeline()), 0
+        self.watch, self.failures = sanity.ContactWatch(job, Timeline.of(job)), 0
 
     def go(self) -> int:
         """Solve what lacks; collective. Returns the exit code."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from .. import progress
 from ..effects.interface import InterfaceColumns, interface_of
-from ..job.sample import describe_sample
+from ..job.checks.sample import describe_sample
 from ..storage import curve_points, files, measures
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..job import Dma, HeightArray, HeightFile, Job, RoughSpectrum, Topography
-from ..job.table import plain
+from ..job.sections.listing import plain
 from . import files
 
 MARKER = ".parcontact"

@@ -6,7 +6,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..job import Job, yamltext
+from ..job import Job
+from ..job.text import yamltext
 from . import hdf5
 
 RESOLVED = "job.resolved.yaml"

@@ -13,7 +13,7 @@ from dataclasses import astuple, dataclass, fields, replace
 
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage, Study
-from ..job.limits import one_cell
+from ..job.checks.limits import one_cell
 
 
 @dataclass(frozen=True)

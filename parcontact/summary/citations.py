@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..job.yamltext import read
+from ..job.text.yamltext import read
 from ..storage import hdf5
 from ..storage.provenance import PROGRAM
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from .. import job as jobs
 from ..errors import InputError, RunError
-from ..job import Job, Topography, yamltext
-from ..job.table import plain
+from ..job import Job, Topography
+from ..job.sections.listing import plain
+from ..job.text import yamltext
 from ..storage import files
 
 JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps

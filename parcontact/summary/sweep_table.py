@@ -11,6 +11,7 @@ from statistics import fmean, stdev
 from typing import Any
 
 from ..errors import InputError
+from ..history.timeline import Timeline
 from ..job import Case, Steady
 from ..storage import curve_points, files, measures
 from . import slide
@@ -101,7 +102,7 @@ def state(case: Case) -> str:
     if not case.job.history:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]
-    timeline = case.job.timeline().follow(dict(zip(steps, columns["time"], strict=True)))
+    timeline = Timeline.of(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
     return "done" if steps and steps[-1] >= len(timeline) else "begun"
 
 

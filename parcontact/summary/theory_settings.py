@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from .. import __version__
 from ..errors import InputError
-from ..job import yamltext
+from ..job.text import yamltext
 from ..storage import files
 
 TABLE, FILE = "theory.csv", "theory.yaml"

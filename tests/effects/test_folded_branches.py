@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parcontact import job, scene
 from parcontact.effects.folded_branches import bands, fold_branches_of, phases
 from parcontact.errors import InputError
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import ZenerBody
@@ -109,7 +110,7 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
     base = marches[1].scene.frame
     marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", frozen=[1])
-    timeline = list(base.job.timeline())
+    timeline = list(Timeline.of(base.job))
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
     wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]
     assert 0.05 < wrong / marches[0].scene.folded.frozen_errors[1] < 1.0

@@ -7,8 +7,8 @@ import pytest
 
 from parcontact import scene
 from parcontact.errors import InputError
-from parcontact.job.cells import first_between_cells
-from parcontact.job.timeline import Timeline
+from parcontact.history.cells import first_between_cells
+from parcontact.history.timeline import Timeline
 from parcontact.storage.resolved import shown_job
 
 from .texts import SMALL, job_of, with_stage
@@ -23,7 +23,7 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, count: int, way: str) -> No
     text = with_stage(f"{{pressure: 1e5, {way}duration: {count}.0, time_step: 1.0}}")
     job = job_of(tmp_path, text)
     began = time.process_time()
-    timeline = job.timeline()
+    timeline = Timeline.of(job)
     # a duration within 1e-9 of a whole number of steps is one
     assert timeline.count == pytest.approx(count + 1, rel=2e-9)
     assert timeline[timeline.count].time == float(count)
@@ -39,11 +39,11 @@ def test_the_first_step_between_cells_of_so_many(tmp_path: Path, count: int) -> 
     cell = 1e-3 / 64
     stage = f"{{pressure: 1e5, velocity: {cell * (1 + 1e-12)!r}, duration: {count}.0, time_step: 1.0}}"
     job = job_of(tmp_path, with_stage(stage))
-    step = first_between_cells(job.timeline(), job.grid)
+    step = first_between_cells(Timeline.of(job), job.grid)
     assert step is not None
 
     def off(number: int) -> float:
-        cells = job.timeline()[number].position[0] / cell
+        cells = Timeline.of(job)[number].position[0] / cell
         return abs(cells - round(cells))
 
     assert off(step.number) >= 1e-6 > off(step.number - 1)
@@ -53,7 +53,7 @@ def test_going_on_to_a_far_end(tmp_path: Path) -> None:
     """`--until` of 1e9 s, in steps of a microsecond and up to 1e18 of them."""
     job = job_of(tmp_path, with_stage("{pressure: 1e5, velocity: 1, duration: 1e-3, time_step: 1e-6}"))
     for until in (1e9, 1e12):
-        timeline: Timeline = job.timeline(until)
+        timeline: Timeline = Timeline.of(job, until)
         assert timeline.count == pytest.approx(1e6 * until, rel=3e-9)
         assert timeline[timeline.count].time == pytest.approx(until, rel=3e-9)
 

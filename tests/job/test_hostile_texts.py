@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from parcontact.job import JobError, load
-from parcontact.job.loading import read_job
+from parcontact.job.text.overrides import read_job
 
 from .texts import SMALL, mistakes_of, with_material, with_stage, with_surface
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from parcontact.job import Job
-from parcontact.job.sample import describe_sample
+from parcontact.job.checks.sample import describe_sample
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 6.25e-5, "rms_slope": 0.1}
 WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}

@@ -23,7 +23,8 @@ from parcontact.command import words
 from parcontact.command.completion import bash, verbs_of
 from parcontact.effects.interface import InterfaceColumns
 from parcontact.errors import InputError
-from parcontact.job import keys, yamltext
+from parcontact.job import keys
+from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
 from parcontact.steady_sliding import table as steady_table
 from parcontact.storage import fields, measures

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import __main__, private
-from parcontact.job.table import plain
+from parcontact.job.sections.listing import plain
 from parcontact.parallel.slab import Slab
 from parcontact.plan import machine, other_ranks, report
 from parcontact.plan.planning import only_steady_states

@@ -10,9 +10,10 @@ import pytest
 from marching import marched
 from mpi4py import MPI
 
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
-from parcontact.job.advice import cells_per_wave
-from parcontact.job.table import plain
+from parcontact.job.checks.advice import cells_per_wave
+from parcontact.job.sections.listing import plain
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import SPOTS_ORDER, Summary
 from parcontact.physics.time_error import TIME_ORDER
@@ -38,7 +39,7 @@ def job(**changes: Any) -> Job:
 def costs(planned: Job, time: float = 0.0, mesh: float = 0.0, of: str = "friction", calls: float = 10.0) -> Costs:
     """As if a trial of all steps had seen such errors; a step takes 1 s and some calls."""
     stages = []
-    for span in planned.timeline().spans:
+    for span in Timeline.of(planned).spans:
         n = span.jumps + span.count
         sums = {"seconds": n, "operator": n * calls, f"{of} weight": n, f"{of} time error": n * time}
         stages.append(StageCost(n, n, float(n), {**sums, f"{of} mesh error": n * mesh}))
@@ -98,7 +99,7 @@ def test_chosen_steps_make_what_they_are_chosen_for() -> None:
     chosen = {key: value for key, value in SLIDE.items() if key != "cells_per_step"}
     planned = job(grid={"points": 240, "size": 1e-3}, history=[chosen])
     seen = costs(planned, time=price.CHOSEN_SHARE * 0.01)
-    lasting = planned.timeline().spans[0].count
+    lasting = Timeline.of(planned).spans[0].count
     for accuracy, times in ((0.01, 1.0), (1e-3, 10 ** (1 / TIME_ORDER))):
         assert price.offer(seen, accuracy).steps == pytest.approx(1 + lasting * times, abs=1.0)
 

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from parcontact import scene
 from parcontact.command import words
 from parcontact.effects import decisions
+from parcontact.history.timeline import Timeline
 from parcontact.parallel.slab import Slab
 from parcontact.plan import other_ranks, trial
 from parcontact.plan.planning import try_job
@@ -41,7 +42,7 @@ def test_rest_that_is_cut_short_is_known(material: Json) -> None:
     dwell = {"pressure": 1e4, "duration": 1.0, "time_step": {"first": 1e-5, "growth": 1.2}}
     planned = job(material=material, history=[dwell, CELLS])
     _, rows = marched(planned)
-    assert len(rows) < len(planned.timeline())
+    assert len(rows) < len(Timeline.of(planned))
     assert sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6).steps == len(rows) - 1
 
 
@@ -65,7 +66,7 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
     """They follow each other without a gap, weigh as much as all, and end where all do."""
     stage = {**stage, **({"duration": 1e-2} if "duration" in stage else {"distance": 1e-2})}
     planned = job(history=[stage])
-    timeline = planned.timeline()
+    timeline = Timeline.of(planned)
     whole = list(timeline)
     picked = list(chosen(timeline, range(1, len(timeline) + 1), share))
     assert sum(weight for _, weight in picked) == pytest.approx(len(whole), rel=1e-12)
@@ -113,9 +114,9 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert tried is not None
     assert max(tried.grid.points) <= 1024
     assert tried.grid.size == large.grid.size
-    assert len(tried.timeline()) < len(large.timeline())
+    assert len(Timeline.of(tried)) < len(Timeline.of(large))
     seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (StageCost(9, 9, 9.0, {"seconds": 9.0}),))
-    assert Scaling.of(large, [seen], MACHINE).steps == len(large.timeline())
+    assert Scaling.of(large, [seen], MACHINE).steps == len(Timeline.of(large))
     ratio = Scaling.of(large, [seen], MACHINE).step(1) / Scaling.of(tried, [seen], MACHINE).step(1)
     assert ratio > large.grid.nx**2 / tried.grid.nx**2
     assert trial.grid_for(job(), 1, 10.0) == job()

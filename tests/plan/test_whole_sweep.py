@@ -6,7 +6,7 @@ from unittest.mock import Mock
 import pytest
 
 from parcontact.job import load_cases
-from parcontact.job.table import plain
+from parcontact.job.sections.listing import plain
 from parcontact.plan import other_ranks, whole_sweep
 from parcontact.plan.sample import Sample, StageCost
 from parcontact.plan.scaling import Machine, Scaling

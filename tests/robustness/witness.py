@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from parcontact.errors import RunError
-from parcontact.job import timeline as clock
-from parcontact.job.timeline import Step
+from parcontact.history import timeline as clock
+from parcontact.history.timeline import Step, Timeline
 from parcontact.march.loop import run
 from parcontact.march.step import March
 from parcontact.parallel.slab import Array
@@ -63,7 +63,7 @@ class Witness:
     def see(self) -> "Witness":
         """To the end; collective."""
         job = self.march.scene.job
-        timeline = job.timeline()
+        timeline = Timeline.of(job)
         try:
             run(self.march, [lambda march: self._note(timeline, march.row)])
         except RunError as error:

@@ -7,6 +7,7 @@ from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, J
 from mpi4py import MPI
 
 from parcontact import scene
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
@@ -46,7 +47,7 @@ def lasting(planned: Job) -> Counter[str]:
     ledger = Ledger(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
     moduli, cells, dt = [0.0, 0.0], 0, -1.0
-    for step in planned.timeline():
+    for step in Timeline.of(planned):
         heights = path.at(step.position)
         trial = body.begin(step.dt, heights)
         alpha = trial.alpha

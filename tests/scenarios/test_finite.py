@@ -13,6 +13,7 @@ from marching import begun
 from short_job import JOB
 
 from parcontact.__main__ import main
+from parcontact.history.timeline import Timeline
 from parcontact.march.failure import StepError
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.measures import Measures
@@ -33,7 +34,7 @@ def test_no_certificate(wrong: float, place: int) -> None:
 def test_heights_that_are_not_finite(wrong: float) -> None:
     """Whatever the solver makes of them: no row, and the state is as it was."""
     march = begun(JOB)
-    first, second = islice(march.scene.job.timeline(), 2)
+    first, second = islice(Timeline.of(march.scene.job), 2)
     march.advance(first)
     before, pressure = march.row, march.field("pressure")
     motion: Any = march.scene.motion

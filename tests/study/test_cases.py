@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from parcontact.errors import InputError
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
 from parcontact.study.cases import Case, Ladders, about_chosen_steps, ladders, overrides
 
@@ -65,10 +66,10 @@ def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, fa
     assert changed.grid.points == (mesh, mesh // 2)
     assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 1e-3)
     assert (changed.numerics.precision, changed.numerics.kernel) == ("mixed", "love")
-    before, after = ([span.count for span in one.timeline().spans] for one in (job, changed))
+    before, after = ([span.count for span in Timeline.of(one).spans] for one in (job, changed))
     assert after[1:] == [round(count / factor) for count in before[1:]]
     assert abs(after[0] - before[0] / factor) <= 2
-    assert changed.timeline().end == pytest.approx(job.timeline().end, rel=1e-12)
+    assert Timeline.of(changed).end == pytest.approx(Timeline.of(job).end, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +121,7 @@ def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
     job, found = chosen(path, "{cells_per_step: [4, 2, 1]}")
     jobs = [load(path, overrides(job, found.own, case)) for case in found.cases()]
     assert [case.steps for case in found.cases()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
-    assert [one.timeline().spans[2].count for one in jobs] == [2, 4, 8]
+    assert [Timeline.of(one).spans[2].count for one in jobs] == [2, 4, 8]
     assert all(one.history[0].chooses for one in jobs)
     (line,) = about_chosen_steps(job)
     assert line == "stage 1: time steps at rest are chosen in every case, they have no cells per step"

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from .fault import Fault, quote, refuse
-from .source import shorten
+from ..text.fault import Fault, quote, refuse
+from ..text.source import shorten
 
 FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits

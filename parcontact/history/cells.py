@@ -1,7 +1,7 @@
 """Which steps leave the surface between cells: by whole cells along x heights are moved without a transform."""
 
+from ..job.sections.settings import Grid
 from .chosen import ChosenEnds
-from .sections import Grid
 from .timeline import Step, Timeline
 
 SAME_PLACE = 1e-6  # of a cell: a displacement this close to whole cells is one of whole cells

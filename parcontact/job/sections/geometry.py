@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
-from .fault import Fault, refuse
-from .heights import HeightArray
+from ..text.fault import Fault, refuse
+from .height_arrays import HeightArray
 from .part import Context, Part, Rule, chosen, existing_file
 from .topography import RoughSpectrum, Topography
 from .values import Positive, Real, Seed, Whole

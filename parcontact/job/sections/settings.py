@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from .fault import Fault
+from ..text.fault import Fault
 from .part import Context, Part, Rule
 from .values import FROM_SURFACE, Count, Flag, Positive, both, from_home, listed
 

@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo
 
-from ..errors import InputError
-from ..rubber import compound
-from .fault import Fault, quote, refuse
+from ...errors import InputError
+from ...rubber import compound
+from ..text.fault import Fault, quote, refuse
 from .part import Part, Rule, chosen, existing_file
 from .temperature import Celsius, Shift, shifted
 from .values import NonNegative, Positive

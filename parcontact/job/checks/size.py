@@ -7,8 +7,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from .sections import Grid, Output
-from .timeline import Timeline
+from ..sections.settings import Grid, Output
 
 MAPS, MAPS_FREE = 9.0, 18.0  # of 8 bytes per point that any run holds, at least; free ones have padded transforms
 MANY_STEPS = 10**8  # at a millisecond each, more than a day; and no step takes less than a tenth of that
@@ -17,11 +16,10 @@ GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
-def warnings(grid: Grid, timeline: Timeline, output: Output) -> Iterator[str]:
-    """Sentences: memory, steps, disk."""
+def warnings(grid: Grid, count: int, output: Output) -> Iterator[str]:
+    """Sentences: memory, steps, of which there are about `count`, disk."""
     if text := beyond_memory(grid):
         yield text
-    count = timeline.count
     if count > MANY_STEPS:
         seconds = 1e-4 * count
         duration = f"{seconds / 3.156e7:.2g} years" if seconds > 3.156e7 else f"{seconds / 3600:.2g} hours"
@@ -56,12 +54,12 @@ def beyond_memory(grid: Grid) -> str:
     )
 
 
-def beyond_file(timeline: Timeline, output: Output) -> str:
+def beyond_file(count: int, output: Output) -> str:
     """What to say if one file cannot hold so many instants of fields, or ''."""
-    saved = -(-timeline.count // output.every)
+    saved = -(-count // output.every)
     if not output.fields or saved <= MOST_INSTANTS:
         return ""
-    least = -(-timeline.count // MOST_INSTANTS)
+    least = -(-count // MOST_INSTANTS)
     return (
         f"output.every: {saved:.4g} instants of fields would be saved, and a file holds {MOST_INSTANTS} at most; use "
         f"every: {least} or more"

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .fault import quote
-from .mapping import source_of
+from .python_data import source_of
 from .source import Key, Mistake, Place, Source, shorten
-from .sweep import SWEEP, Setting, Sweep, refuse_overrides, take
+from .sweep_cases import SWEEP, Setting, Sweep, refuse_overrides, take
 from .yamltext import parse, read, read_with_content
 
 MATERIAL: Key = ("material",)
 INCLUDE: Key = ("material", "include")
-OURS = Path(__file__).parents[1] / "materials"  # compounds that come with the program
+OURS = Path(__file__).parents[2] / "materials"  # compounds that come with the program
 
 
 class Override(NamedTuple):

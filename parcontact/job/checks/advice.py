@@ -9,10 +9,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from .history import AUTO, GeometricStep, Stage
-from .material import Elastic, Zener
-from .sections import Grid, Numerics
-from .surface import Rough
+from ..sections.geometry import Rough
+from ..sections.materials import Elastic, Zener
+from ..sections.settings import Grid, Numerics
+from ..sections.stages import AUTO, GeometricStep, Stage
 
 LONG_WAVES = 4  # in the box: fewer make the statistics of one surface a matter of luck (paper, end of section 3)
 CELLS_PER_WAVE = 8  # for an error of 1 %: fewer under-resolve the contact of the shortest waves

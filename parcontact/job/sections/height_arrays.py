@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator
 
-from .fault import Fault, quote, refuse
-from .mapping import is_array
+from ..text.fault import Fault, quote, refuse
+from ..text.python_data import is_array
 from .part import Part
-from .sections import Grid
+from .settings import Grid
 
 if TYPE_CHECKING:
     import numpy as np

@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
+from ..job.checks.limits import first_step
+from ..job.sections.settings import Grid
+from ..job.sections.stages import AUTO, GeometricStep, Stage
 from .chosen import RAMP_STEPS, SAME_TIME, reached
-from .history import AUTO, GeometricStep, Stage
-from .limits import first_step
-from .sections import Grid
 
 MANY = 10**12  # steps of a stage, of which one is too little to be told from the end
 

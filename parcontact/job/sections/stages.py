@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create_model
 
-from .fault import Fault, quote, refuse
+from ..text.fault import Fault, quote, refuse
 from .part import Context, Part, Rule
 from .temperature import Celsius
 from .values import Flag, NonNegative, Positive, Real, Vector, listed, log_range

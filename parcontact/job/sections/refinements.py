@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from .fault import Fault
+from ..text.fault import Fault
 from .part import Part, Rule
 from .values import Count, Positive, listed
 

@@ -9,10 +9,11 @@ from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
+from ..job import Job
+from ..job.sections.settings import Grid
+from ..job.sections.stages import GeometricStep, Ramp, Stage
 from .chosen import ChosenEnds, ChosenSteps, reached
 from .division import Fractions, divided
-from .history import GeometricStep, Ramp, Stage
-from .sections import Grid
 
 ROUNDINGS = 4.0  # of an instant, between two that are the same
 
@@ -162,6 +163,15 @@ class Timeline:
         total = self.spans[-1].last if history else 0
         self._from = [*(total - span.before for span in self._spans), 0]  # steps from a stage on that has not begun
 
+    @classmethod
+    def of(cls, job: Job, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
+        """All steps of a job; its last stage goes on to `until` [s] if that is later than its end.
+
+        `chosen` are the steps that stages have chosen so far; those to come are guessed.
+        """
+        record = (chosen or ChosenSteps.of(job)) if job.remembers else None
+        return cls(job.history, job.grid, until, job.initial.pressure, record)
+
     @property
     def spans(self) -> list[Span]:
         """Those of all stages."""
@@ -203,7 +213,7 @@ class Timeline:
     def _ends(self, index: int, stage: Stage, until: float) -> Fractions | ChosenEnds:
         if self.chosen is None or not stage.chooses:
             return divided(stage, self.grid)
-        return self.chosen.of(index, stage, self.grid, until if self._is_last(index) else 0.0)
+        return self.chosen.of_stage(index, stage, self.grid, until if self._is_last(index) else 0.0)
 
     def follow(self, times: Mapping[int, float]) -> "Timeline":
         """Take the times [s] of steps that were made, by their numbers, as those that the stages have chosen."""

@@ -8,10 +8,10 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, PlainValidator
 
-from ..errors import InputError
-from ..rubber.shift import WLF, Arrhenius, Factors
-from ..rubber.shift import Shift as Law
-from .fault import Fault
+from ...errors import InputError
+from ...rubber.shift import WLF, Arrhenius, Factors
+from ...rubber.shift import Shift as Law
+from ..text.fault import Fault
 from .part import Part, Rule, chosen
 from .values import Positive, Real
 

@@ -2,8 +2,8 @@
 
 import math
 
-from .model import Job
-from .surface import Rough
+from ..model import Job
+from ..sections.geometry import Rough
 
 # Standard deviations over 8 to 12 seeds, times the longest waves along a side; found with six steady states of 2 to
 # 50 % contact of bodies of one and twelve branches, in boxes of 2, 4 and 8 of these waves: 0.11 to 0.44 for friction,

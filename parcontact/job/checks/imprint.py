@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
-from .history import Initial, Stage
-from .material import Elastic, Zener
-from .sections import Grid
-from .surface import Rough, Wave
+from ..sections.geometry import Rough, Wave
+from ..sections.materials import Elastic, Zener
+from ..sections.settings import Grid
+from ..sections.stages import Initial, Stage
 
 NEAR = 0.4  # of the longest wave: as near to where it was, the surface is over its own imprint
 REMEMBERS = 0.1  # of the time since: a branch that relaxes in less has forgotten

@@ -10,13 +10,13 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from .fault import Fault
-from .heights import HeightArray
-from .history import AUTO, GeometricStep, Initial, Stage, Steady
-from .material import Elastic, Zener, ZenerBranch
-from .sections import Grid
-from .source import Key
-from .surface import Cylinder, HeightFile, Rough, Sphere, Wave
+from ..sections.geometry import Cylinder, HeightFile, Rough, Sphere, Wave
+from ..sections.height_arrays import HeightArray
+from ..sections.materials import Elastic, Zener, ZenerBranch
+from ..sections.settings import Grid
+from ..sections.stages import AUTO, GeometricStep, Initial, Stage, Steady
+from ..text.fault import Fault
+from ..text.source import Key
 
 SMALLEST, LARGEST = 1e-70, 1e70  # fourth powers and their reciprocals are normal numbers of double precision
 MOST_STEPS = 10**18  # of a history: instants are counted in 64 bits
@@ -165,6 +165,12 @@ def of_steps(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
                 count = f"{total:.3g} steps" if math.isfinite(total) else "steps without number"
                 yield Fault(f"leads to {count}; a history has at most {MOST_STEPS:.0e}", (*at, key))
                 return
+
+
+def count_steps(grid: Grid, history: tuple[Stage, ...]) -> int:
+    """About how many steps a history has; jumps are left out."""
+    lasting = [stage for stage in history if stage.seconds]
+    return math.ceil(sum(steps_of(stage, stage.seconds, first_step(stage, grid)) for stage in lasting))
 
 
 def first_step(stage: Stage, grid: Grid) -> float:

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-from .history import Stage
-from .limits import one_cell
-from .sections import Grid
-from .surface import Cylinder, Flat, Rough, Sphere, Wave
+from ..job import Job
+from ..job.checks.limits import one_cell
+from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
+from ..job.sections.settings import Grid
+from ..job.sections.stages import Stage
 
 SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
 HALVINGS = 10  # of a cell, in the shortest step of a surface that slides
@@ -143,12 +144,18 @@ class ChosenSteps:
     ends: dict[int, list[float]] = field(default_factory=dict)
     next: float = 0.0
 
+    @classmethod
+    def of(cls, job: Job, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
+        """Those that the stages of a job had chosen when a checkpoint with these numbers was written; none without."""
+        none = cls(most_cells(job.grid, job.surface))
+        return none.restored(saved) if saved is not None else none
+
     @property
     def count(self) -> int:
         """How many."""
         return sum(map(len, self.ends.values()))
 
-    def of(self, stage: int, asked: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
+    def of_stage(self, stage: int, asked: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
         """Those of a stage that may go on to `until` [s after its start]."""
         made, limits = self.ends.get(stage, []), bounds(asked, grid, self.cells)
         stops = (asked.seconds, *([until] if not reached(asked.seconds, until) else []))
@@ -179,13 +186,14 @@ class ChosenSteps:
         return found
 
 
-def describe(history: Sequence[Stage], accuracy: float, remembers: bool, cells: int) -> str:
-    """Which stages choose their own steps, how, and why; '' if none does."""
-    names = ", ".join(stage.name for stage in history if stage.chooses)
+def describe_steps(job: Job) -> str:
+    """Which stages choose their own time steps, how, and why; '' if none does."""
+    cells = most_cells(job.grid, job.surface)
+    names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
         return ""
-    if not remembers:
+    if not job.remembers:
         return f"{names}: an elastic body has no error of time, one cell of sliding per step, one step at rest"
-    slides = any(stage.chooses and stage.speed for stage in history)
+    slides = any(stage.chooses and stage.speed for stage in job.history)
     limits = f", at most {cells} cell{'s' * (cells > 1)} of sliding" * slides
-    return f"{names}: steps follow the error that numerics.accuracy {accuracy:g} allows{limits}"
+    return f"{names}: steps follow the error that numerics.accuracy {job.numerics.accuracy:g} allows{limits}"

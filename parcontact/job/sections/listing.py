@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from .heights import HeightArray
-from .history import Ramp
+from .height_arrays import HeightArray
 from .part import Part
+from .stages import Ramp
 
 
 def plain(value: Any) -> Any:

@@ -11,9 +11,9 @@ import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from ..sections.values import log_range
 from .fault import quote
 from .source import Key, Mistake, Place, Source, shorten
-from .values import log_range
 
 SWEEP: Key = ("sweep",)
 MAX_CASES = 1000

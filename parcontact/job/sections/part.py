@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError, Valida
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from .fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
-from .loading import Included
-from .source import shorten
+from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
+from ..text.overrides import Included
+from ..text.source import shorten
 from .values import from_home
 
 

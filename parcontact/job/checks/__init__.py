@@ -1,0 +1,1 @@
+"""Checks of a job beyond single keys: limits of computing, resolution, physical meaning, size."""
