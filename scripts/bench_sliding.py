@@ -78,7 +78,7 @@ def _friction(rows: list[Row]) -> Map:
 
 
 def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    base = scene.frame(sliding_job(points, 1), Slab(MPI.COMM_SELF, points, points))
+    base = scene.set_up(sliding_job(points, 1), Slab(MPI.COMM_SELF, points, points))
     for speed in (0.01, 0.3, 10.0):
         calls = SteadySliding(base).solve((speed, 0.0), 1e5).operator_calls
         yield Line("steady", f"cold at {speed:g} m/s: operator calls", calls, "")

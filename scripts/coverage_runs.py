@@ -110,7 +110,7 @@ def _within(budgets: tuple[Parts | None, Parts | None], means: list[float]) -> d
 
 def _steady(job: jobs.Job) -> Series:
     wanted = curve.request(job)
-    sliding = SteadySliding(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    sliding = SteadySliding(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
     speed, pressure, _ = wanted.points[0]
     point = sliding.solve(wanted.velocity(speed), pressure)
     area = point.measures.contact_area_corrected

@@ -38,12 +38,13 @@ from hostile_jobs import write_job
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact import sanity, scene
+from parcontact import scene
 from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job.text import yamltext
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
+from parcontact.scene import sanity
 
 CPU_SECONDS = 3.0  # to refuse a job
 HANG_SECONDS = 20.0  # of CPU time for all that is done with a job in this process
@@ -84,7 +85,7 @@ def drive(path: Path) -> tuple[str, jobs.Job | None]:
             return "large", None
         scene.effects(job)
         built = scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points))
-        sanity.of_surface(built.frame)
+        sanity.of_surface(built.setup)
     except InputError:
         return "refused", None
     return march(job, built), job

@@ -38,7 +38,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "physics/halfspace.py": ("tests/physics/test_halfspace.py", "tests/physics/test_love.py"),
     "physics/surface.py": (*SURFACE, "tests/physics/test_sliding.py"),
     "physics/roughness.py": ("tests/physics/test_roughness.py",),
-    "physics/lowest.py": ("tests/physics/test_lowest.py", "tests/test_rigid_surface.py"),
+    "physics/lowest.py": ("tests/physics/test_lowest.py", "tests/scene/test_rigid_surface.py"),
     "physics/budget.py": ("tests/physics/test_budget.py", "tests/test_half_mesh.py"),
     "physics/seen.py": ("tests/physics/test_budget.py",),
     "physics/time_error.py": ("tests/physics/test_budget.py",),
@@ -46,8 +46,8 @@ PARTS = {  # files of the program, and the tests that answer for them
     "parallel/slab.py": ("tests/parallel/test_slab.py",),
     "solve/contact.py": (*CONTACT, "tests/robustness/test_descent.py"),
     "solve/kernels.py": ("tests/solve/test_kernels.py", *CONTACT),
-    "solve/nonsymmetric/steady.py": ("tests/test_steady_states.py",),
-    "solve/nonsymmetric/projected.py": ("tests/solve/test_projected.py", "tests/test_steady_states.py"),
+    "solve/nonsymmetric/steady.py": ("tests/steady_sliding/test_sliding.py",),
+    "solve/nonsymmetric/projected.py": ("tests/solve/test_projected.py", "tests/steady_sliding/test_sliding.py"),
     "solve/local_load.py": ("tests/solve/test_local_load.py",),
     "solve/nonsymmetric/gcr.py": ("tests/solve/test_gcr.py",),
     "solve/fallback/active_set.py": ("tests/solve/test_active_set.py", "tests/test_retry.py"),
@@ -63,7 +63,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "history/timeline.py": ("tests/test_clock.py", *VISCOELASTIC),
     "history/chosen.py": ("tests/test_chosen_steps.py", "tests/test_choosing.py"),
     "storage/checkpoint.py": ("tests/storage/test_checkpoint.py",),
-    "plan/memory.py": ("tests/plan/test_memory.py", "tests/test_steady_memory.py"),
+    "plan/memory.py": ("tests/plan/test_memory.py", "tests/steady_sliding/test_start.py"),
 }
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Add: ast.Sub,

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from parcontact import prediction
 from parcontact.errors import InputError
 from parcontact.job import Initial, load
 from parcontact.parallel.mpi import MPI
 from parcontact.parallel.slab import Slab
+from parcontact.report import prediction
 from parcontact.summary import sweep_table
 from parcontact.theory.persson import GAMMA
 

@@ -61,7 +61,7 @@ def trial(random, points):
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory, "random.yaml")
         path.write_text(text)
-        sliding = SteadySliding(scene.frame(job.load(path), Slab(MPI.COMM_SELF, points, points)))
+        sliding = SteadySliding(scene.set_up(job.load(path), Slab(MPI.COMM_SELF, points, points)))
     return sliding, (modulus_inf, moduli, times), speed, pressure
 
 

@@ -46,7 +46,7 @@ def states(points: int, box: float = BOX) -> SteadySliding:
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory, "sphere.yaml")
         path.write_text(TEXT.format(points=points, size=box * CONTACT))
-        return SteadySliding(scene.frame(job.load(path), Slab(MPI.COMM_SELF, points, points)))
+        return SteadySliding(scene.set_up(job.load(path), Slab(MPI.COMM_SELF, points, points)))
 
 
 def solve(sliding: SteadySliding, speed: float, box: float = BOX) -> Point:

@@ -8,11 +8,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from parcontact import sanity, scene
+from parcontact import scene
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
+from parcontact.scene import sanity
 
 Json = dict[str, Any]
 HERE = Path(__file__).parents[1] / "jobs"
@@ -30,7 +31,7 @@ def of_file(path: Path, heights: NDArray[np.floating], **sections: Any) -> list[
     np.save(path, heights)
     grid = {"points": list(heights.shape[::-1]), "size": 1e-3}
     job = job_of({"shape": "file", "path": str(path)}, [{"pressure": 1e4}], grid=grid, **sections)
-    return sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    return sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
 
 
 def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.floating]:

@@ -19,7 +19,7 @@ def sliding(path: Path, text: str, comm: MPI.Intracomm, *overrides: str) -> Stea
     file = path / f"steady-{comm.rank}.yaml"
     file.write_text(text)
     job = jobs.load(file, overrides)
-    return SteadySliding(scene.frame(job, Slab(comm, *job.grid.points)))
+    return SteadySliding(scene.set_up(job, Slab(comm, *job.grid.points)))
 
 
 def certificate(states: SteadySliding, speed: float, pressure: float) -> float:

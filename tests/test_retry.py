@@ -137,9 +137,9 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
     """FFTW guesses them: what it measures depends on how busy the machine is, and the last digits on that."""
     data = {"grid": {**GRID, "boundary": boundary}, "surface": ROUGH, "material": ELASTIC, "history": [PRESS]}
     built = begun(data | {"numerics": {"precision": precision}}).scene
-    coarse = solver_on(built.frame, built.slab.resized(32, 32), 1e-3)
+    coarse = solver_on(built.setup, built.slab.resized(32, 32), 1e-3)
     assert coarse.slab.shape == (32, 32)
-    assert built.frame.fft.measured
+    assert built.setup.fft.measured
     for operator in (coarse.operator, coarse.preconditioner):
         assert isinstance(operator, Convolution)
         assert not operator.fft.measured

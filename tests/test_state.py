@@ -88,7 +88,7 @@ def test_a_start_from_steady_sliding_is_a_state_like_any_other(material: dict[st
     """The gap is closed where there is pressure, and nowhere less, to the tolerance."""
     march = begun(job(material, SLIDES, **STEADY))
     gap, pressed = march.field("gap"), march.field("pressure") > 0.0
-    limit = march.scene.job.numerics.tolerance * march.scene.frame.height
+    limit = march.scene.job.numerics.tolerance * march.scene.setup.height
     assert 0.0 < np.mean(pressed) < 1.0
     assert gap.min() > -limit
     assert np.mean(np.abs(gap[pressed])) < 2.0 * limit

@@ -151,7 +151,7 @@ def test_the_end_of_a_dwell_is_that_of_all_its_steps(tolerance: float, precision
     assert len(found) < len(expected)
     end, whole = (next(row for row in series if row.step == found[-5].step) for series in (found, expected))
     assert end.time == pytest.approx(0.1, rel=1e-12)
-    height = march.scene.frame.height
+    height = march.scene.setup.height
     assert abs(end.measures.approach - whole.measures.approach) <= 3 * tolerance * height
     change = march.field("displacement") - plain.field("displacement")
     assert np.abs(change).max() <= 4 * tolerance * height

@@ -41,7 +41,7 @@ def steady(options: argparse.Namespace) -> int:
 
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
-    from .. import prediction
+    from ..report import prediction
     from ..steady_sliding import curve
 
     asked = [getattr(options, name, ()) for name in OF_A_CURVE]
@@ -83,14 +83,15 @@ def _doubts(job: Job) -> list[str]:
 
     if meaning.says_all(job.surface) and not job.measured:
         return []
-    from .. import sanity, scene
-    from ..effects.measured_range import describe_beyond
+    from .. import scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
+    from ..scene import sanity
+    from ..scene.measured_range import describe_beyond
 
     found = list(describe_beyond(job))
     if sanity.is_quickly_made(job):
-        found += sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+        found += sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
     return found
 
 
@@ -99,12 +100,13 @@ def plan(options: argparse.Namespace) -> int:
 
     started = watch.age()
     world = ranks.start()
-    from .. import sanity, scene
-    from ..effects.measured_range import describe_beyond
+    from .. import scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..plan import machine, planning, whole_sweep
     from ..run import sweep_warnings
+    from ..scene import sanity
+    from ..scene.measured_range import describe_beyond
 
     chosen = on_root(world, lambda: cases_of(options)[1])
     job = chosen[0].job
@@ -120,7 +122,7 @@ def plan(options: argparse.Namespace) -> int:
     doubts = [] if whole else [*job.warnings, *describe_beyond(job)]
     if whole:
         on_root(world, lambda: sweep_warnings.warn_once(chosen))
-    for warning in (*doubts, *(sanity.of_surface(scene.frame(job, slab)) if sanity.is_quickly_made(job) else ())):
+    for warning in (*doubts, *(sanity.of_surface(scene.set_up(job, slab)) if sanity.is_quickly_made(job) else ())):
         if world.rank == 0:
             print(f"warning: {warning}", flush=True)
     given = slab, alone, wanted, started
@@ -135,9 +137,9 @@ def theory(options: argparse.Namespace) -> int:
 
 
 def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
-    from .. import prediction
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
+    from ..report import prediction
     from ..summary.theory_settings import TheorySettings
 
     def write() -> Path:
@@ -187,10 +189,11 @@ def surface(options: argparse.Namespace) -> int:
     world = ranks.start()
     from pathlib import Path
 
-    from .. import sanity, scene
+    from .. import scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..plotting import surfaces
+    from ..scene import sanity
     from ..summary import measured_maps
 
     given = Path(options.job)
@@ -202,7 +205,7 @@ def surface(options: argparse.Namespace) -> int:
     def act() -> list[str]:
         measured_maps.refuse_taken(options.start)
         job = measured_maps.load(given, options.set) if alone else _load(options, MPI.COMM_SELF)
-        base = scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))
+        base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
         doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
         base.surface.rescale(1.0)
         heights = base.surface.heights((0.0, 0.0), base.slab.empty())

@@ -111,7 +111,7 @@ class Bench:
         loads, tractions, penetrations = zip(*built.slab.from_all(own), strict=True)
         load, traction, penetration = math.fsum(loads), float(max(tractions)), float(max(penetrations))
         self.expect("traction", max(traction, 0.0), 0.0, 0.0)
-        self.expect("penetration", max(penetration / built.frame.height, 0.0), 0.0, 1.1 * tolerance, scale=1.0)
+        self.expect("penetration", max(penetration / built.setup.height, 0.0), 0.0, 1.1 * tolerance, scale=1.0)
         self.expect("residual", march.row.certificate.worst, 0.0, tolerance, scale=1.0)
         numbers = dataclasses.astuple(measures)
         self.expect("numbers", math.fsum(abs(x) < math.inf for x in numbers), float(len(numbers)), 0.0)

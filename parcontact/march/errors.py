@@ -22,7 +22,7 @@ from ..physics.prony import Prony
 from ..physics.seen import Known, Seen
 from ..physics.slopes import friction_by_energy
 from ..physics.time_error import time_error
-from ..scene import Frame, Scene
+from ..scene import Scene, Setup
 from ..solve.contact import Contact
 
 PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
@@ -76,7 +76,7 @@ class Errors:
         grid, material, self.slab = scene.job.grid, scene.material, scene.slab
         exponential = scene.job.numerics.integrator == "exponential"
         prony = material.prony if isinstance(material, ZenerBody) else None
-        self.known = known_of(scene.frame, scene.folded.bound, exponential, prony)
+        self.known = known_of(scene.setup, scene.folded.bound, exponential, prony)
         self._slope_unit = scene.units.height / scene.units.length
         self._pressure_unit = scene.units.pressure
         self._cell = grid.dx, grid.dy
@@ -160,11 +160,11 @@ class Errors:
         return last.seen[0]
 
 
-def known_of(frame: Frame, folded: float, exponential: bool, prony: Prony | None) -> Known:
+def known_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> Known:
     """Return what is known of a job before it begins, with the bound of its `folded` branches and what relaxes."""
-    job = frame.job
+    job = setup.job
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
-    waves += [frame.shortest] if frame.shortest is not None else []
+    waves += [setup.shortest] if setup.shortest is not None else []
     cells = min(waves) / max(job.grid.dx, job.grid.dy) if waves else None
     return Known(cells, 1 in job.grid.points or _ridges(job.surface), folded, exponential, prony)
 

@@ -72,7 +72,7 @@ def _reach(scene: Scene, last: Contact, h: Array) -> float:
     as the box: a load far beyond full contact has no digits left for what differs from its mean.
     """
     sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
-    sizes[2] *= scene.frame.half_space.largest_compliance
+    sizes[2] *= scene.setup.half_space.largest_compliance
     return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / last.certificate.length
 
 

@@ -174,7 +174,7 @@ def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
             continue
         error, allowed = scene.folded.memoryless_errors[k], contents.job["numerics"].get("branch_error", 0.0)
         if error > allowed:
-            time = scene.frame.prony.relaxation_times[k]
+            time = scene.setup.prony.relaxation_times[k]
             raise InputError(
                 f"{contents.path} has no map of the branch of relaxation time {time:g} s: its run had no step so short "
                 f"that it mattered to numerics.branch_error = {allowed:g}, now friction would be wrong by {error:.2g}; "

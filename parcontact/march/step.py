@@ -42,8 +42,8 @@ class March:
         slab = scene.slab
         earlier = slab.zeros() if scene.lasts else None
         further = tuple(Past(slab.zeros()) for _ in range(FURTHER * scene.keeps_further))
-        frame, highest = scene.frame, scene.frame.heights.highest  # at no load the surface just touches the body
-        touching = Measures(approach=0.0 - highest - frame.surface.datum, mean_gap=highest - frame.heights.mean)
+        setup, highest = scene.setup, scene.setup.heights.highest  # at no load the surface just touches the body
+        touching = Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
         row, d = self._complete(Row(measures=touching)), -highest / scene.units.height
         self.state = State(row, slab.zeros(), earlier, approach=d, further=further)
         self._next_pressure = slab.zeros()
@@ -174,10 +174,10 @@ class March:
         start = self.starts.make(step, self.state, trial.alpha, self._next_pressure)
         self._elastic_displacement = None
         if self.state.alpha == 0.0:  # nothing has been solved before
-            cold_start.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.frame))
+            cold_start.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.setup))
         contact, remark = self.scene.solver.solve(trial.effective, control, start), ""
         if contact.failure:
-            in_double = solver_in_double(self.scene.frame)
+            in_double = solver_in_double(self.scene.setup)
             if in_double is not None or not self._accepts(contact):
                 contact, remark = self._retry(step, trial.effective, control, contact, in_double)
         if step.passed:
@@ -187,7 +187,7 @@ class March:
     def _control(self, step: Step, trial: Trial) -> MeanPressure | Approach:
         scene, grid = self.scene, self.scene.job.grid
         if step.control == "approach":
-            d = (step.load + scene.frame.surface.datum) / scene.units.height
+            d = (step.load + scene.setup.surface.datum) / scene.units.height
             self._refuse_beyond_full_contact(step, d, trial.effective)
             return Approach(d)
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
@@ -198,8 +198,8 @@ class March:
         scene = self.scene
         if scene.job.grid.boundary == "periodic":
             mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
-            datum = scene.frame.surface.datum
-            rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.frame.height) / scene.units.height
+            datum = scene.setup.surface.datum
+            rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height
             if d + mean > rounding:
                 most = -mean * scene.units.height - datum
                 raise StepError(
@@ -221,7 +221,7 @@ class March:
     ) -> tuple[Contact, str]:
         """Retry a solve that failed, one that would do as it is only in double precision; the contact, and what to say
         of it. Raises StepError when nothing helps."""
-        scene, would_do, on = self.scene, self._accepts(failed), partial(solver_on, self.scene.frame)
+        scene, would_do, on = self.scene, self._accepts(failed), partial(solver_on, self.scene.setup)
         most = 1 if would_do else None
         contact, tried = retry.again(scene.solver, effective, control, failed, on, in_double, most)
         if contact.failure:
@@ -276,7 +276,7 @@ class March:
         base, offset = scene.motion.at(self.state.position).parts
         heights = np.roll(base, offset, axis=1)
         if name == "height":
-            return heights * units.height + scene.frame.surface.datum
+            return heights * units.height + scene.setup.surface.datum
         return (u - heights - self.state.approach) * units.height
 
 

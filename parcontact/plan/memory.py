@@ -24,7 +24,7 @@ from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
 from ..physics.lowest import shape_of
-from ..rigid_surface import highest_waves
+from ..scene.rigid_surface import highest_waves
 from ..solve.contact import ContactSolver
 from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.preconditioner.extension import grids_for

@@ -131,7 +131,7 @@ def _warm_up(job: Job, slab: Slab) -> None:
     with suppress(RunError, InputError):
         if not small.history:
             wanted = request(small)
-            SteadySliding(scene.frame(small, own)).solve((wanted.points[0][0], 0.0), wanted.points[0][1])
+            SteadySliding(scene.set_up(small, own)).solve((wanted.points[0][0], 0.0), wanted.points[0][1])
             return
         march = start.first(small, own)
         for step in islice(steps_to_make(march, Timeline.of(small)), FIRST):
@@ -150,7 +150,7 @@ def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]
 def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
     """Seconds that the scene took, and the steady states, some far apart tried, as one stage; collective."""
     began = time.perf_counter()
-    sliding = SteadySliding(scene.frame(job, slab))
+    sliding = SteadySliding(scene.set_up(job, slab))
     building = time.perf_counter() - began
     wanted = request(job)
     states = wanted.points

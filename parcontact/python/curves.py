@@ -15,7 +15,7 @@ from ..errors import JobError, RunError
 from ..job import log_range
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
-from ..scene import frame
+from ..scene import set_up
 from ..steady_sliding import curve
 from ..steady_sliding.missed import describe_missed
 from ..steady_sliding.sliding import Point, SteadySliding
@@ -88,7 +88,7 @@ def steady(
     found = read(job, {**set, **keys} if isinstance(set, Mapping) else set or keys, comm)
     slab = Slab(all_ranks(comm), *found.grid.points)
     wanted = curve.request(found, *asked.values())
-    base = frame(found, slab)
+    base = set_up(found, slab)
     warn_of(found, base)
     sliding = SteadySliding(base)
     points: list[Point | None] = []

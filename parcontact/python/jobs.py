@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 
 from .. import job as jobs
-from .. import sanity
-from ..effects.measured_range import describe_beyond
 from ..errors import InputError, JobError
 from ..history.timeline import Timeline
 from ..job import Job
 from ..parallel.meeting import meet
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
-from ..scene import Frame
+from ..scene import Setup, sanity
+from ..scene.measured_range import describe_beyond
 
 Given = str | os.PathLike[str] | Mapping[str, Any] | Job
 SOMEWHERE = {"points": 2, "size": 1.0}  # a grid for what needs none
@@ -108,8 +107,8 @@ def of_parts(**parts: Any) -> Job:
     return _sound(jobs.load(rest | parts))
 
 
-def warn_of(job: Job, frame: Frame) -> None:
+def warn_of(job: Job, setup: Setup) -> None:
     """Warn, on root, of what is allowed but means little; collective."""
-    for text in (*job.warnings, *describe_beyond(job), *sanity.of_surface(frame)):
-        if frame.slab.root:
+    for text in (*job.warnings, *describe_beyond(job), *sanity.of_surface(setup)):
+        if setup.slab.root:
             warnings.warn(text, UserWarning, stacklevel=4)

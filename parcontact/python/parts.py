@@ -13,7 +13,7 @@ from ..effects.relaxation import relaxation_of
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..physics import prony
-from ..scene import frame
+from ..scene import set_up
 from .jobs import of_parts
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
     files that do not fit.
     """
     job = of_parts(surface=surface, grid=grid)
-    base = frame(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    base = set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     return np.asarray(heights * base.units.height + base.surface.datum)
 

@@ -201,7 +201,7 @@ class Simulation:
             saved = self._saved
             wisdom.recall(self.job, self._slab, saved.numbers.get("plans/all") if saved else None)
             self._march_made = start.first(self.job, self._slab, saved=saved)
-            warn_of(self.job, self._march_made.scene.frame)
+            warn_of(self.job, self._march_made.scene.setup)
         return self._march_made
 
     @property

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..effects.folded_branches import excited_band
-from ..effects.measured_range import excited_bands
 from ..effects.relaxation import relaxation_of
 from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
 from ..plotting import style, units
+from ..scene.measured_range import excited_bands
 from .parts import Section, Table, of_panel
 
 DECADES = 1.5  # that a picture shows beyond the relaxation times

@@ -2,7 +2,6 @@
 
 from functools import partial
 
-from .. import rigid_surface
 from ..errors import InputError
 from ..job import Job
 from ..job.sections import listing
@@ -11,6 +10,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import surface, units
 from ..road import statistics
+from ..scene import rigid_surface
 from .parts import Section, Table, of_panel
 
 MOST_POINTS = 2**22  # of a surface that is made anew for a report

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
-from .. import sanity, scene
+from .. import scene
 from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..history.timeline import Timeline
@@ -15,6 +15,7 @@ from ..march.failure import StepError
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..physics.entries import Entry
+from ..scene import sanity
 from ..storage import checkpoint, measures, wisdom
 from ..storage.checkpoint import Facts
 from ..storage.console import always

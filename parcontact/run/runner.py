@@ -4,10 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .. import sanity
 from ..effects import decisions
 from ..effects.effect import columns_of
-from ..effects.measured_range import describe_beyond
 from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
@@ -15,7 +13,8 @@ from ..job import Job, Rough, RoughSpectrum
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..scene import Scene
+from ..scene import Scene, sanity
+from ..scene.measured_range import describe_beyond
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, marker, measures, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
@@ -88,7 +87,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         wisdom.recall(job, slab, origin.wisdom if origin else None)
         marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
         timeline = marching.timeline(options.until or 0.0)
-        found = (*job.warnings, *describe_beyond(job), *sanity.of_surface(marching.scene.frame))
+        found = (*job.warnings, *describe_beyond(job), *sanity.of_surface(marching.scene.setup))
         doubts = () if options.beside else found
         wisdom.keep(job, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)

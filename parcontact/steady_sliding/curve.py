@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from .. import sanity, scene
-from ..effects.measured_range import describe_beyond
+from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
+from ..scene import sanity
+from ..scene.measured_range import describe_beyond
 from ..storage import curve_points, hdf5, marker, stopfile
 from ..storage.console import always
 from ..storage.directory import ADVICE, Directory
@@ -106,7 +107,7 @@ def run(
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
-        base = scene.frame(job, slab)
+        base = scene.set_up(job, slab)
         doubts = [*job.warnings, *describe_beyond(job, wanted.temperatures), *sanity.of_surface(base)]
         sliding = SteadySliding(base)
         directory.make(job.path, job.resolved(), marker.Claim(plain))

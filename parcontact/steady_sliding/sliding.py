@@ -20,7 +20,7 @@ from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.seen import Seen
-from ..scene import Frame
+from ..scene import Setup
 from ..solve import kernels, nested
 from ..solve.certificate import Certificate
 from ..solve.nonsymmetric import proximal
@@ -81,7 +81,7 @@ class SteadySliding:
     Started from coarser grids, or from the last state where that is very near. `footprint` says what it holds.
     """
 
-    def __init__(self, base: Frame) -> None:
+    def __init__(self, base: Setup) -> None:
         self.base = base
         self.ledger = base.ledger()
         heights = base.surface.heights((0.0, 0.0), base.slab.empty())
@@ -284,7 +284,7 @@ def tolerance_of(asked: float) -> float:
     return max(SHARE * asked, min(LOOSE, asked))
 
 
-def branch_maps(base: Frame, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
+def branch_maps(base: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
     """The map h_k of each branch in a steady state at a velocity [m/s], each time in `out`; collective."""
     fft, half_space, speed = base.fft, base.half_space, base.in_units(velocity)
     if half_space.free:

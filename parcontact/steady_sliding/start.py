@@ -9,7 +9,7 @@ from ..march.state import State
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..physics.body import ZenerBody
-from ..scene import Frame, build, frame
+from ..scene import Setup, build, set_up
 from ..solve.nonsymmetric.steady import SteadyContact
 from ..storage.checkpoint import Contents
 from .sliding import Point, SteadySliding, branch_maps
@@ -37,7 +37,7 @@ def _from_steady_sliding(job: Job, slab: Slab, until: float) -> March:
     """
     if decisions.energies(job).on:
         raise InputError("output.energy: energies count from a body at rest, so they need initial: {state: virgin}")
-    base = frame(job, slab)
+    base = set_up(job, slab)
     point, contact = _solve(base)
     scene = build(job, slab, until, base)
     pressure, spare, _ = scene.solver.lend()
@@ -60,7 +60,7 @@ def _from_steady_sliding(job: Job, slab: Slab, until: float) -> March:
     return march
 
 
-def _solve(base: Frame) -> tuple[Point, SteadyContact]:
+def _solve(base: Setup) -> tuple[Point, SteadyContact]:
     """The state, and its contact, without the maps that it took to find it; collective."""
     sliding, initial = SteadySliding(base), base.job.initial
     point = sliding.solve(initial.velocity, initial.pressure or 0.0)

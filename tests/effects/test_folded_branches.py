@@ -108,7 +108,7 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     slide = {**SLIDE, "pressure": pressure, "distance": 5e-3}
     numerics = {"branch_error": 0.0, "tolerance": 1e-7}
     marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
-    base = marches[1].scene.frame
+    base = marches[1].scene.setup
     marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", frozen=[1])
     timeline = list(Timeline.of(base.job))
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]

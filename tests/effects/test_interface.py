@@ -79,7 +79,7 @@ def test_a_bell_over_the_velocity() -> None:
 
 def test_a_steady_state_has_it_too() -> None:
     built = job(interface=CONSTANT)
-    sliding = SteadySliding(scene.frame(built, Slab(MPI.COMM_SELF, 32, 4)))
+    sliding = SteadySliding(scene.set_up(built, Slab(MPI.COMM_SELF, 32, 4)))
     measures = sliding.solve((SPEED, 0.0), PRESSURE).measures
     assert measures.friction_interface == pytest.approx(STRESS * measures.contact_area / PRESSURE, rel=1e-12)
     assert measures.friction > measures.friction_interface

@@ -18,7 +18,7 @@ import yaml
 from marching import ROOT
 from pydantic import TypeAdapter
 
-from parcontact import __main__, job, prediction
+from parcontact import __main__, job
 from parcontact.command import words
 from parcontact.command.completion import bash, verbs_of
 from parcontact.effects.interface import InterfaceColumns
@@ -26,6 +26,7 @@ from parcontact.errors import InputError
 from parcontact.job import keys
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
+from parcontact.report import prediction
 from parcontact.steady_sliding import table as steady_table
 from parcontact.storage import fields, measures
 from parcontact.study import table as study_table

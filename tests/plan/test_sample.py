@@ -130,7 +130,7 @@ def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None
     """All of them, in another order: the states and transforms are those of the verb, as each starts from nothing."""
     planned = job(material=TWO, history=[], steady=CURVE)
     slab = Slab(comm, *planned.grid.points)
-    sliding = SteadySliding(scene.frame(planned, slab))
+    sliding = SteadySliding(scene.set_up(planned, slab))
     before = slab.tally.copy()
     for pressure in CURVE["pressures"]:
         for speed in CURVE["velocities"]:

@@ -10,16 +10,17 @@ from judging import job_of
 from mpi4py import MPI
 
 import parcontact as pc
-from parcontact import sanity, scene
+from parcontact import scene
 from parcontact.march.errors import known_of
 from parcontact.parallel.slab import Slab
+from parcontact.scene import sanity
 
 SLIDE = {"pressure": 1e5, "velocity": 0.3, "distance": 1e-4, "cells_per_step": 1}
 
 
-def frame_of(surface: dict[str, Any], points: int, boundary: str = "periodic") -> scene.Frame:
+def frame_of(surface: dict[str, Any], points: int, boundary: str = "periodic") -> scene.Setup:
     job = job_of(surface, [SLIDE], grid={"points": points, "size": 1e-3, "boundary": boundary})
-    return scene.frame(job, Slab(MPI.COMM_SELF, points, points))
+    return scene.set_up(job, Slab(MPI.COMM_SELF, points, points))
 
 
 def rough(hurst: float, short: float) -> dict[str, Any]:
@@ -34,8 +35,8 @@ def saved(path: Path, surface: dict[str, Any], points: int) -> dict[str, Any]:
     return {"shape": "topography", "path": str(path), "unit": "m", "size": [1e-3, 1e-3]}
 
 
-def cells(frame: scene.Frame) -> float:
-    found = known_of(frame, 0.0, True, None).cells_per_wave
+def cells(setup: scene.Setup) -> float:
+    found = known_of(setup, 0.0, True, None).cells_per_wave
     assert found is not None
     return found
 

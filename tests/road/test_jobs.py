@@ -50,7 +50,7 @@ def heights_of(
     if comm.rank == 0:
         path.write_text(JOB.format(points=points, size=size, more=more))
     comm.barrier()
-    base = scene.frame(jobs.load(path), Slab(comm, points, points))
+    base = scene.set_up(jobs.load(path), Slab(comm, points, points))
     rows = base.surface.heights((0.0, 0.0), base.slab.empty()) * base.units.height
     return np.concatenate(comm.allgather(rows))
 

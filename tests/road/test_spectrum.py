@@ -8,11 +8,12 @@ from mpi4py import MPI
 from scipy.special import gamma
 
 from parcontact import job as jobs
-from parcontact import prediction, rigid_surface
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
+from parcontact.report import prediction
 from parcontact.road import spectrum, statistics
+from parcontact.scene import rigid_surface
 from parcontact.theory import persson_rings
 
 L, N = 1.0e-3, 128

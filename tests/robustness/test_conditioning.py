@@ -169,7 +169,7 @@ def test_a_flat_file_is_flat(constant: float, tmp_path: Path) -> None:
     data = job(heights, tmp_path, {"pressure": 2e-8}, modulus=1e13)
     data["grid"]["size"] = [1e-3, 2e-4]
     march, rows = marched(data)
-    assert march.scene.frame.height == march.scene.job.grid.dy  # the shorter side of a cell, whichever that is
+    assert march.scene.setup.height == march.scene.job.grid.dy  # the shorter side of a cell, whichever that is
     assert all(row.iterations == 0 for row in rows)
     assert_allclose(march.field("pressure"), 1.4e-8, rtol=1e-9)
     # an approach that just touches is full contact, but for rounding, and not beyond it

@@ -118,7 +118,7 @@ class Witness:
         if scene.energy is None:
             return
         lost = [b - a for a, b in zip(self.last.branch_dissipation, row.branch_dissipation, strict=True)]
-        grid, prony = scene.job.grid, scene.frame.prony
+        grid, prony = scene.job.grid, scene.setup.prony
         stiffest = prony.modulus_inf + float(prony.moduli.sum())
         scales.energy = max(scales.energy, abs(row.work), abs(row.stored), abs(row.dissipated))
         scales.force = max(scales.force, row.measures.pressure * grid.lx * grid.ly * stiffest / self.march.state.alpha)
@@ -143,7 +143,7 @@ class Witness:
     def _length(self) -> float:
         """What the certificate compares gaps with [m]; without contact the surface's height."""
         length, scene = self.march.row.certificate.length, self.march.scene
-        return scene.frame.height if math.isnan(length) else length * scene.units.height
+        return scene.setup.height if math.isnan(length) else length * scene.units.height
 
     def _blur(self) -> tuple[float, float]:
         scene, modulus = self.march.scene, self.march.state.alpha * self.march.scene.units.modulus
@@ -158,7 +158,7 @@ class Witness:
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
         alpha = scene.material.begin(step.dt, scene.motion.at(step.position)).alpha
         strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
-        allowed = scene.job.numerics.tolerance * SHALLOW * scene.frame.height
+        allowed = scene.job.numerics.tolerance * SHALLOW * scene.setup.height
         return DIGITS * EPS * strain * max(grid.lx, grid.ly) > allowed
 
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from parcontact.effects.measured_range import describe_beyond
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.rubber import compound, sane, tables
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, given
+from parcontact.scene.measured_range import describe_beyond
 
 from . import measured
 

@@ -22,7 +22,7 @@ from parcontact.solve.contact import ContactSolver, MeanPressure
 def bare(planned: Job) -> Counter[str]:
     """A surface that stands on an elastic body: a solver, and measures. Nothing lasts, moves or remembers."""
     slab = Slab(MPI.COMM_SELF, NX, NY)
-    base = scene.frame(planned, slab)
+    base = scene.set_up(planned, slab)
     heights = base.surface.heights((0.0, 0.0), slab.empty())
     solver = bare_solver(base)
     last, p = slab.zeros(), slab.zeros()
@@ -39,7 +39,7 @@ def bare(planned: Job) -> Counter[str]:
 def lasting(planned: Job) -> Counter[str]:
     """The same for a body with or without memory under stages that last; the surface stands or moves by whole cells."""
     slab = Slab(MPI.COMM_SELF, NX, NY)
-    base = scene.frame(planned, slab)
+    base = scene.set_up(planned, slab)
     path = WholeCells(base.surface)
     memory = base.prony.moduli.size > 0
     body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
@@ -67,7 +67,7 @@ def lasting(planned: Job) -> Counter[str]:
     return slab.tally.copy()
 
 
-def bare_solver(base: scene.Frame) -> ContactSolver:
+def bare_solver(base: scene.Setup) -> ContactSolver:
     operator, inverse = base.half_space.operator(base.fft), base.half_space.inverse(base.fft)
     return ContactSolver(base.slab, operator, inverse, base.height / base.units.height, 1e-15, ITERATIONS)
 

@@ -10,9 +10,9 @@ from marching import JOBS, load_script, marched
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from parcontact import prediction
 from parcontact.job import Job, load, load_cases
 from parcontact.parallel.slab import Slab
+from parcontact.report import prediction
 from parcontact.summary import slide, sweep_table
 from parcontact.summary.slide import Slide
 from parcontact.theory import hertz
@@ -80,7 +80,7 @@ def test_surface_has_the_spectrum_that_was_asked_for() -> None:
     """The mean of Phi over the waves of a ring is C k^-3.8, within the scatter of exponential variates; slope 0.02."""
     job = paper("fig05_surface", *SMALL)
     march, _ = marched(job)
-    heights = march.scene.frame.surface.heights((0.0, 0.0), march.scene.slab.empty()) * march.scene.units.height
+    heights = march.scene.setup.surface.heights((0.0, 0.0), march.scene.slab.empty()) * march.scene.units.height
     figures = load_script("paper_figures")
     k, found = figures.ring_means(heights, 1e-3)
     inside = (k > 0.99 * 2 * np.pi / 2.5e-4) & (k < 1.01 * 2 * np.pi / 1.25e-4)

@@ -9,9 +9,10 @@ import pytest
 from judging import HERE, Json, job_of, rough_heights, run
 from mpi4py import MPI
 
-from parcontact import sanity, scene
+from parcontact import scene
 from parcontact.job import Job, load_cases
 from parcontact.parallel.slab import Slab
+from parcontact.scene import sanity
 
 OURS = sorted(path for path in HERE.rglob("*.yaml") if path.parent.name != "road")  # that one: tests/road/test_chain.py
 
@@ -22,7 +23,7 @@ def test_no_job_of_ours_is_told(path: Path) -> None:
     job = load_cases(path)[-1].job
     assert job.warnings == ()
     if sanity.is_quickly_made(job):
-        assert sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []
+        assert sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []
 
 
 def sound(dice: random.Random, directory: Path) -> Job:
@@ -78,5 +79,5 @@ def test_no_sound_scene_is_told(tmp_path: Path) -> None:
     for number in range(50):
         job = sound(dice, tmp_path)
         assert job.warnings == (), (number, job.resolved())
-        assert sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))) == [], job.resolved()
+        assert sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == [], job.resolved()
         assert run(job) == [], (number, job.resolved())

@@ -17,7 +17,7 @@ coverage_scenes = load_script("coverage_scenes")
 def sampled(number: int, finer: int, directory: Path) -> np.ndarray:
     """Heights of the surface of a scene at the points of the coarse grid, above their mean."""
     job = jobs.Job.model_validate(coverage_scenes.sketch(number).job(directory, finer))
-    base = scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     rows = heights[:: finer if job.grid.ny > 1 else 1, ::finer] * base.units.height
     return np.asarray(rows - rows.mean())

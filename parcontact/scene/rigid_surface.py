@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import job as jobs
-from .job import Grid, Job
-from .job.checks import meaning
-from .parallel.fft import FFT, Spectrum
-from .parallel.root import on_root
-from .parallel.slab import Array
-from .physics import heightfile
-from .physics.lowest import lowest
-from .physics.roughness import Roughness, shortest_wave
-from .physics.shapes import Round, Shape
-from .physics.surface import Surface, single_wave
+from .. import job as jobs
+from ..job import Grid, Job
+from ..job.checks import meaning
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.root import on_root
+from ..parallel.slab import Array
+from ..physics import heightfile
+from ..physics.lowest import lowest
+from ..physics.roughness import Roughness, shortest_wave
+from ..physics.shapes import Round, Shape
+from ..physics.surface import Surface, single_wave
 
 ROUNDING = 1e-8  # relative, of the shortest wavelength of a table
 FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
@@ -89,7 +89,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.Topography):
-        from .road import surface as road  # with much of scipy, which is slow to import
+        from ..road import surface as road  # with much of scipy, which is slow to import
 
         rows, done = road.rows_of(part, grid, fft.slab)
         told += done
@@ -114,7 +114,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectr
 
 
 def _of_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, told: list[str]) -> Spectrum:
-    from .road import spectrum
+    from ..road import spectrum
 
     found, (long, short) = on_root(fft.slab.comm, lambda: spectrum.of(part))
     told += _told(part, grid, long, short) if fft.slab.root else []

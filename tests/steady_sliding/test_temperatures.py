@@ -9,10 +9,11 @@ from conftest import RunParcontact
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact import prediction, scene
+from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 from parcontact.plotting import steady
+from parcontact.report import prediction
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.measures import read
@@ -46,7 +47,7 @@ def solver(tmp_path: Path, text: str, changes: Sequence[str] = ()) -> SteadySlid
     path = tmp_path / "job.yaml"
     path.write_text(text)
     job = jobs.load(path, changes)
-    return SteadySliding(scene.frame(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    return SteadySliding(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
 
 
 def test_friction_of_a_wave_at_each_temperature(tmp_path: Path) -> None:

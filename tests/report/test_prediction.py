@@ -12,12 +12,13 @@ from marching import JOBS, PRONY, SLS, column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
-from parcontact import __version__, prediction
+from parcontact import __version__
 from parcontact.__main__ import main
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
+from parcontact.report import prediction
 from parcontact.summary import info_directory, theory_settings
 from parcontact.summary.theory_settings import TheorySettings
 from parcontact.theory import full_contact

@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from ..effects.folded_branches import excited_band
+from ..effects.relaxation import time_factor_of
 from ..job import Dma, Job, Zener
-from .folded_branches import excited_band
-from .relaxation import time_factor_of
 
 NEAR = 0.5  # decades beyond the measured band that pass: a surface has little of its last waves
 

@@ -1,7 +1,7 @@
 """From a job to what steps are made of: bodies, solver, energies, ledger and followers are made here and nowhere else.
 
 What is made follows from the job alone, as `effects/decisions.py` decides; what a job does not call for is never made.
-Steady sliding takes the frame from here and brings a solver of its own.
+Steady sliding takes the setup from here and brings a solver of its own.
 """
 
 from collections.abc import Callable
@@ -10,34 +10,34 @@ from functools import partial
 
 import numpy as np
 
-from .effects import decisions, relaxation
-from .effects.effect import Decision, Effect, effects_that_follow, values_of
-from .effects.folded_branches import describe_folded_branches, fold_branches_of
-from .effects.interface import interface_of
-from .effects.relaxation import relaxation_of
-from .history.chosen import describe_steps
-from .job import Job, extension
-from .parallel.fft import FFT
-from .parallel.slab import Slab
-from .physics.body import ElasticBody, ZenerBody
-from .physics.convolution import Convolution
-from .physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
-from .physics.entries import Remembers
-from .physics.folding import FoldedBranches
-from .physics.halfspace import HalfSpace
-from .physics.ledger import Ledger
-from .physics.motion import AnyFraction, Motion, PartCells, WholeCells
-from .physics.prony import Prony
-from .physics.roughness import Moments, moments
-from .physics.surface import Surface
-from .physics.units import Units
+from ..effects import decisions, relaxation
+from ..effects.effect import Decision, Effect, effects_that_follow, values_of
+from ..effects.folded_branches import describe_folded_branches, fold_branches_of
+from ..effects.interface import interface_of
+from ..effects.relaxation import relaxation_of
+from ..history.chosen import describe_steps
+from ..job import Job, extension
+from ..parallel.fft import FFT
+from ..parallel.slab import Slab
+from ..physics.body import ElasticBody, ZenerBody
+from ..physics.convolution import Convolution
+from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
+from ..physics.entries import Remembers
+from ..physics.folding import FoldedBranches
+from ..physics.halfspace import HalfSpace
+from ..physics.ledger import Ledger
+from ..physics.motion import AnyFraction, Motion, PartCells, WholeCells
+from ..physics.prony import Prony
+from ..physics.roughness import Moments, moments
+from ..physics.surface import Surface
+from ..physics.units import Units
+from ..solve.contact import ContactSolver
+from ..solve.preconditioner.extension import grids_for
 from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
-from .solve.contact import ContactSolver
-from .solve.preconditioner.extension import grids_for
 
 
 @dataclass
-class Frame:
+class Setup:
     """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
 
     `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
@@ -85,7 +85,7 @@ class Frame:
 class Scene:
     """Everything a march needs."""
 
-    frame: Frame
+    setup: Setup
     motion: Motion
     folded: FoldedBranches
     material: ElasticBody | ZenerBody
@@ -108,15 +108,15 @@ class Scene:
 
     @property
     def job(self) -> Job:
-        return self.frame.job
+        return self.setup.job
 
     @property
     def slab(self) -> Slab:
-        return self.frame.slab
+        return self.setup.slab
 
     @property
     def units(self) -> Units:
-        return self.frame.units
+        return self.setup.units
 
 
 def effects(job: Job) -> list[Decision]:
@@ -125,7 +125,7 @@ def effects(job: Job) -> list[Decision]:
     return [decide(job) for decide in (*decisions.TABLE, *further)]
 
 
-def frame(job: Job, slab: Slab) -> Frame:
+def set_up(job: Job, slab: Slab) -> Setup:
     """The surface of a job and what it is measured in; collective. Raises InputError for files that do not fit."""
     fft = FFT(slab)
     surface, told = make_surface(job, fft)
@@ -136,15 +136,15 @@ def frame(job: Job, slab: Slab) -> Frame:
     units = Units.near(heights.span, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
     surface.rescale(units.height)
     scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    return Frame(job, slab, fft, surface, roughness, shortest, heights, units, scaled, told)
+    return Setup(job, slab, fft, surface, roughness, shortest, heights, units, scaled, told)
 
 
-def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -> Scene:
+def build(job: Job, slab: Slab, until: float = 0.0, base: Setup | None = None) -> Scene:
     """Make a job's scene on the ranks of `slab`, to be marched to the end of its history or, if later, to `until` [s].
 
-    Its frame is `base`, if it has one. Collective. Raises InputError for surface files that do not fit.
+    Its setup is `base`, if it has one. Collective. Raises InputError for surface files that do not fit.
     """
-    base = frame(job, slab) if base is None else base
+    base = set_up(job, slab) if base is None else base
     motion = _motion(base)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
@@ -157,8 +157,8 @@ def build(job: Job, slab: Slab, until: float = 0.0, base: Frame | None = None) -
     return scene
 
 
-def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
-    """A solver for the body of a frame on another grid, for a start or a retry; collective.
+def solver_on(base: Setup, slab: Slab, tolerance: float) -> ContactSolver:
+    """A solver for the body of a setup on another grid, for a start or a retry; collective.
 
     Its transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give other
     last digits.
@@ -166,7 +166,7 @@ def solver_on(base: Frame, slab: Slab, tolerance: float) -> ContactSolver:
     return _solver(replace(base, slab=slab, fft=FFT(slab, measured=False)), tolerance)
 
 
-def solver_in_double(base: Frame) -> Callable[[], ContactSolver] | None:
+def solver_in_double(base: Setup) -> Callable[[], ContactSolver] | None:
     """What makes a solver whose operator is in double precision, for a retry; None where that of the scene is."""
     if not decisions.single_operator(base.job).on:
         return None
@@ -177,8 +177,8 @@ def solver_in_double(base: Frame) -> Callable[[], ContactSolver] | None:
 
 def facts(built: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
-    found = built.frame.roughness
-    told = [*built.frame.told, *describe_folded_branches(built.folded, relaxation_of(built.job))]
+    found = built.setup.roughness
+    told = [*built.setup.told, *describe_folded_branches(built.folded, relaxation_of(built.job))]
     if steps := describe_steps(built.job):
         told.append(f"time steps that are chosen: {steps}")
     if found is None:
@@ -193,7 +193,7 @@ def facts(built: Scene) -> list[str]:
 # -- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _motion(base: Frame) -> Motion:
+def _motion(base: Setup) -> Motion:
     """How the surface moves."""
     if not decisions.part_cells(base.job).on:
         return WholeCells(base.surface)
@@ -202,14 +202,14 @@ def _motion(base: Frame) -> Motion:
     return AnyFraction(base.surface)
 
 
-def _material(base: Frame, branches: FoldedBranches) -> ElasticBody | ZenerBody:
+def _material(base: Setup, branches: FoldedBranches) -> ElasticBody | ZenerBody:
     if not relaxation.decide(base.job).on:
         return ElasticBody(base.slab, base.prony.modulus_inf)
     integrator = base.job.numerics.integrator
     return ZenerBody(base.slab, base.prony, integrator, branches.memoryless, branches.frozen)
 
 
-def _solver(base: Frame, tolerance: float) -> ContactSolver:
+def _solver(base: Setup, tolerance: float) -> ContactSolver:
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
     operators = _operators(base)
     grids = grids_for(base.job.grid.dx, base.job.grid.dy)
@@ -217,7 +217,7 @@ def _solver(base: Frame, tolerance: float) -> ContactSolver:
     return ContactSolver(base.slab, *operators, height, tolerance, limit, grids, kept)
 
 
-def _operators(base: Frame) -> tuple[Convolution, Convolution]:
+def _operators(base: Setup) -> tuple[Convolution, Convolution]:
     """The operator of the half space, and its preconditioner."""
     body = base.half_space
     if not decisions.mixed_precision(base.job).on:
@@ -227,7 +227,7 @@ def _operators(base: Frame) -> tuple[Convolution, Convolution]:
     return body.operator(own), body.inverse(single)
 
 
-def _energy(base: Frame, solver: ContactSolver, material: ElasticBody | ZenerBody) -> ElasticEnergy | ZenerEnergy:
+def _energy(base: Setup, solver: ContactSolver, material: ElasticBody | ZenerBody) -> ElasticEnergy | ZenerEnergy:
     slab, grid, units = base.slab, base.job.grid, base.units
     unit = units.pressure * units.height * grid.dx * grid.dy
     if isinstance(material, ElasticBody):

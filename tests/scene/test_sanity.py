@@ -12,13 +12,14 @@ from conftest import RunParcontact
 from judging import RUBBER, SPHERE, Json, job_of, of_file, rough_heights, run
 from mpi4py import MPI
 
-from parcontact import sanity, scene
+from parcontact import scene
 from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, JobError, load
 from parcontact.job.checks import size as size_advice
 from parcontact.job.checks.advice import cells_per_wave
 from parcontact.parallel.slab import Slab
+from parcontact.scene import sanity
 
 SMALL = """\
 grid: {points: 64, size: 1e-3}
@@ -118,7 +119,7 @@ def test_a_measured_road_is_looked_at_before_it_runs(tmp_path: Path) -> None:
     road = {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "m", "size": [1e-3, 1e-3]}
     job = job_of(road, [{"pressure": 1e4}], grid={"points": 64, "size": 1e-3})
     assert sanity.is_quickly_made(job)
-    (text,) = sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, 64, 64)))
+    (text,) = sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, 64, 64)))
     assert "unit: um in a topography" in text
 
 
@@ -190,10 +191,10 @@ def test_every_rank_says_the_same(comm: MPI.Intracomm, communicators: list[MPI.I
         comm.Barrier()
         shape = {"shape": "file", "path": str(shared_path / "road.npy")}
         job = job_of(shape, [PRESS], grid={"points": [30, 48], "size": 1e-3})
-        (alone,) = sanity.of_surface(scene.frame(job, Slab(MPI.COMM_SELF, 30, 48)))
+        (alone,) = sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, 30, 48)))
         assert words in alone
         for group in communicators:
-            assert group.allgather(sanity.of_surface(scene.frame(job, Slab(group, 30, 48)))) == [[alone]] * group.size
+            assert group.allgather(sanity.of_surface(scene.set_up(job, Slab(group, 30, 48)))) == [[alone]] * group.size
         comm.Barrier()
 
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .errors import InputError, RunError
-from .history.timeline import Timeline
-from .job import Job, OnOneMesh
-from .job.checks import advice, meaning, size
-from .parallel import rows
-from .parallel.slab import Array, Slab
-from .physics.measures import Measures
-from .scene import Frame
+from ..errors import InputError, RunError
+from ..history.timeline import Timeline
+from ..job import Job, OnOneMesh
+from ..job.checks import advice, meaning, size
+from ..parallel import rows
+from ..parallel.slab import Array, Slab
+from ..physics.measures import Measures
+from .scene import Setup
 
 SEAM = (
     2.0  # the jump across the edge of the box over the largest increment of neighbours inside: 1 if nothing is special
@@ -48,35 +48,35 @@ def is_quickly_made(job: Job) -> bool:
     return not meaning.says_all(job.surface) and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
-def of_surface(frame: Frame) -> list[str]:
+def of_surface(setup: Setup) -> list[str]:
     """What is wrong with the heights of a scene, collective; raises InputError with `numerics.strict`."""
-    found = list(_of_surface(frame))
-    if found and frame.job.numerics.strict:
+    found = list(_of_surface(setup))
+    if found and setup.job.numerics.strict:
         raise InputError("\n".join(f"{text} ({STRICT})" for text in found))
     return found
 
 
-def _of_surface(frame: Frame) -> Iterator[str]:
-    if frame.roughness and (text := meaning.steep(frame.roughness.rms_slope)) and text not in frame.job.warnings:
+def _of_surface(setup: Setup) -> Iterator[str]:
+    if setup.roughness and (text := meaning.steep(setup.roughness.rms_slope)) and text not in setup.job.warnings:
         yield text
     seams: list[str] = []
-    if any(isinstance(shape, OnOneMesh) for shape in frame.job.surface):
-        heights = frame.surface.heights((0.0, 0.0), frame.slab.empty())
-        seams = list(_seams(frame, heights)) if frame.job.grid.boundary == "periodic" else []
+    if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface):
+        heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
+        seams = list(_seams(setup, heights)) if setup.job.grid.boundary == "periodic" else []
         yield from seams
-    if frame.shortest is not None and not seams:  # a seam has waves of its own
-        yield from advice.measured(frame.job.grid, frame.shortest, frame.job.numerics.accuracy)
+    if setup.shortest is not None and not seams:  # a seam has waves of its own
+        yield from advice.measured(setup.job.grid, setup.shortest, setup.job.numerics.accuracy)
 
 
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------
 
 
-def _seams(frame: Frame, heights: Array) -> Iterator[str]:
+def _seams(setup: Setup, heights: Array) -> Iterator[str]:
     """Where the first and the last points of a periodic box do not fit together."""
-    unit, grid = frame.units.height, frame.job.grid
+    unit, grid = setup.units.height, setup.job.grid
     for name, (jump, inside, rise), length in (
-        ("x", _along_x(frame.slab, heights), grid.lx),
-        ("y", _along_y(frame.slab, heights), grid.ly),
+        ("x", _along_x(setup.slab, heights), grid.lx),
+        ("y", _along_y(setup.slab, heights), grid.ly),
     ):
         if jump <= SEAM * inside:
             continue

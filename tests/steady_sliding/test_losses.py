@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from steady_scenes import CREEP_TIME, certificate, sliding
-from test_steady_lines import LINE, cylinder_on
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
@@ -15,6 +14,8 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.prony import Prony
 from parcontact.solve.nonsymmetric import proximal
 from parcontact.steady_sliding.sliding import SteadySliding
+
+from .test_lines import LINE, cylinder_on
 
 RATIO, MODULUS, TIME = 1000.0, 1.0e6, 1.0e-3  # G0/G_inf, G_inf [Pa], relaxation time [s]
 PEAK = 2.5e-4 / (2 * np.pi * TIME * np.sqrt(RATIO))  # at which the loss tangent of waves of 0.25 mm is largest [m/s]

@@ -44,7 +44,7 @@ def test_what_is_held_while_it_is_solved(comm: MPI.Intracomm, name: str) -> None
     grid, surface, velocity = SCENES[name]
     planned = job(grid, surface, velocity)
     slab = Slab(comm, *planned.grid.points)
-    sliding = SteadySliding(scene.frame(planned, slab))
+    sliding = SteadySliding(scene.set_up(planned, slab))
     assert sliding.solve(velocity, 1e5).sets == 0
     few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
     held = slab.tally["map bytes at most"]
@@ -64,7 +64,7 @@ def test_what_is_held_where_sets_change(
     grid, surface, velocity = SCENES[name]
     planned = job(grid, surface, velocity, tolerance=tolerance)
     slab = Slab(comm, *planned.grid.points)
-    assert SteadySliding(scene.frame(planned, slab)).solve(velocity, 1e5 if name == "free" else 3e3).sets > 0
+    assert SteadySliding(scene.set_up(planned, slab)).solve(velocity, 1e5 if name == "free" else 3e3).sets > 0
     few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
     assert slab.tally["map bytes at most"] == most
     assert most - few == (8 + 2 * 7 * itemsize) * slab.shape[0] * slab.nx

@@ -7,11 +7,12 @@ import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
-from parcontact import rigid_surface, scene
+from parcontact import scene
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.lowest import rows_of
 from parcontact.physics.surface import Surface
+from parcontact.scene import rigid_surface
 
 NX, NY = 40, 30
 SIZE = (1e-3, 7.5e-4)
@@ -35,7 +36,7 @@ def surface_of(*parts: dict[str, Any]) -> tuple[Job, Surface]:
             "history": [{"pressure": 1e4}],
         }
     )
-    return job, scene.frame(job, Slab(MPI.COMM_SELF, NX, NY)).surface
+    return job, scene.set_up(job, Slab(MPI.COMM_SELF, NX, NY)).surface
 
 
 @pytest.mark.parametrize(

@@ -9,22 +9,22 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from . import job as jobs
-from . import scene
-from .effects.relaxation import relaxation_of, time_factor_of
-from .errors import InputError
-from .history.timeline import Span, Timeline
-from .job import Job
-from .parallel.slab import Slab
-from .physics.prony import Prony, complex_modulus
-from .physics.roughness import EDGE, Roughness
-from .steady_sliding.curve import Request
-from .storage import files, hdf5, measures
-from .summary import theory_settings
-from .summary.theory_settings import TheorySettings
-from .theory import full_contact, persson, persson_rings
-from .theory.persson_history import Leg, Memory, follow
-from .theory.persson_rings import Rings
+from .. import job as jobs
+from .. import scene
+from ..effects.relaxation import relaxation_of, time_factor_of
+from ..errors import InputError
+from ..history.timeline import Span, Timeline
+from ..job import Job
+from ..parallel.slab import Slab
+from ..physics.prony import Prony, complex_modulus
+from ..physics.roughness import EDGE, Roughness
+from ..steady_sliding.curve import Request
+from ..storage import files, hdf5, measures
+from ..summary import theory_settings
+from ..summary.theory_settings import TheorySettings
+from ..theory import full_contact, persson, persson_rings
+from ..theory.persson_history import Leg, Memory, follow
+from ..theory.persson_rings import Rings
 
 COLUMNS = ("time", "distance", "pressure", "friction", "contact_area")
 STEADY_FILE = "steady_theory.csv"
@@ -112,7 +112,7 @@ def write_steady(job: Job, wanted: Request) -> Path:
     path = job.output.directory / STEADY_FILE
     with _told_where(path):
         _write(path, SteadyInstant._fields, predict_steady(job, wanted))
-    from .plotting import plots  # matplotlib is slow to import, and for pictures only
+    from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
     return plots.draw_steady(job.output.directory / "steady.csv")
 
@@ -163,8 +163,8 @@ def _refuse_unknown(job: Job) -> None:
 
 def _lattice(job: Job, slab: Slab) -> Rings:
     exact = job.model_copy(update={"numerics": job.numerics.model_copy(update={"precision": "double"})})
-    frame = scene.frame(exact, slab)
-    heights = frame.units.height * frame.surface.heights((0.0, 0.0), slab.empty(np.float64))
+    setup = scene.set_up(exact, slab)
+    heights = setup.units.height * setup.surface.heights((0.0, 0.0), slab.empty(np.float64))
     try:
         return persson_rings.rings_of_surface(full_contact.waves(heights, *job.grid.size))
     except ValueError as error:
@@ -198,7 +198,7 @@ def _continuum(job: Job, slide: float) -> Rings:
 
 def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
     """Of a measured spectrum; the box holds nothing longer than its longer side, the grid no waves below two cells."""
-    from .road import spectrum
+    from ..road import spectrum
 
     found, (long, short) = spectrum.of(part)
     cell = max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
