@@ -22,9 +22,5 @@ class InUseError(InputError):
     """The output directory is that of another program that runs now."""
 
 
-class TakenError(InUseError):
-    """Another program has run the same job in the output directory while this one made ready for it, and has ended."""
-
-
 class RunError(Exception):
     """A run that cannot go on, said in one sentence: exit code 1."""

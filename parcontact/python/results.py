@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from ..storage import fields, hdf5, measures
+from ..storage import fields, hdf5, measures, row
 from .jobs import path_of
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
 
 
 def _units(name: str) -> dict[str, str]:
-    kind = measures.UNITS.get("dissipated" if name.startswith("dissipated_") else name)
+    kind = row.UNITS.get("dissipated" if name.startswith("dissipated_") else name)
     return {"units": kind} if kind else {}
 
 

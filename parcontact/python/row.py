@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..storage import measures
-from ..storage.row import Row as Recorded
+from ..storage import row as recorded
 
 
 class Row(Mapping[str, float]):
@@ -19,17 +18,17 @@ class Row(Mapping[str, float]):
         self._numbers = dict(numbers)
 
     @classmethod
-    def of(cls, row: Recorded, added: tuple[str, ...] = ()) -> Row:
+    def of(cls, row: recorded.Row, added: tuple[str, ...] = ()) -> Row:
         """A recorded row; `added` names the columns of effects."""
         branches = len(row.branch_dissipation)
-        return cls(dict(zip(measures.columns(branches, added), measures.numbers(row, branches), strict=True)))
+        return cls(dict(zip(recorded.columns(branches, added), recorded.numbers(row, branches), strict=True)))
 
     @classmethod
     def of_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
         """A row as a line of measures.csv has it, of as many branches as there is room for."""
         cells = [float(cell or "nan") for cell in line.split(",")]
-        branches = len(cells) - len(measures.columns(0, added))
-        return cls(dict(zip(measures.columns(branches, added), cells, strict=True)))
+        branches = len(cells) - len(recorded.columns(0, added))
+        return cls(dict(zip(recorded.columns(branches, added), cells, strict=True)))
 
     def __getitem__(self, name: str) -> float:
         return self._numbers[name]

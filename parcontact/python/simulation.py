@@ -13,6 +13,7 @@ import numpy as np
 
 from ..effects.effect import columns_of
 from ..errors import InputError
+from ..job import identity
 from ..job import Job
 from ..job.text.yamltext import parse
 from ..march.rest import steps_to_make
@@ -25,7 +26,7 @@ from ..physics.entries import Entry
 from ..run import restart, runner
 from ..run.errors_so_far import ErrorsSoFar
 from ..steady_sliding import start
-from ..storage import checkpoint, heights, marker, wisdom
+from ..storage import checkpoint, heights, measures, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.fields import UNITS
 from .jobs import Given, agree, all_ranks, path_of, read, warn_of
@@ -158,8 +159,8 @@ class Simulation:
         """
         file, march, slab = path_of(path), self._march, self._slab
         self._meet(f"saves {file}")
-        plain = on_root(self.comm, lambda: marker.plain_job(self.job))
-        last = ",".join("" if value != value else repr(value) for value in self.row.values())
+        plain = on_root(self.comm, lambda: identity.plain_job(self.job))
+        last = ",".join(measures.texts(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
         facts = Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last))
         entries = {**march.entries(), **self._errors_so_far.entries(), "plans/all": Entry(wisdom.gather(slab))}
@@ -186,7 +187,7 @@ class Simulation:
             job = job.of(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)
         slab = simulation._slab
-        plain = on_root(world, lambda: marker.plain_job(job))
+        plain = on_root(world, lambda: identity.plain_job(job))
         found = restart.sound(file, job, plain, slab)
         if isinstance(found, str):
             raise InputError(found)

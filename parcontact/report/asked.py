@@ -6,7 +6,6 @@ from .. import job as jobs
 from ..errors import InputError
 from ..job import Job
 from ..job.sections import listing
-from ..storage import files
 from ..storage.resolved import shown_job
 from .parts import Section, Table
 
@@ -24,5 +23,5 @@ def read(resolved: Path) -> tuple[Job, bool]:
 def section(job: Job, given: Path) -> Section:
     """A table of all keys, and the job file as it was given, if it is there."""
     rows = [row for row in listing.rows(job) if not row[0].startswith(ELSEWHERE)]
-    texts = [("the job file as it was given", files.text(given))] if given.is_file() else []
+    texts = [("the job file as it was given", given.read_text(errors="replace"))] if given.is_file() else []
     return Section("What was asked", tables=[Table(("key", "value", "unit"), rows)], texts=texts)

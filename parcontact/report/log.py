@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..storage import files
 from ..storage.console import STAMP, WARNING
 from ..storage.curve_points import LOG
 
@@ -45,7 +44,7 @@ class Log:
 
 def read(directory: Path) -> Log:
     """Of a directory; empty where there is no log."""
-    texts = [files.text(directory / name) for name in LOGS if (directory / name).is_file()]
+    texts = [(directory / name).read_text(errors="replace") for name in LOGS if (directory / name).is_file()]
     lines = [STAMP.sub("", line) for text in texts for line in text.splitlines()]
     warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from ..plotting import style
 from ..plotting.charts import Chart, draw, with_key_beside
 from ..plotting.run import Panel
-from ..storage import files
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
 PHONE_COLUMNS = 2  # of a table that is shown as one on a phone
@@ -107,7 +106,7 @@ def of_panel(panel: Panel, caption: str) -> Picture:
 
 def of_file(path: Path, kind: str = "text/csv") -> Download:
     """A file to be downloaded from the page."""
-    data = files.contents(path)
+    data = path.read_bytes()
     return Download(path.name, uri_of(data, kind), len(data))
 
 

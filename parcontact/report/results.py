@@ -7,7 +7,8 @@ from pathlib import Path
 
 from ..plotting import histories, steady, sweep
 from ..plotting.run import Run
-from ..storage import files, measures
+from ..storage import measures
+from ..storage.row import UNITS
 from ..summary import slide, sweep_table, theory_settings
 from . import browse
 from .parts import Picture, Section, Table, of_chart, uri_of
@@ -31,7 +32,7 @@ def of_run(directory: Path) -> Section:
     for name in names:
         known = [value for value in columns[name] if value == value]
         if known:
-            unit = measures.UNITS.get(name, "")
+            unit = UNITS.get(name, "")
             rows.append((name.replace("_", " "), number(known[-1]), number(min(known)), number(max(known)), unit))
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     pictures = [of_chart(chart) for chart in histories.charts(run)]
@@ -43,7 +44,7 @@ def of_curve(directory: Path) -> Section:
     """The points of a friction curve, and their maps."""
     columns = measures.read(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
-    units = {**measures.UNITS, "velocity": "m/s", "temperature": "°C"}
+    units = {**UNITS, "velocity": "m/s", "temperature": "°C"}
     head = [f"{name.replace('_', ' ')} [{units[name]}]" if name in units else name.replace("_", " ") for name in names]
     rows = [[number(value) for value in row] for row in zip(*(columns[name] for name in names), strict=True)]
     pictures = [of_chart(chart) for chart in steady.charts(directory)]
@@ -66,14 +67,14 @@ def of_study(directory: Path) -> Section:
     names = [name for name in (rows[0] if rows else ()) if name != "fingerprint"]
     table = shortened(names, [[_short(row[name]) for name in names] for row in rows])
     told = directory / "study.txt"
-    sentences = files.text(told).splitlines() if told.is_file() else ["The study is not finished."]
+    sentences = told.read_text(errors="replace").splitlines() if told.is_file() else ["The study is not finished."]
     return Section("What accuracy costs", sentences, [table], list(_study_pictures(directory)))
 
 
 def _study_pictures(directory: Path) -> Iterator[Picture]:
     for name, caption in STUDY_PICTURES.items():
         if (directory / name).is_file():
-            yield Picture(uri_of(files.contents(directory / name), "image/png"), caption)
+            yield Picture(uri_of((directory / name).read_bytes(), "image/png"), caption)
 
 
 def shortened(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

@@ -9,6 +9,7 @@ from ..effects.effect import columns_of
 from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
+from ..job import identity
 from ..job import Job, Rough, RoughSpectrum
 from ..march.step import March
 from ..parallel.signals import Signals
@@ -16,7 +17,7 @@ from ..parallel.slab import Slab
 from ..scene import Scene, sanity
 from ..scene.measured_range import describe_beyond
 from ..steady_sliding import start as steadystart
-from ..storage import header, heights, marker, measures, wisdom
+from ..storage import header, heights, row, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.console import Console, Silence, always
 from ..storage.directory import Directory
@@ -71,7 +72,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
     """As `run`; what can be gone on from in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
-        plain = marker.plain_job(job) if slab.root else {}
+        plain = identity.plain_job(job) if slab.root else {}
         timeline = Timeline.of(job, options.until or 0.0)
         finished = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
         origin, warnings = (None, []) if finished else restart.choose(job, plain, slab, directory, options.restart)
@@ -184,7 +185,7 @@ def _begin(
 ) -> Recorder:
     """Make the output directory ready, and its files; collective."""
     job, added = built.job, columns_of(built.followers)
-    measures.columns(0, added)  # refuses names that are taken
+    row.columns(0, added)  # refuses names that are taken
     directory.make(job.path, job.resolved(), claim)
     heights.store(job, directory.path, built.slab)
     if origin and origin.own:

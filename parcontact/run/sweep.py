@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError, InUseError, RunError, TakenError
+from ..errors import InputError, InUseError, RunError
+from ..job import identity
 from ..job import Case, Job
 from ..job.reading import CASES
 from ..parallel.groups import Groups
-from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..storage import marker, stopfile
-from ..storage.directory import BESIDE, SHOWN
+from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
 from ..summary import sweep_table
 from . import watch
@@ -22,13 +22,12 @@ from .journey import AGAIN, DONE
 from .sweep_warnings import SweepWarnings, warn
 
 FAILED = 1
-ELSEWHERE, DONE_ELSEWHERE = -1, -2  # no exit codes: of a case that another program runs, or has finished meanwhile
+ELSEWHERE = -1  # no exit code: of a case that another program runs
 ENDS = {
     DONE: "done",
     AGAIN: "stopped early",
     FAILED: "failed",
     ELSEWHERE: "passed over",
-    DONE_ELSEWHERE: "done by another program",
 }
 
 Shows = Callable[[str], bool]
@@ -59,9 +58,8 @@ def run(
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
     and what says whether a warning is shown.
 
-    A case that fails does not stop the others: the code is 1 in the end. One that another program runs, or has run
-    while this one made ready for it, is passed over, like those that have finished; if it is the only one, and not
-    done, InUseError is raised. One that stops early with a checkpoint stops the sweep, with its code, and the cases
+    A case that fails does not stop the others: the code is 1 in the end. One that another program runs is passed over,
+    like those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint stops the sweep, with its code, and the cases
     beside it, but no other program: the same command goes on with them. So do the file `stop`, which stops other
     programs too, and the end of the wall time. The file stays: others may not have seen it yet, and it stops no later
     one.
@@ -124,10 +122,13 @@ def _go(
         try:
             ended = _attempt(case, slab, lambda job, slab: act(job, slab, doubts.shows), manner.runs)
         except InUseError as error:
-            ended = _elsewhere(case, slab, error, alone=groups.count == len(own) == 1)
+            if groups.count == len(own) == 1:
+                raise
+            _complain(slab, f"case {case.number} is being run by another program: {error}")
+            ended = ELSEWHERE
         if slab.root:
             sweep_table.write(directory, cases)
-        if speaks and (groups.count > 1 or ended == DONE_ELSEWHERE):
+        if speaks and groups.count > 1:
             _say(f"case {case.number}: {ENDS[ended]}")
         if ended == AGAIN:
             if slab.root and groups.count > 1:
@@ -145,19 +146,9 @@ def refuse_foreign(cases: Sequence[Case]) -> None:
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
     except (OSError, ValueError) as error:
         raise InputError(f"the output directory {directory} cannot be used: {error}") from error
-    for verb, claim in claims.items():
-        if found := "; ".join(marker.differences(claim.job, marker.plain_job(first.job), marker.SCENE)):
-            raise InputError(
-                f"the output directory {directory} holds {marker.VERBS[verb]} of another job: {found}; give --out for "
-                "another directory"
-            )
-    foreign = sorted(name for name in entries if not name.startswith(".") and name not in BESIDE)
-    if foreign and not claims and not {CASES, sweep_table.TABLE} & set(foreign):
-        names = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
-        raise InputError(
-            f"the output directory {directory} is not empty and not of this program: it holds {names}; give --out for "
-            "another directory"
-        )
+    refuse_other_jobs(directory, claims, identity.plain_job(first.job))
+    if not claims and not {CASES, sweep_table.TABLE} & set(entries):
+        refuse_files(directory, entries)
 
 
 def _say(text: str) -> None:
@@ -175,7 +166,7 @@ def _directory(cases: Sequence[Case]) -> Path:
 
 
 def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool) -> int:
-    """The code with which a case ends; raises InUseError if another program runs it, or has done so meanwhile."""
+    """Return the code with which a case ends; raises InUseError if another program runs it."""
     reason = ""
     try:
         code = act(case.job, slab)
@@ -188,18 +179,6 @@ def _attempt(case: Case, slab: Slab, act: Callable[[Job, Slab], int], runs: bool
     if reason:
         _complain(slab, f"case {case.number}: {reason}")
     return code
-
-
-def _elsewhere(case: Case, slab: Slab, error: InUseError, alone: bool) -> int:
-    """What is to be said of a case that another program runs, or has run meanwhile; collective. Raises the error if it
-    is not done, and is `alone`."""
-    taken = isinstance(error, TakenError)
-    if taken and on_root(slab.comm, lambda: sweep_table.state(case) == "done"):
-        return DONE_ELSEWHERE
-    if alone:
-        raise error
-    _complain(slab, f"case {case.number} {'has been' if taken else 'is being'} run by another program: {error}")
-    return ELSEWHERE
 
 
 def _complain(slab: Slab, text: str) -> None:

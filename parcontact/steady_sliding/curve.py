@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
+from ..job import identity
 from ..job import Job
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
@@ -129,7 +130,7 @@ def run(
 def _identity(job: Job, wanted: Request) -> dict[str, Any]:
     """What a curve is of, as plain data: of the `steady` section only what no point may differ in."""
     return {
-        **marker.kept(marker.plain_job(job)),
+        **marker.kept(identity.plain_job(job)),
         "steady": {"direction": list(wanted.direction), "waves": wanted.waves},
     }
 

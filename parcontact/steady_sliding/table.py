@@ -11,7 +11,7 @@ from ..job.checks.sample import describe_sample
 from ..storage import curve_points, files, measures
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG
-from ..storage.growing import GrowingTable
+from ..storage.files import GrowingTable
 from .missed import describe_missed
 from .sliding import Point, SteadySliding
 
@@ -103,8 +103,7 @@ class CurveTable:
     def conclude(self, failures: int) -> None:
         """Put a curve that was solved in parts into order, draw it, and say how it went; raises OSError."""
         self._bar.close()
-        lost, mended = self._file.sync()
-        self.warn([*mended, *([lost] if lost else [])])
+        self._file.sync()
         if self.known:
             self._sort()
         self.warn(list(describe_missed(self._points, self._job.numerics.accuracy)))

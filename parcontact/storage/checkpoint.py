@@ -36,10 +36,9 @@ SUMS = "checksums"
 
 @dataclass(frozen=True)
 class Table:
-    """What measures.csv held: how many rows, their checksum, and the last one."""
+    """What measures.csv held: how many rows, and the last one."""
 
     rows: int = 0
-    checksum: int = 0
     last: str = ""
 
 
@@ -194,13 +193,14 @@ def _contents(path: Path, file: h5py.File) -> Contents:
     maps = {item.name[1:]: item.dtype for item in _datasets(file, 2)}
     numbers = {item.name[1:]: item[()] for item in [*_datasets(file, 0), *_datasets(file, 1)]}
     shape = next((file[name].shape for name in maps), (0, 0))
+    table = json.loads(file.attrs.get("table", "{}"))
     return Contents(
         path,
         int(file.attrs["step"]),
         float(file.attrs["time"]),
         json.loads(file.attrs["plain job"]),
         str(file.attrs.get("run", "")),
-        Table(**json.loads(file.attrs.get("table", "{}"))),
+        Table(table.get("rows", 0), table.get("last", "")),
         read_chain(file),
         shape,
         {name: float(file[name].attrs["unit"]) for name in [*maps, *numbers]},

@@ -1,6 +1,5 @@
 """What a run says: one line per step on root, a progress bar on a terminal, the same lines in run.log."""
 
-import os
 import re
 import sys
 import time
@@ -11,7 +10,6 @@ from typing import TextIO
 from tqdm import tqdm
 
 from ..streams import printable
-from . import files
 from .row import Row
 
 HEAD = "    step        time [s]    load [Pa]      area  friction   iter  residual"
@@ -44,7 +42,7 @@ class Console:
     """Root's voice; the other ranks have `Silence` instead, so that no caller asks who it is."""
 
     def __init__(self, log: Path | None, quiet: bool, total: int) -> None:
-        self._log = files.opened(log, os.O_WRONLY | os.O_APPEND) if log is not None else None
+        self._log = log.open("ab", buffering=0) if log is not None else None
         self._quiet, self._total = quiet, total
         self._first, self._began, self._told = 0, 0.0, 0.0
         self._bar: tqdm[None] | None = None
@@ -62,7 +60,7 @@ class Console:
             now = time.time()
             stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now))
             with suppress(OSError):
-                os.write(self._log, f"{stamp},{int(now % 1.0 * 1000):03d} {printable(text)}\n".encode())
+                self._log.write(f"{stamp},{int(now % 1.0 * 1000):03d} {printable(text)}\n".encode())
 
     def warn(self, text: str, shown: bool = True) -> None:
         """A message that is shown even to those who asked for quiet, or is for run.log only."""
@@ -110,8 +108,7 @@ class Console:
         if self._bar is not None:
             self._bar.close()
         if self._log is not None:
-            with suppress(OSError):
-                os.close(self._log)
+            self._log.close()
 
     def _write(self, text: str, file: TextIO | None = None) -> None:
         if self._bar is not None:

@@ -10,17 +10,17 @@ import re
 import shutil
 import socket
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, InUseError, TakenError
+from ..errors import InputError, InUseError
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from . import checkpoint, curve_points, files, hdf5, marker, stopfile
-from .marker import SCENE, SECTIONS, VERBS, Claim
+from .marker import SCENE, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
 RESULTS = {
@@ -47,6 +47,7 @@ class Directory:
         self.path, self.slab, self.verb = path, slab, verb
         self.claims: dict[str, Claim] = {}
         self._lock: int | None = None
+        self._made: list[Path] = []
 
     @property
     def checkpoints(self) -> Path:
@@ -62,14 +63,14 @@ class Directory:
         return self.claims.get(self.verb)
 
     def checkpoint(self, step: int) -> Path:
-        """The file for the checkpoint after a step."""
+        """Return the path of the checkpoint after a step."""
         return self.checkpoints / f"step-{step}.h5"
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
-        """No other run writes here meanwhile; collective. A directory that does not exist is claimed when made."""
+        """Keep other runs from writing here meanwhile; collective. A new directory that stays empty is removed."""
         try:
-            self._on_root(self._lock_if_there)
+            self._on_root(self._lock_and_read)
             yield
         finally:
             self._release()
@@ -77,39 +78,18 @@ class Directory:
     def refuse_foreign(self, job: Path, data: Mapping[str, Any], afresh: bool) -> None:
         """Raise InputError where the files of others, or of another job, are; collective. `data`: the job, plain."""
 
-        def look() -> str:
-            foreign = self._foreign(job)
-            if foreign and not self.claims and not afresh and not self._proven():
-                names = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
-                return (
-                    f"the output directory {self.path} is not empty and not of this program: it holds {names}; give "
-                    "--out for another directory, or --restart never to write here and put files of these names aside"
-                )
-            for verb, claim in self.claims.items():
-                if verb != self.verb and (found := "; ".join(marker.differences(claim.job, data, SCENE))):
-                    return (
-                        f"the output directory {self.path} holds {VERBS[verb]} of another job: {found}; give --out for "
-                        "another directory"
-                    )
-            return ""
+        def look() -> None:
+            if not self.claims and not afresh and not self._has_checkpoints():
+                hint = ", or --restart never to write here and put files of these names aside"
+                refuse_files(self.path, self._foreign(job), hint)
+            refuse_other_jobs(self.path, {v: claim for v, claim in self.claims.items() if v != self.verb}, data)
 
         self._on_root(look)
 
     def make(self, job: Path, resolved: str, claim: Claim) -> None:
-        """Make the directory with the job in it; collective. Raises InputError where it cannot be written, TakenError
-        where another run of the same job has been in it meanwhile."""
+        """Put the marker and the job into the directory; collective. Raises InputError where it cannot be written."""
 
-        def act() -> str:
-            seen = self.claims
-            if not self.path.is_dir() or self._lock is None:
-                self.path.mkdir(parents=True, exist_ok=True)
-                if problem := self._lock_if_there():
-                    return problem
-                if self.claims != seen or (self._foreign(job) and not self.claims):
-                    taken = f"the output directory {self.path} has been taken by another run meanwhile"
-                    if self.claims and self._are_of(claim):
-                        raise TakenError(f"{taken}; run again to go on with it")
-                    return f"{taken}; {ADVICE}"
+        def act() -> None:
             self._put_aside_what_is_not_ours(job)
             self.claims = {**self.claims, self.verb: claim}
             marker.write(self.path, self.claims)
@@ -120,31 +100,28 @@ class Directory:
                 with files.replaced(self.path / copy) as new, job.open("rb") as given:
                     shutil.copyfileobj(given, new)
             files.write(self.path / table, resolved)
-            return ""
 
         self._on_root(act)
 
     def clear(self) -> None:
         """Remove what earlier runs of this verb wrote; collective. Only after `make`, which has put aside the rest."""
 
-        def act() -> str:
+        def act() -> None:
             checkpoints = [path for _, path in self.saved()] if self.verb == "run" else []
             for path in [*(self.path / name for name in RESULTS[self.verb]), *self._unfinished(), *checkpoints]:
                 path.unlink(missing_ok=True)
-            return ""
 
         self._on_root(act)
 
     def go_back(self, step: int) -> None:
         """Put aside the checkpoints after a step, and remove unfinished files; collective."""
 
-        def act() -> str:
+        def act() -> None:
             for path in self._unfinished():
                 path.unlink()
             for later, path in self.saved():
                 if later > step:
                     files.put_aside(path)
-            return ""
 
         self._on_root(act)
 
@@ -162,7 +139,7 @@ class Directory:
                 marker.write(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
-        """Checkpoints and their steps, the newest first; root only."""
+        """Return checkpoints and their steps, the newest first; root only."""
         found = [
             (int(match.group(1)), path)
             for path in self.checkpoints.glob("step-*.h5")
@@ -171,99 +148,81 @@ class Directory:
         return sorted(found, reverse=True)
 
     def results(self) -> list[str]:
-        """Names of this verb's results that are here; root only."""
-        found = [name for name in RESULTS[self.verb][:2] if os.path.lexists(self.path / name)]
+        """Return the names of this verb's results that are here; root only."""
+        found = [name for name in RESULTS[self.verb][:2] if (self.path / name).exists()]
         return [*found, *(path.name for _, path in self.saved() if self.verb == "run")]
 
     def _unfinished(self) -> list[Path]:
-        """Files that a run which was killed had not finished."""
+        """Return the files that a run which was killed had not finished."""
         return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
 
     # -- whose it is --------------------------------------------------------------------------------------------------
 
-    def _foreign(self, job: Path) -> list[str]:
-        """What is here beside hidden files and the job that is to run."""
-        if not self.path.is_dir():
-            return []
-        return sorted(
-            path.name
-            for path in self.path.iterdir()
-            if not path.name.startswith(".") and path.name not in BESIDE and not _same(path, job)
-        )
+    def _foreign(self, job: Path) -> Iterator[str]:
+        """Yield what is here beside the job that is to run."""
+        return (path.name for path in self.path.iterdir() if not _same(path, job))
 
-    def _are_of(self, claim: Claim) -> bool:
-        """Whether all claims here are of the job of this one."""
-        return not any(
-            list(marker.differences(found.job, claim.job, SECTIONS if verb == self.verb else SCENE))
-            for verb, found in self.claims.items()
-        )
-
-    def _proven(self) -> bool:
-        """Whether a checkpoint says that the directory is ours, as in a copy that has lost its marker."""
+    def _has_checkpoints(self) -> bool:
+        """Return whether the directory proves to be ours, as a copy that has lost its marker does."""
         return any(checkpoint.is_one(path) for _, path in self.saved())
 
     def _put_aside_what_is_not_ours(self, job: Path) -> None:
-        """Files that bear the names of this verb's, where neither the marker nor a checkpoint says that they are."""
-        if self.claim is None and not (self.verb == "run" and self._proven()):
+        """Put aside files of the names of this verb's where neither the marker nor a checkpoint says that they are."""
+        if self.claim is None and not (self.verb == "run" and self._has_checkpoints()):
             for name in (*RESULTS[self.verb], *COPIES[self.verb], *(["checkpoint"] if self.verb == "run" else [])):
                 if not _same(self.path / name, job):
                     files.put_aside(self.path / name)
 
-    def _on_root(self, act: Callable[[], str]) -> None:
-        """Root acts, and returns what stands in the way or ''; collective. Raises InputError on all ranks."""
+    def _on_root(self, act: Callable[[], None]) -> None:
+        """Act on root; collective. Raises InputError on all ranks if that fails."""
 
         def attempt() -> None:
             try:
-                problem = act()
+                act()
             except hdf5.FAILURES as error:
-                problem = f"the output directory {self.path} cannot be written: {hdf5.reason(error)}"
-            if problem:
-                raise InputError(problem)
+                raise InputError(
+                    f"the output directory {self.path} cannot be written: {hdf5.reason(error)}"
+                ) from error
 
         on_root(self.slab.comm, attempt)
 
     # -- the lock -----------------------------------------------------------------------------------------------------
 
-    def _lock_if_there(self) -> str:
-        """Take the lock and read the marker; returns what stands in the way."""
-        if self._lock is None and self.path.is_dir():
-            if problem := self._take_lock():
-                return problem
-            try:
-                self.claims = marker.read(self.path)
-            except ValueError as error:
-                return f"{error}, so that it cannot be told whose {self.path} is; --out chooses another directory"
-        return ""
+    def _lock_and_read(self) -> None:
+        self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]
+        self._take_lock()
+        try:
+            self.claims = marker.read(self.path)
+        except ValueError as error:
+            raise InputError(
+                f"{error}, so that it cannot be told whose {self.path} is; --out chooses another directory"
+            ) from error
 
-    def _take_lock(self) -> str:
-        """Take the lock, which the system gives back however this process ends. Returns what stands in the way; raises
-        InUseError if it is another program."""
+    def _take_lock(self) -> None:
+        """Take the lock, which the system gives back however this process ends; raises InUseError."""
         deadline = time.monotonic() + MAX_SECONDS_TO_RELEASE
         path = self.path / LOCK
         while True:
-            try:
-                handle = files.opened(path, os.O_RDWR)
-            except ValueError as error:
-                return f"the output directory {self.path} cannot be locked by {path}: {error}"
+            self.path.mkdir(parents=True, exist_ok=True)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 if error.errno not in NO_LOCKS:
-                    holder = os.pread(handle, 200, 0).decode(errors="replace").strip()
+                    holder = os.pread(handle, 200, 0).decode(errors="replace").strip() or "just started"
                     os.close(handle)
                     if time.monotonic() > deadline:
-                        who = holder or "just started"
-                        raise InUseError(f"the output directory {self.path} is in use by another run ({who})") from None
+                        said = f"the output directory {self.path} is in use by another run ({holder})"
+                        raise InUseError(said) from None
                     time.sleep(0.05)
                     continue
-            if files.is_the_file(path, handle):
+            if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
                 break
             os.close(handle)  # its last holder has removed it
         self._lock = handle
         with suppress(OSError):  # only for whom it may concern
             os.ftruncate(handle, 0)
             os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
-        return ""
 
     def _release(self) -> None:
         if self._lock is not None:
@@ -271,6 +230,30 @@ class Directory:
                 (self.path / LOCK).unlink()
             os.close(self._lock)
             self._lock = None
+            with suppress(OSError):  # not empty: the run has written here
+                for path in self._made:
+                    path.rmdir()
+
+
+def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
+    """Raise InputError if a directory that is not ours holds files of these names, beside hidden ones and `BESIDE`."""
+    foreign = sorted(name for name in names if not name.startswith(".") and name not in BESIDE)
+    if foreign:
+        shown = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
+        raise InputError(
+            f"the output directory {directory} is not empty and not of this program: it holds {shown}; give --out for "
+            f"another directory{hint}"
+        )
+
+
+def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
+    """Raise InputError if one of the claims of a directory is of another scene than the job `data`, as plain data."""
+    for verb, claim in claims.items():
+        if found := "; ".join(marker.differences(claim.job, data, SCENE)):
+            raise InputError(
+                f"the output directory {directory} holds {VERBS[verb]} of another job: {found}; give --out for "
+                "another directory"
+            )
 
 
 def _same(one: Path, other: Path) -> bool:

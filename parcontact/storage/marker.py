@@ -5,14 +5,11 @@ Only what the marker (or a sealed checkpoint) proves to be ours is ever replaced
 
 import json
 import secrets
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..job import Dma, HeightArray, HeightFile, Job, RoughSpectrum, Topography
-from ..job.sections.listing import plain
 from . import files
 
 MARKER = ".parcontact"
@@ -32,27 +29,6 @@ class Claim:
     id: str = field(default_factory=lambda: secrets.token_hex(16))
     saved: bool = False
     finished: tuple[int, float] | None = None
-
-
-def plain_job(job: Job) -> dict[str, Any]:
-    """A job as plain data; files that are read are known by what they hold, not by their path."""
-    data: dict[str, Any] = plain(job)
-    pairs = zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True)
-    for part, given in pairs:
-        if isinstance(given, HeightFile | Dma | Topography):
-            del part["path"]
-            part["content"] = _checksum(given.path)
-        elif isinstance(given, HeightArray):
-            del part["path"]
-            part["content"] = given.heights.checksum
-        elif isinstance(given, RoughSpectrum):
-            del part["spectrum"]
-            part["content"] = _checksum(given.spectrum)
-    return data
-
-
-def _checksum(path: Path) -> str:
-    return f"{zlib.crc32(path.read_bytes()):08x}"
 
 
 def kept(data: Mapping[str, Any]) -> dict[str, Any]:

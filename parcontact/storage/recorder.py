@@ -136,16 +136,8 @@ class Recorder:
 
         What is wrong with it is left in `problem`, if results are lost by it, or warned of.
         """
-
-        def sync() -> None:
-            if self._measures:
-                lost, mended = self._measures.sync()
-                for text in mended:
-                    self.console.warn(text)
-                if lost:
-                    raise RunError(lost)
-
         try:
+            sync = self._measures.sync if self._measures else lambda: None
             hdf5.on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
             if self._fields:
                 self._fields.sync(provenance)

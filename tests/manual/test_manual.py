@@ -28,7 +28,7 @@ from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
 from parcontact.report import prediction
 from parcontact.steady_sliding import table as steady_table
-from parcontact.storage import fields, measures
+from parcontact.storage import fields, row
 from parcontact.study import table as study_table
 from parcontact.summary import citations, sweep_table
 
@@ -139,7 +139,7 @@ def test_the_page_has_range_unit_and_default() -> None:
 # -- columns ---------------------------------------------------------------------------------------------------------
 
 COLUMNS = {
-    "measures.csv": [*measures.columns(0, InterfaceColumns.columns), "dissipated_K"],
+    "measures.csv": [*row.columns(0, InterfaceColumns.columns), "dissipated_K"],
     "steady.csv": [
         *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
         *(*steady_table.HEATED, *InterfaceColumns.columns, *steady_table.ERRORS),
@@ -159,7 +159,7 @@ def test_every_column_is_documented(file: str) -> None:
     (section,) = re.findall(rf"^## {re.escape(file)}\n(.*?)(?=^## |\Z)", texts.page("outputs"), re.M | re.S)
     rows = re.findall(r"^\| `(\w+)` \| *([^|]*?) *\| ", section, re.M)
     assert sorted(name for name, _ in rows) == sorted(COLUMNS[file])
-    known = {"measures.csv": measures.UNITS, "fields.h5": fields.UNITS}.get(file, {})
+    known = {"measures.csv": row.UNITS, "fields.h5": fields.UNITS}.get(file, {})
     assert {name: unit for name, unit in rows if name in known} == known
 
 

@@ -8,8 +8,8 @@ import pytest
 from parcontact.physics.measures import Measures
 from parcontact.storage import measures
 from parcontact.storage.checkpoint import Table
-from parcontact.storage.measures import COLUMNS, LAST, MeasuresFile
-from parcontact.storage.row import Row
+from parcontact.storage.measures import MeasuresFile
+from parcontact.storage.row import COLUMNS, LAST, Row
 
 
 def row(step: int, lost: tuple[float, ...] = ()) -> Row:
@@ -17,7 +17,7 @@ def row(step: int, lost: tuple[float, ...] = ()) -> Row:
 
 
 def written(path: Path, count: int, branches: int = 0) -> None:
-    file = MeasuresFile(path, branches)
+    file = MeasuresFile(path, branches, Table())
     for step in range(count):
         file.write(row(step, (0.1,) * branches))
     file.close()
@@ -43,7 +43,7 @@ def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: fl
     found = Measures(1.0, *forces, friction)
     assert found.friction_x == pytest.approx(signed, rel=2e-16, abs=0.0)
     assert math.copysign(1.0, found.friction_x) == (-1.0 if signed < 0.0 else 1.0)
-    file = MeasuresFile(tmp_path / "measures.csv", 1)
+    file = MeasuresFile(tmp_path / "measures.csv", 1, Table())
     file.write(Row(1, measures=found, branch_dissipation=(0.1,)))
     file.close()
     table = measures.read(tmp_path / "measures.csv")
@@ -59,7 +59,7 @@ def test_cut_back(tmp_path: Path) -> None:
         file.write("6,0.6,0.")  # a row that was cut off
     assert measures.cut_back(path, 3, 0, Table())[1] == []
     assert path.read_text() == "".join(whole.splitlines(keepends=True)[:5])
-    file_again = MeasuresFile(path, 0)
+    file_again = MeasuresFile(path, 0, Table())
     for step in (4, 5):
         file_again.write(row(step))
     file_again.close()

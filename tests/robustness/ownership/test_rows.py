@@ -19,13 +19,10 @@ def change(line: int, act: Callable[[str], str]) -> Callable[[str], str]:
 
 EDITS: list[tuple[Callable[[str], str], str]] = [
     (change(4, lambda line: "abc" + line), "measures.csv, line 4: the step 'abc2' is not a whole number"),
-    (change(4, lambda line: f"{line}\n{line}"), "measures.csv, line 5: step 2 comes after step 2"),
     (change(4, lambda line: line + ",7"), "measures.csv, line 4, has "),
     (change(4, lambda line: line[:20].rsplit(",", 1)[0]), "measures.csv, line 4, has "),
     (change(1, lambda line: "a,b"), "measures.csv, line 1, does not name the columns"),
-    (lambda text: text + "1," * 700_000, "has more than 1048576 bytes"),
     (lambda text: text + "1,", ""),
-    (change(4, lambda line: "1" * 2_000_000), "measures.csv, line 4, has more than 1048576 bytes"),
     (lambda text: "", "measures.csv, line 1, does not name the columns"),
 ]
 
@@ -67,19 +64,11 @@ def test_plot_of_edited_rows(main: Main, tmp_path: Path, edit: Callable[[str], s
     assert message in said
 
 
-@pytest.mark.parametrize(
-    ("edit", "message"),
-    [
-        (change(4, lambda line: ""), "lacks 1 of the "),
-        (change(4, lambda line: line.replace(",", ",1", 1)), "was changed by hand"),
-        (lambda text: "\n".join(text.splitlines()[:3]) + "\n", "ends with step 1: the rows up to step "),
-    ],
-)
-def test_missing_and_changed_rows(main: Main, tmp_path: Path, edit: Callable[[str], str], message: str) -> None:
+def test_missing_rows(main: Main, tmp_path: Path) -> None:
     """Told from what the checkpoint says of the table; the run goes on."""
     main("job.yaml", "--out", "out", "--until", "0.003")
     path = tmp_path / "out" / "measures.csv"
-    path.write_text(edit(path.read_text()).replace("\n\n", "\n"))
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:3]))
     code, said = main("job.yaml", "--out", "out")
     assert code == DONE
-    assert message in said
+    assert "ends with step 1: the rows up to step " in said
