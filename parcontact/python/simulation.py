@@ -13,8 +13,7 @@ import numpy as np
 
 from ..effects.effect import columns_of
 from ..errors import InputError
-from ..job import identity
-from ..job import Job
+from ..job import Job, identity
 from ..job.text.yamltext import parse
 from ..march.rest import steps_to_make
 from ..march.step import March

@@ -9,8 +9,7 @@ from ..effects.effect import columns_of
 from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
-from ..job import identity
-from ..job import Job, Rough, RoughSpectrum
+from ..job import Job, Rough, RoughSpectrum, identity
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -18,12 +17,12 @@ from ..scene import Scene, sanity
 from ..scene.measured_range import describe_beyond
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, row, wisdom
-from ..storage.checkpoint import Contents, Facts, Table
+from ..storage.checkpoint import Contents, Facts
 from ..storage.console import Console, Silence, always
 from ..storage.directory import Directory
 from ..storage.marker import Claim
 from ..storage.provenance import Link, Provenance, extended
-from ..storage.recorder import Recorder
+from ..storage.recorder import Recorder, Recording
 from ..storage.stopfile import StopFile
 from . import half_mesh, restart, watch
 from .errors_so_far import ErrorsSoFar
@@ -193,7 +192,13 @@ def _begin(
     elif origin is None:
         directory.clear()
     split = decisions.branch_dissipation(job).on
-    dissipated = len(built.energy.balance.dissipated) if split and built.energy else 0
-    after, then = (origin.contents.step, origin.contents.table) if origin else (None, Table())
-    total, chooses = len(timeline), timeline.chooses
-    return Recorder(job, built.slab, directory, provenance, total, after, then, dissipated, quiet, added, chooses)
+    recording = Recording(
+        total=len(timeline),
+        branches=len(built.energy.balance.dissipated) if split and built.energy else 0,
+        added=added,
+        maps=job.output.fields if decisions.fields(job).on else (),
+        size=job.grid.size,
+        every=job.output.every,
+        open_ended=timeline.chooses,
+    )
+    return Recorder(directory, recording, provenance, origin.contents if origin else None, quiet)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError, InUseError, RunError
-from ..job import identity
-from ..job import Case, Job
+from ..job import Case, Job, identity
 from ..job.reading import CASES
 from ..parallel.groups import Groups
 from ..parallel.signals import Signals
@@ -59,10 +58,10 @@ def run(
     and what says whether a warning is shown.
 
     A case that fails does not stop the others: the code is 1 in the end. One that another program runs is passed over,
-    like those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint stops the sweep, with its code, and the cases
-    beside it, but no other program: the same command goes on with them. So do the file `stop`, which stops other
-    programs too, and the end of the wall time. The file stays: others may not have seen it yet, and it stops no later
-    one.
+    like those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint
+    stops the sweep, with its code, and the cases beside it, but no other program: the same command goes on with them.
+    So do the file `stop`, which stops other programs too, and the end of the wall time. The file stays: others may not
+    have seen it yet, and it stops no later one.
     """
     doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
     code = _go(cases, dealt(chosen, groups), groups, act, stop, manner, doubts)

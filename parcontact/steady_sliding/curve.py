@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
-from ..job import identity
-from ..job import Job
+from ..job import Job, identity
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
 from ..scene import sanity

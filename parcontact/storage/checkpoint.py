@@ -108,8 +108,7 @@ def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in
     try:
         layout.lay_out(part, slab, build, SEAL)
         hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()], in_turn)
-        own = hdf5.while_syncing(part, slab, lambda: {name: row_sums(rows) for name, rows in maps.items()})
-        everyone = slab.from_all(own)
+        everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.on_root(slab, finish, f"cannot write {part}")
         hdf5.sync(part, slab)
         hdf5.on_root(slab, lambda: _publish(part, path), f"cannot make {path}")

@@ -180,9 +180,7 @@ class Directory:
             try:
                 act()
             except hdf5.FAILURES as error:
-                raise InputError(
-                    f"the output directory {self.path} cannot be written: {hdf5.reason(error)}"
-                ) from error
+                raise InputError(f"the output directory {self.path} cannot be written: {hdf5.reason(error)}") from error
 
         on_root(self.slab.comm, attempt)
 

@@ -5,15 +5,11 @@ rank is raised on all, as a RunError in one sentence.
 """
 
 import errno
-import fcntl
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, TypeVar
+from typing import Any, BinaryIO, NamedTuple
 
 import h5py
 import numpy as np
@@ -21,7 +17,6 @@ import numpy as np
 from ..errors import InputError, RunError
 from ..parallel.slab import Array, Slab
 
-T = TypeVar("T")
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
@@ -47,24 +42,12 @@ def read(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -
 
 def sync(path: Path, slab: Slab) -> None:
     """Wait until what any rank has written is on the disk; collective."""
-    while_syncing(path, slab, lambda: None)
-
-
-def while_syncing(path: Path, slab: Slab, meanwhile: Callable[[], T]) -> T:
-    """As `sync`; returns what was done `meanwhile`."""
     problem = ""
-    with ThreadPoolExecutor(1) as pool:
-        try:
-            wait: Callable[[], None] = pool.submit(sync_one, path).result
-        except RuntimeError:  # a limit of the system leaves no room for a thread
-            wait = partial(sync_one, path)
-        result = meanwhile()
-        try:
-            wait()
-        except OSError as error:
-            problem = f"cannot write {path}: {reason(error)}"
+    try:
+        sync_one(path)
+    except OSError as error:
+        problem = f"cannot write {path}: {reason(error)}"
     raise_first(slab, problem)
-    return result
 
 
 def sync_one(path: Path) -> None:
@@ -220,27 +203,3 @@ class _Move:
 
     def write(self, how: h5py.h5p.PropDXID) -> None:
         self._id.write(self._memory, self._space, self.rows, dxpl=how)
-
-
-def lock_holder(path: Path) -> str:
-    """Which process keeps others from reading an HDF5 file, by HDF5's own lock; '' if none does."""
-    with path.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError as error:
-            return _holder(os.fstat(file.fileno())) if error.errno == errno.EWOULDBLOCK else ""
-    return ""
-
-
-def _holder(found: os.stat_result) -> str:
-    """The process with a lock on a file, as far as the system tells."""
-    place = f"{os.major(found.st_dev):02x}:{os.minor(found.st_dev):02x}:{found.st_ino}"
-    with suppress(OSError):
-        for line in Path("/proc/locks").read_text().splitlines():
-            words = line.split()
-            if place in words:
-                number = words[words.index(place) - 1]
-                with suppress(OSError):
-                    return f"process {number}, {Path(f'/proc/{number}/comm').read_text().strip()}"
-                return f"process {number}"
-    return "another process"

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..parallel.slab import Slab
+from ..parallel.slab import Array, Slab
 from . import hdf5
 from .hdf5 import overwrite
 
@@ -158,3 +158,28 @@ def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) 
     parent = file.require_group(group) if group else file
     h5py.h5d.create(parent.id, leaf.encode(), h5py.h5t.py_create(np.dtype(dtype)), space, dcpl=plist)
     return parent[leaf]
+
+
+def add_coordinate(file: h5py.File, name: str, values: Array, unit: str) -> None:
+    """Add a coordinate of the maps of a file."""
+    dataset = fixed(file, name, values.shape, np.float64)
+    dataset[...] = values
+    dataset.make_scale(name)
+    dataset.attrs["units"] = unit
+
+
+def add_maps(
+    file: h5py.File, slab: Slab, size: tuple[float, float], units: Mapping[str, str], leading: Sequence[str]
+) -> None:
+    """Add x and y [m] of a box of this `size`, and maps of these `units` by name, of shape (n, y, x).
+
+    `leading` names the coordinates along the first dimension, which are there.
+    """
+    for axis, length, points in zip("xy", size, (slab.nx, slab.ny), strict=True):
+        add_coordinate(file, axis, np.arange(points) * (length / points), "m")
+    for name, unit in units.items():
+        dataset = fixed(file, name, (len(file[leading[0]]), slab.ny, slab.nx), np.float64)
+        dataset.attrs["units"] = unit
+        for dimension, axes in enumerate((leading, "y", "x")):
+            for axis in axes:
+                dataset.dims[dimension].attach_scale(file[axis])

@@ -22,7 +22,7 @@ def texts(values: Iterable[float]) -> list[str]:
 class MeasuresFile(GrowingTable):
     """The growing file of a run; `table` is what it holds."""
 
-    def __init__(self, path: Path, branches: int, table: Table, added: Sequence[str] = ()) -> None:
+    def __init__(self, path: Path, table: Table, branches: int = 0, added: Sequence[str] = ()) -> None:
         """Continue the file, which holds this `table`, or begin it."""
         super().__init__(path, columns(branches, added))
         self.table, self._branches = table, branches
@@ -34,7 +34,9 @@ class MeasuresFile(GrowingTable):
         self.append(cells)
 
 
-def cut_back(path: Path, step: int, branches: int, then: Table, added: Sequence[str] = ()) -> tuple[Table, list[str]]:
+def cut_back(
+    path: Path, step: int, then: Table, branches: int = 0, added: Sequence[str] = ()
+) -> tuple[Table, list[str]]:
     """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
 
     `then` is what the file held when the checkpoint was written: a last row for which the disk had no room is added.

@@ -1,13 +1,12 @@
 """The files that grow with a run: run.log, measures.csv and fields.h5, begun or continued after a step."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from ..effects import decisions
 from ..errors import InputError, RunError
-from ..job import Job
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array
 from . import fields, hdf5, measures
-from .checkpoint import Table
+from .checkpoint import Contents, Table
 from .console import Console, Silence
 from .directory import Directory
 from .fields import FieldsFile
@@ -16,65 +15,72 @@ from .provenance import Provenance
 from .row import Row
 
 
-class Recorder:
-    """Writes what a job asks for after every step; making one, and its methods, are collective.
+@dataclass(frozen=True)
+class Recording:
+    """What is recorded: the dissipation of so many `branches`, the columns `added` by effects, and the `maps` of a box
+    of this `size` [m] after `every` so many steps; `total` steps of the run, about so many if it is `open_ended`."""
 
-    Parameters: the `directory`; the `provenance` of its files; `total` steps of the run, about so many if it is
-    `open_ended`; `after`, the step after which it goes on, or None to begin, and what the `table` of measures held;
-    `dissipated`, the number of branches whose dissipation has a column; `added`, the columns of effects. Raises
-    InputError where the files cannot be written. `warnings` says what was lost of an earlier run, `problem` what of the
-    results cannot be written.
+    total: int
+    branches: int = 0
+    added: tuple[str, ...] = ()
+    maps: tuple[str, ...] = ()
+    size: tuple[float, float] = (0.0, 0.0)
+    every: int = 1
+    open_ended: bool = False
+
+    @property
+    def map_steps(self) -> list[int]:
+        """The steps after which maps are saved, as far as they are known."""
+        last = set[int]() if self.open_ended else {self.total}
+        return sorted({*range(self.every, self.total + 1, self.every), *last})
+
+
+class Recorder:
+    """Writes what is asked for after every step; making one, and its methods, are collective.
+
+    A run that goes on from a checkpoint gives what that has, as `saved`. Raises InputError where the files cannot be
+    written. `warnings` says what was lost of an earlier run, `problem` what of the results cannot be written.
     """
 
     def __init__(
-        self,
-        job: Job,
-        slab: Slab,
-        directory: Directory,
-        provenance: Provenance,
-        total: int,
-        after: int | None,
-        then: Table,
-        dissipated: int,
-        quiet: bool,
-        added: Sequence[str] = (),
-        open_ended: bool = False,
+        self, directory: Directory, recording: Recording, provenance: Provenance, saved: Contents | None, quiet: bool
     ) -> None:
-        self._every = job.output.every if open_ended else 0
-        self.slab, self.path, self.problem = slab, directory.path, ""
+        self.slab, self.path, self.problem = directory.slab, directory.path, ""
+        self._recording = recording
         self.console: Console | Silence = Silence()
         self._measures: MeasuresFile | None = None
         self.warnings: list[str] = []
-
         table, log = self.path / "measures.csv", self.path / "run.log"
+        kept, columns = Table(), (recording.branches, recording.added)
 
-        def begin_table() -> None:
-            kept = Table()
-            if after is not None:
-                kept, lost = measures.cut_back(table, after, dissipated, then, added)
+        def cut_back() -> None:
+            nonlocal kept
+            if saved is not None:
+                kept, lost = measures.cut_back(table, saved.step, saved.table, *columns)
                 self.warnings += lost
-            self._measures = MeasuresFile(table, dissipated, kept, added)
 
         def begin_log() -> None:
-            self.console = Console(log, quiet, total)
+            self.console = Console(log, quiet, recording.total)
 
-        hdf5.on_root(slab, begin_table, f"cannot write {table}", InputError)
-        hdf5.on_root(slab, begin_log, f"cannot write {log}", InputError)
-        self._fields = self._begin_fields(job, provenance, total, after)
+        def begin_table() -> None:
+            self._measures = MeasuresFile(table, kept, *columns)
 
-    def _begin_fields(self, job: Job, provenance: Provenance, total: int, after: int | None) -> FieldsFile | None:
-        path, output = self.path / "fields.h5", job.output
-        if not decisions.fields(job).on or not total:
-            if after is not None:
-                self.warnings += filter(None, [fields.cut_back(path, self.slab, after)])
+        hdf5.on_root(self.slab, cut_back, f"cannot write {table}", InputError)
+        self._fields = self._begin_fields(provenance, saved)
+        hdf5.on_root(self.slab, begin_log, f"cannot write {log}", InputError)
+        hdf5.on_root(self.slab, begin_table, f"cannot write {table}", InputError)
+
+    def _begin_fields(self, provenance: Provenance, saved: Contents | None) -> FieldsFile | None:
+        path, recording = self.path / "fields.h5", self._recording
+        if not recording.maps or not recording.total:
+            if saved is not None:
+                self.warnings += filter(None, [fields.cut_back(path, self.slab, saved.step)])
             return None
-        ends = set[int]() if self._every else {total}
-        steps: Sequence[int] = sorted({*range(output.every, total + 1, output.every), *ends})
-        file = FieldsFile(path, self.slab, job.grid.size, output.fields, steps)
-        if after is None:
+        file = FieldsFile(path, self.slab, recording.size, recording.maps, recording.map_steps)
+        if saved is None:
             file.make(provenance)
         else:
-            self.warnings += filter(None, [file.resume(after, provenance)])
+            self.warnings += filter(None, [file.resume(saved.step, provenance)])
         return file
 
     @property
@@ -96,23 +102,24 @@ class Recorder:
                 self._measures.write(row)
             except OSError as error:
                 self.problem = f"cannot write {self._measures.path}: {hdf5.reason(error)}"
-        if self._fields and self._every and total:
-            self._make_place(self._fields, row.step, total)
+        if self._fields:
+            try:
+                if self._recording.open_ended and total:
+                    self._make_place(self._fields, row.step, total)
+            except RunError as error:
+                self.problem = self.problem or str(error)
         self._save_fields(row, field)
 
     def _make_place(self, file: FieldsFile, step: int, total: int) -> None:
-        """In an open-ended run there may be more instants than were foreseen, and in the end there are as many as there
-        are."""
+        """Make place for as many instants as an open-ended run has, in the end or when there are more than foreseen."""
+        every = self._recording.every
         wanted: list[int] = []
         if step >= total:
             wanted = [step]
-        elif step % self._every == 0 and step not in file.steps:
-            wanted = list(range(step, max(total, 2 * step) + 1, self._every))
+        elif step % every == 0 and step not in file.steps:
+            wanted = list(range(step, max(total, 2 * step) + 1, every))
         if wanted and wanted != [last for last in file.steps if last >= step]:
-            try:
-                file.make_place(wanted)
-            except RunError as error:
-                self.problem = self.problem or str(error)
+            file.make_place(wanted)
 
     def catch_up(self, row: Row, field: Callable[[str], Array]) -> None:
         """Save the maps of the step after which a run goes on, if they are due and could not be saved then."""
@@ -134,7 +141,7 @@ class Recorder:
     def sync(self, provenance: Provenance) -> None:
         """Wait until all that was recorded is on the disk, with where it comes from.
 
-        What is wrong with it is left in `problem`, if results are lost by it, or warned of.
+        What cannot be written is left in `problem`, if results are lost by it, or warned of.
         """
         try:
             sync = self._measures.sync if self._measures else lambda: None
@@ -147,7 +154,7 @@ class Recorder:
             self.console.warn(self._fields.trouble)
 
     def close(self) -> None:
-        """Not collective; raises nothing."""
+        """Close the log and the table; not collective; raises nothing."""
         self.console.close()
         if self._measures:
             self._measures.close()

@@ -72,21 +72,6 @@ class SteadyMaps:
     def _build(self, file: h5py.File, provenance: Provenance) -> None:
         file.attrs["kind"] = KIND
         provenance.write(file)
-        count = len(self.points)
         for name, unit in self.axes.items():
-            dataset = layout.fixed(file, name, (count,), np.float64)
-            dataset[...] = np.nan
-            dataset.make_scale(name)
-            dataset.attrs["units"] = unit
-        for axis, length, points in zip("xy", self.size, (self.slab.nx, self.slab.ny), strict=True):
-            dataset = layout.fixed(file, axis, (points,), np.float64)
-            dataset[...] = np.arange(points) * (length / points)
-            dataset.make_scale(axis)
-            dataset.attrs["units"] = "m"
-        for name in self.names:
-            dataset = layout.fixed(file, name, (count, self.slab.ny, self.slab.nx), np.float64)
-            dataset.attrs["units"] = UNITS[name]
-            for axis in self.axes:
-                dataset.dims[0].attach_scale(file[axis])
-            for dimension, axis in ((1, "y"), (2, "x")):
-                dataset.dims[dimension].attach_scale(file[axis])
+            layout.add_coordinate(file, name, np.full(len(self.points), np.nan), unit)
+        layout.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, list(self.axes))

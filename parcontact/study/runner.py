@@ -5,8 +5,7 @@ import os
 from collections.abc import Callable, Sequence
 
 from ..errors import RunError
-from ..job import identity
-from ..job import Job
+from ..job import Job, identity
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..plotting import study as study_plots

@@ -5,7 +5,6 @@ import os
 import resource
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -191,15 +190,3 @@ def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) 
     assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
     with pytest.raises(InputError, match="names no column"):
         measures.read(table)[column]
-
-
-def test_no_room_for_threads(here: Path, main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files are brought to the disk all the same."""
-
-    def refuse(_: object) -> NoReturn:
-        raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr(threading.Thread, "start", refuse)
-    code, _, said = main("job.yaml", "--quiet", "--out", "out")
-    assert (code, said) == (DONE, "")
-    assert (here / "out" / "checkpoint").is_dir()

@@ -17,7 +17,7 @@ def row(step: int, lost: tuple[float, ...] = ()) -> Row:
 
 
 def written(path: Path, count: int, branches: int = 0) -> None:
-    file = MeasuresFile(path, branches, Table())
+    file = MeasuresFile(path, Table(), branches)
     for step in range(count):
         file.write(row(step, (0.1,) * branches))
     file.close()
@@ -43,7 +43,7 @@ def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: fl
     found = Measures(1.0, *forces, friction)
     assert found.friction_x == pytest.approx(signed, rel=2e-16, abs=0.0)
     assert math.copysign(1.0, found.friction_x) == (-1.0 if signed < 0.0 else 1.0)
-    file = MeasuresFile(tmp_path / "measures.csv", 1, Table())
+    file = MeasuresFile(tmp_path / "measures.csv", Table(), 1)
     file.write(Row(1, measures=found, branch_dissipation=(0.1,)))
     file.close()
     table = measures.read(tmp_path / "measures.csv")
@@ -57,9 +57,9 @@ def test_cut_back(tmp_path: Path) -> None:
     whole = path.read_text()
     with path.open("a") as file:
         file.write("6,0.6,0.")  # a row that was cut off
-    assert measures.cut_back(path, 3, 0, Table())[1] == []
+    assert measures.cut_back(path, 3, Table(), 0)[1] == []
     assert path.read_text() == "".join(whole.splitlines(keepends=True)[:5])
-    file_again = MeasuresFile(path, 0, Table())
+    file_again = MeasuresFile(path, Table())
     for step in (4, 5):
         file_again.write(row(step))
     file_again.close()
@@ -68,19 +68,19 @@ def test_cut_back(tmp_path: Path) -> None:
 
 def test_what_is_lost_is_said(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
-    assert "is missing" in measures.cut_back(path, 3, 0, Table())[1][0]
+    assert "is missing" in measures.cut_back(path, 3, Table(), 0)[1][0]
     written(path, 3)
-    assert "ends with step 2: the rows up to step 5 are lost" in measures.cut_back(path, 5, 0, Table())[1][0]
+    assert "ends with step 2: the rows up to step 5 are lost" in measures.cut_back(path, 5, Table(), 0)[1][0]
 
 
 def test_other_columns(tmp_path: Path) -> None:
     """The dissipation of branches may be asked for later, or no longer."""
     path = tmp_path / "measures.csv"
     written(path, 3)
-    assert measures.cut_back(path, 2, 2, Table())[1] == []
+    assert measures.cut_back(path, 2, Table(), 2)[1] == []
     assert list(measures.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1", *LAST]
     assert math.isnan(measures.read(path)["dissipated_1"][2])
-    assert measures.cut_back(path, 2, 0, Table())[1] == []
+    assert measures.cut_back(path, 2, Table(), 0)[1] == []
     assert list(measures.read(path)) == [*COLUMNS, *LAST]
     written(tmp_path / "split.csv", 2, branches=2)
     assert measures.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]

@@ -1,33 +1,15 @@
 """What others have planted in a directory, or changed in its maps, is neither followed nor lost."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
 
 from parcontact.storage import files
 
 from .jobs import BAD_INPUT, DONE, Main, contents
-
-# -- planted links ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", [".lock", "run.log", "measures.csv", "fields.h5", "job.resolved.yaml", ".parcontact"])
-def test_planted_links_are_not_followed(main: Main, tmp_path: Path, name: str) -> None:
-    """A link to somebody's file, planted where a run writes, never changes that file."""
-    precious = tmp_path / "precious"
-    precious.write_text("years of work")
-    main("job.yaml", "--out", "out", "--until", "0.003")
-    (tmp_path / "out" / name).unlink(missing_ok=True)
-    (tmp_path / "out" / name).symlink_to(precious)
-    code, said = main("job.yaml", "--out", "out")
-    assert precious.read_text() == "years of work"
-    assert code == DONE or (code == BAD_INPUT and name in said)
 
 
 def test_planted_picture(main: Main, tmp_path: Path) -> None:
@@ -55,16 +37,6 @@ def test_names_of_unfinished_files_cannot_be_guessed(tmp_path: Path) -> None:
     assert (path.read_bytes(), len(list(tmp_path.iterdir()))) == (b"new", 1)
 
 
-def test_a_named_pipe_does_not_hang(main: Main, tmp_path: Path) -> None:
-    """Nor does it end up as a log."""
-    main("job.yaml", "--out", "out", "--until", "0.003")
-    (tmp_path / "out" / "run.log").unlink()
-    os.mkfifo(tmp_path / "out" / "run.log")
-    code, said = main("job.yaml", "--out", "out")
-    assert code == BAD_INPUT
-    assert "run.log" in said
-
-
 # -- fields that cannot be read ---------------------------------------------------------------------------------------
 
 
@@ -80,7 +52,7 @@ def test_locked_fields(main: Main, tmp_path: Path) -> None:
         code, said = main("job.yaml", "--out", "out")
         holder.communicate(b"")
     assert code == BAD_INPUT
-    assert f"out/fields.h5 is locked by process {holder.pid}, " in said
+    assert "out/fields.h5 is locked by another program" in said
     assert contents(tmp_path / "out") == before
     assert main("job.yaml", "--out", "out")[0] == DONE
 
@@ -97,21 +69,3 @@ def test_fields_cut_short(main: Main, tmp_path: Path, wanted: list[str]) -> None
     assert "fields.h5 cannot be read" in said
     assert path.with_name("fields.h5.aside").read_bytes() == data
     assert path.exists() == bool(wanted)
-
-
-@pytest.mark.parametrize("wanted", [["pressure"], ["pressure", "gap"]])
-def test_own_data_in_fields(main: Main, tmp_path: Path, wanted: list[str]) -> None:
-    """What a user has added to the file stays in it, or in the one that is put aside."""
-    main("job.yaml", "--out", "out", "--until", "0.003")
-    path = tmp_path / "out" / "fields.h5"
-    with h5py.File(path, "r+") as file:
-        file.create_dataset("analysis/mine", data=[[1.0, 2.0]], chunks=True, compression="gzip")
-        file["pressure"].attrs["checked"] = "by me"
-    code, said = main("job.yaml", "--out", "out", "--set", f"output.fields={json.dumps(wanted)}")
-    assert code == DONE
-    assert ("held analysis, which this program did not write" in said) == (len(wanted) > 1)
-    with h5py.File(path if len(wanted) == 1 else path.with_name("fields.h5.aside")) as file:
-        assert file["analysis/mine"][...].tolist() == [[1.0, 2.0]]
-    with h5py.File(path) as file:
-        assert not np.isnan(file["t"][...]).any()
-    assert main("plot", "out")[0] == DONE

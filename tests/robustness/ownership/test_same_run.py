@@ -6,15 +6,12 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
-from parcontact.storage.directory import Directory
-
-from .jobs import BAD_INPUT, DONE, STEPS, Contents, Main, contents, steps, write_job
+from .jobs import BAD_INPUT, DONE, STEPS, Main, contents, steps, write_job
 
 # -- which checkpoint is of this run ----------------------------------------------------------------------------------
 
@@ -147,45 +144,17 @@ def test_another_job_that_left_no_checkpoint(main: Main, tmp_path: Path) -> None
 # -- two at once ------------------------------------------------------------------------------------------------------
 
 
-def test_loser_of_a_race_writes_nothing(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who finds a new directory taken, when it comes to write, leaves the winner's job as it is."""
+def test_second_run_is_refused(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It writes nothing; of a directory that it has made itself nothing is left when its job is refused."""
     monkeypatch.setattr("parcontact.storage.directory.MAX_SECONDS_TO_RELEASE", 0.1)
-    out, winner = tmp_path / "out", Contents()
-    make = Directory.make
-
-    def late(self: Directory, *arguments: Any) -> None:
-        if not winner:  # the other one is faster: it makes the directory, takes the lock, and writes
-            out.mkdir()
-            (out / "job.yaml").write_text("the winner's")
-            handle = os.open(out / ".lock", os.O_RDWR | os.O_CREAT)
-            fcntl.flock(handle, fcntl.LOCK_EX)
-            winner.update(contents(out))
-        make(self, *arguments)
-
-    monkeypatch.setattr(Directory, "make", late)
+    out = tmp_path / "out"
+    code, said = main("job.yaml", "--out", "out/deep", "--restart", "absent.h5")
+    assert (code, out.exists()) == (BAD_INPUT, False)
+    out.mkdir()
+    handle = os.open(out / ".lock", os.O_RDWR | os.O_CREAT)
+    fcntl.flock(handle, fcntl.LOCK_EX)
     code, said = main("job.yaml", "--out", "out")
+    os.close(handle)
     assert code == BAD_INPUT
-    assert "is in use by another run" in said
-    assert contents(out) == winner
-
-
-def test_directory_taken_and_given_back_meanwhile(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The other run may even have ended by then; that of another job is no reason to go on with it."""
-    main("job.yaml", "--out", "first")
-    make = Directory.make
-
-    def late(self: Directory, *arguments: Any) -> None:
-        if self.path.name == "out" and not self.path.exists():
-            shutil.copytree(tmp_path / "first", tmp_path / "out")
-        make(self, *arguments)
-
-    monkeypatch.setattr(Directory, "make", late)
-    for changes, advice in (
-        ((), "run again to go on with it"),
-        (("--set", "material.modulus_inf=2e6"), "give --restart never to start afresh"),
-    ):
-        code, said = main("job.yaml", "--out", "out", *changes)
-        assert code == BAD_INPUT
-        assert f"out has been taken by another run meanwhile; {advice}" in said
-        assert contents(tmp_path / "out") == contents(tmp_path / "first")
-        shutil.rmtree(tmp_path / "out")
+    assert "out is in use by another run" in said
+    assert [path.name for path in out.iterdir()] == [".lock"]

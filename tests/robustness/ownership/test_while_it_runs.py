@@ -9,64 +9,12 @@ from typing import Any
 
 import h5py
 import numpy as np
-import pytest
 
 from parcontact.storage import checkpoint
 
 from .jobs import AGAIN, DONE, FAILED, STEPS, Main, contents, steps
 
 # -- while it runs ----------------------------------------------------------------------------------------------------
-
-
-def remove(path: Path) -> None:
-    path.unlink()
-
-
-def replace(path: Path) -> None:
-    path.unlink()
-    path.write_text("mine")
-
-
-@pytest.mark.parametrize("act", [remove, replace])
-def test_measures_taken_away(
-    main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path, act: Callable[[Path], None]
-) -> None:
-    """The rows are written again, what stands in their place is put aside, and a warning says so."""
-    out = tmp_path / "out"
-    at_step(6, lambda: act(out / "measures.csv"))
-    code, said = main("job.yaml", "--out", "out")
-    assert code == DONE
-    assert "measures.csv was re" in said
-    assert steps(out) == list(range(STEPS + 1))
-    if act is replace:
-        assert (out / "measures.csv.aside").read_text() == "mine"
-
-
-def test_measures_cut_short(main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path) -> None:
-    """Rows are lost, so the run ends with 1, its state saved, and goes on when asked to."""
-    out = tmp_path / "out"
-    at_step(6, lambda: os.truncate(out / "measures.csv", 100))
-    code, said = main("job.yaml", "--out", "out")
-    assert code == FAILED
-    assert "measures.csv was cut short by another program during the run: rows are lost" in said
-    assert "the newest checkpoint is out/checkpoint/step-6.h5" in said
-    assert checkpoint.inspect(out / "checkpoint" / "step-6.h5").step == 6
-
-
-def test_fields_taken_away(main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path) -> None:
-    """The state is saved before the run ends with 1; the same command goes on."""
-    out = tmp_path / "out"
-    at_step(6, (out / "fields.h5").unlink)
-    code, said = main("job.yaml", "--out", "out", "--set", "checkpoint.every=100")
-    assert code == FAILED
-    assert "fields.h5" in said
-    assert "the newest checkpoint is out/checkpoint/step-6.h5" in said
-    code, said = main("job.yaml", "--out", "out")
-    assert code == DONE
-    assert "fields.h5 is missing" in said
-    with h5py.File(out / "fields.h5") as file:
-        assert file["step"][...].tolist() == list(range(6, STEPS + 1))
-        assert not np.isnan(file["t"][...]).any()
 
 
 def test_locked_fields_do_not_disturb_a_run(
