@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from .command import ranks
+from .command.arguments import parse_arguments
 from .command.verbs import BAD_INPUT, DONE, FAILED
-from .command.words import understand
 from .errors import InputError, JobError, RunError
 from .streams import patient, why_unread
 
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(words: list[str]) -> int:
     try:
         _refuse_nowhere()
-        options = understand(words)
+        options = parse_arguments(words)
         code = int(options.act(options))
         return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output())
     except SystemExit as asked:  # of --help and --version

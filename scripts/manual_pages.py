@@ -21,8 +21,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from parcontact.command import words
-from parcontact.command.completion import reference
+from parcontact.command.arguments import describe_verbs
 from parcontact.manual import texts
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,7 +36,7 @@ def main() -> int:
     target: Path = options.to
     target.mkdir(parents=True, exist_ok=True)
     for name in texts.names():
-        (target / f"{name}.md").write_text(texts.page(name, {"verbs": lambda: reference(words._parser())}))
+        (target / f"{name}.md").write_text(texts.page(name, {"verbs": describe_verbs}))
     shutil.copy(texts.PAGES.parent / "conf.py", target)
     (target / "static").mkdir(exist_ok=True)
     shutil.copy(texts.PAGES.parent / "manual.css", target / "static")

@@ -103,8 +103,8 @@ MADE_BY = {  # which modules make objects of a kind
     },
     **{kind: {"scene.scene"} for kind in ("ElasticPressure", "AppliedInverse", "Ledger", "Setup", "Scene")},
     "ZenerBody": {"scene.scene", "physics.energy"},  # a second one follows A^-1 u
-    "ContactSolver": {"scene.scene", "plan.machine"},  # and one of no job measures a machine
-    "HalfSpace": {"scene.scene", "plan.machine", "plan.memory"},
+    "ContactSolver": {"scene.scene"},
+    "HalfSpace": {"scene.scene", "plan.memory"},
     "SteadySolver": {"steady_sliding.sliding"},
     "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample", "python.curves"},
     "March": {"steady_sliding.start", "study.outcome"},

@@ -13,7 +13,7 @@ from parcontact.errors import RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
-from parcontact.plan import side_by_side, trial
+from parcontact.plan import memory
 from parcontact.run import sweep, watch
 from parcontact.summary import info_directory, sweep_table
 
@@ -147,12 +147,12 @@ def test_unfinished_cases_are_dealt_first(cases: tuple[Case, ...], monkeypatch: 
 def test_how_many_cases_are_done_at_a_time(cases: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """One on each rank as long as cases are small, there are that many, and they fit into the memory."""
     jobs = [case.job for case in cases]
-    assert [side_by_side.count(jobs, ranks) for ranks in (1, 2, 4, 40)] == [1, 2, 4, 6]
-    assert side_by_side.count(jobs[:1], 4) == 1
+    assert [memory.count_side_by_side(jobs, ranks) for ranks in (1, 2, 4, 40)] == [1, 2, 4, 6]
+    assert memory.count_side_by_side(jobs[:1], 4) == 1
     large = jobs[0].model_copy(update={"grid": jobs[0].grid.model_copy(update={"points": (2048, 1024)})})
-    assert side_by_side.count([*jobs, large], 4) == 1
-    monkeypatch.setattr(trial, "free_bytes", lambda: 8 * 34 * 34 * 10)
-    assert side_by_side.count(jobs, 4) == 1
+    assert memory.count_side_by_side([*jobs, large], 4) == 1
+    monkeypatch.setattr(memory, "free_bytes", lambda: 8 * 34 * 34 * 10)
+    assert memory.count_side_by_side(jobs, 4) == 1
 
 
 def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,6 +41,11 @@ def rank() -> int:
     return next((int(text) for name in RANKS if (text := os.environ.get(name, "")).isdecimal()), 0)
 
 
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
 def launched() -> int:
     """How many ranks a launcher has started."""
     return max((int(os.environ.get(name) or 1) for name in LAUNCHERS), default=1)

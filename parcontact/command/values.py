@@ -1,77 +1,35 @@
 """Values of options: text -> value, or an argparse.ArgumentTypeError that says what is expected."""
 
 import argparse
-from contextlib import suppress
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
+
+T = TypeVar("T")
+INFINITE = float("inf")
 
 
-def directory(text: str) -> str:
-    if not text:
-        raise argparse.ArgumentTypeError("must name a directory, got ''")
-    return str(Path.cwd() / text) if text.startswith("~") else text  # a shell has said all there is to say of homes
+def checked(convert: Callable[[str], T], accepts: Callable[[T], bool], expected: str) -> Callable[[str], T]:
+    """Make a function that converts a text and refuses what is not as expected."""
+
+    def value_of(text: str) -> T:
+        try:
+            value = convert(text)
+        except ValueError:
+            value = None
+        if value is None or not accepts(value):
+            raise argparse.ArgumentTypeError(f"must be {expected}, got {text!r}")
+        return value
+
+    return value_of
 
 
-def seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a time [s] of zero or more, got {text!r}")
-    return value
+def _floats(text: str) -> tuple[float, ...]:
+    return tuple(map(float, text.split(",")))
 
 
-def count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"must be positive whole numbers, got {text!r}")
-    return int(text)
-
-
-def natural(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"must be a whole number of zero or more, got {text!r}")
-    return int(text)
-
-
-def counts(text: str) -> tuple[int, ...]:
-    return tuple(count(part) for part in text.split(","))
-
-
-def instant(text: str) -> str:
-    """A step, as digits, or a time as the text of a number."""
-    with suppress(ValueError):
-        if 0.0 <= float(text) < float("inf"):
-            return text.strip()
-    raise argparse.ArgumentTypeError(f"must be a step, as a whole number, or a time [s], got {text!r}")
-
-
-def names(text: str) -> tuple[str, ...]:
-    return tuple(filter(None, (part.strip() for part in text.split(","))))
-
-
-def network(text: str) -> tuple[float, float]:
-    found = numbers(text)
-    if len(found) != 2 or min(found) <= 0.0:
-        raise argparse.ArgumentTypeError(f"must be seconds of a message and bytes per second, got {text!r}")
-    return found[0], found[1]
-
-
-def positive(text: str) -> float:
-    with suppress(ValueError):
-        if 0.0 < float(text) < float("inf"):
-            return float(text)
-    raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}")
-
-
-def poisson(text: str) -> float:
-    with suppress(ValueError):
-        if -1.0 < float(text) <= 0.5:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"must be a Poisson ratio above -1 and up to 0.5, got {text!r}")
-
-
-def share(text: str) -> float:
-    with suppress(ValueError):
-        if 0.0 <= float(text) <= 1.0:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
+def _counts(text: str) -> tuple[int, ...]:
+    return tuple(map(int, text.split(",")))
 
 
 def wall_seconds(text: str) -> float:
@@ -87,26 +45,38 @@ def wall_seconds(text: str) -> float:
         return 0.0
 
 
-def wall(text: str) -> float:
-    limit = wall_seconds(text)
-    if not 0.0 < limit < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a wall time HH:MM:SS, got {text!r}")
-    return limit
+seconds = checked(float, lambda value: 0.0 <= value < INFINITE, "a time [s] of zero or more")
+wall = checked(wall_seconds, lambda value: 0.0 < value < INFINITE, "a wall time HH:MM:SS")
+natural = checked(int, lambda value: value >= 0, "a whole number of zero or more")
+counts = checked(_counts, lambda values: min(values) > 0, "positive whole numbers")
+positive = checked(float, lambda value: 0.0 < value < INFINITE, "a positive number")
+share = checked(float, lambda value: 0.0 <= value <= 1.0, "a number from 0 to 1")
+poisson = checked(float, lambda value: -1.0 < value <= 0.5, "a Poisson ratio above -1 and up to 0.5")
+degrees = checked(_floats, bool, "a list of temperatures [deg C]")
+
+
+def instant(text: str) -> str:
+    """A step, as digits, or a time as the text of a number."""
+    checked(float, lambda value: 0.0 <= value < INFINITE, "a step, as a whole number, or a time [s]")(text)
+    return text.strip()
+
+
+def directory(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("must name a directory, got ''")
+    return str(Path.cwd() / text) if text.startswith("~") else text  # a shell has said all there is to say of homes
+
+
+def names(text: str) -> tuple[str, ...]:
+    return tuple(filter(None, (part.strip() for part in text.split(","))))
 
 
 def numbers(text: str) -> tuple[float, ...]:
     """Numbers equally spaced in their logarithm, `first:last:count`, or a list `a,b,c`."""
     try:
-        return _spaced(text) if ":" in text else tuple(float(part) for part in text.split(","))
+        return _spaced(text) if ":" in text else _floats(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be first:last:count or a list of numbers, got {text!r}") from None
-
-
-def degrees(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a list of temperatures [deg C], got {text!r}") from None
 
 
 def _spaced(text: str) -> tuple[float, ...]:

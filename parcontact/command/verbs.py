@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..parallel.root import on_root
 from . import ranks
-from .cases import OF_A_CURVE, cases_of, each_case, overrides
+from .each_case import OF_A_CURVE, cases_of, each_case, overrides
 
 if TYPE_CHECKING:
     import argparse
@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..job import Job
-    from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from .cases import Shows
+    from .each_case import Shows
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: stopped early, run again
 
@@ -101,32 +100,29 @@ def plan(options: argparse.Namespace) -> int:
     started = watch.age()
     world = ranks.start()
     from .. import scene
-    from ..parallel.mpi import MPI
+    from ..parallel.groups import Groups
     from ..parallel.slab import Slab
-    from ..plan import machine, planning, whole_sweep
+    from ..plan.memory import count_side_by_side
+    from ..plan.planning import Planner
     from ..run import sweep_warnings
     from ..scene import sanity
     from ..scene.measured_range import describe_beyond
 
     chosen = on_root(world, lambda: cases_of(options)[1])
-    job = chosen[0].job
-    counts = options.ranks or tuple(sorted({1, world.size, *({machine.cores()} if world.size == 1 else ())}))
-    words = [options.job, *(word for change in options.set for word in ("--set", change))]
-    words += [] if options.case is None else ["--case", str(options.case)]
-    wanted = planning.Wanted(counts, words, options.seconds, options.cores, options.network)
-    slab, alone = Slab(world, *job.grid.points), Slab(MPI.COMM_SELF, 1, 1)
-    if options.sample:
-        planning.leave_sample(job, slab, wanted, options.sample, options.sample_points)
-        return DONE
-    whole = len(chosen) > 1
-    doubts = [] if whole else [*job.warnings, *describe_beyond(job)]
-    if whole:
+    job, several = chosen[0].job, len(chosen) > 1
+    slab = Slab(world, *job.grid.points)
+    if several:
         on_root(world, lambda: sweep_warnings.warn_once(chosen))
-    for warning in (*doubts, *(sanity.of_surface(scene.set_up(job, slab)) if sanity.is_quickly_made(job) else ())):
-        if world.rank == 0:
-            print(f"warning: {warning}", flush=True)
-    given = slab, alone, wanted, started
-    for line in whole_sweep.plan(chosen, *given) if whole else planning.plan(job, *given):
+    doubts = [] if several else [*job.warnings, *describe_beyond(job)]
+    if sanity.is_quickly_made(job):
+        doubts += sanity.of_surface(scene.set_up(job, slab))
+    planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
+    if several:
+        at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
+        lines = planner.plan_sweep(chosen, Groups(world, at_once))
+    else:
+        lines = planner.plan(job, slab)
+    for line in (*(f"warning: {text}" for text in doubts), *lines):
         if world.rank == 0:
             print(line, flush=True)
     return DONE
@@ -172,21 +168,18 @@ def fit(options: argparse.Namespace) -> int:
 
 def study(options: argparse.Namespace) -> int:
     world = ranks.start()
-    from .. import job as jobs
     from ..parallel.slab import Slab
     from ..study import runner
 
-    job, words = _load(options, world), overrides(options)
-
     def make(changes: Sequence[str]) -> Job:
-        return on_root(world, lambda: jobs.load(options.job, [*words, *changes], options.case))
+        return on_root(world, lambda: _load(options, changes))
 
+    job = make(())
     return runner.run(job, make, Slab(world, *job.grid.points), options.quiet)
 
 
+@ranks.root_alone
 def surface(options: argparse.Namespace) -> int:
-    """Root's work alone: maps are whole."""
-    world = ranks.start()
     from pathlib import Path
 
     from .. import scene
@@ -201,55 +194,45 @@ def surface(options: argparse.Namespace) -> int:
     alone = measured_maps.is_map(given)
     if options.start and not alone:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
-
-    def act() -> list[str]:
-        measured_maps.refuse_taken(options.start)
-        job = measured_maps.load(given, options.set) if alone else _load(options, MPI.COMM_SELF)
-        base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
-        doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
-        base.surface.rescale(1.0)
-        heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-        lines = list(surfaces.describe(job, heights, base.told, base.shortest, picture))
-        lines += [f"warning: {text}" for text in doubts]
-        return [*lines, *measured_maps.start(job, given, options.start)] if alone else lines
-
-    lines = on_root(world, act)
-    if world.rank == 0:
-        print("\n".join(lines))
+    measured_maps.refuse_taken(options.start)
+    job = measured_maps.load(given, options.set) if alone else _load(options)
+    base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
+    base.surface.rescale(1.0)
+    heights = base.surface.heights((0.0, 0.0), base.slab.empty())
+    print("\n".join(surfaces.describe(job, heights, base.told, base.shortest, picture)))
+    for text in doubts:
+        print(f"warning: {text}")
+    for line in measured_maps.start(job, given, options.start) if alone else ():
+        print(line)
     return DONE
 
 
+@ranks.root_alone
 def info(options: argparse.Namespace) -> int:
-    world = ranks.start()
     from ..summary import info as about
 
-    text, sound = on_root(world, lambda: about.describe_all(options.file))
-    if world.rank == 0:
-        print(text)
+    text, sound = about.describe_all(options.file)
+    print(text)
     return DONE if sound else BAD_INPUT
 
 
+@ranks.root_alone
 def plot(options: argparse.Namespace) -> int:
-    world = ranks.start()
     from ..plotting import plots
 
     names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
     wanted = plots.Options(**{name: getattr(options, name) for name in names})
-    pictures = on_root(world, lambda: plots.plot(options.directories, wanted))
-    if world.rank == 0:
-        for picture in pictures:
-            print(f"picture: {picture}")
+    for picture in plots.plot(options.directories, wanted):
+        print(f"picture: {picture}")
     return DONE
 
 
+@ranks.root_alone
 def report(options: argparse.Namespace) -> int:
-    """Root's work alone."""
-    world = ranks.start()
     from ..report import page
 
-    target = on_root(world, lambda: page.write(options.directories, options.out))
-    if world.rank == 0:
-        print(f"report: {target}")
+    print(f"report: {page.write(options.directories, options.out)}")
     return DONE
 
 
@@ -265,8 +248,45 @@ def doctor(options: argparse.Namespace) -> int:
     return FAILED if wrong else DONE
 
 
-def _load(options: argparse.Namespace, world: MPI.Intracomm) -> Job:
-    """Root reads the job; the others get what it found; collective."""
+@ranks.root_alone
+def manual(options: argparse.Namespace) -> int:
+    from ..manual import texts
+
+    if options.open:
+        import webbrowser
+
+        webbrowser.open(texts.built(options.page or "index").as_uri())
+    elif options.page:
+        print(texts.plain(options.page, {"verbs": options.describe_verbs}))
+    else:
+        print(texts.contents())
+    return DONE
+
+
+@ranks.root_alone
+def schema(options: argparse.Namespace) -> int:
+    import json
+    import sys
+
+    from ..job import extension
+    from ..job import schema as job_schema
+
+    for text in extension.unusable():
+        print(f"warning: {text}; the schema is without it", file=sys.stderr)
+    print(json.dumps(job_schema.schema(), indent=1))
+    return DONE
+
+
+@ranks.root_alone
+def cite(options: argparse.Namespace) -> int:
+    from ..summary import citations
+
+    print(citations.describe(options.directory))
+    return DONE
+
+
+def _load(options: argparse.Namespace, changes: Sequence[str] = ()) -> Job:
+    """The job that the command line is about, with some more changes."""
     from .. import job as jobs
 
-    return on_root(world, lambda: jobs.load(options.job, overrides(options), options.case))
+    return jobs.load(options.job, [*overrides(options), *changes], options.case)

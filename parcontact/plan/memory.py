@@ -3,8 +3,10 @@
 Each class says what it holds; here this is added up.
 """
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -14,8 +16,9 @@ from ..effects.effect import effects_that_follow
 from ..effects.folded_branches import fold_branches_of
 from ..effects.relaxation import relaxation_of
 from ..job import Job
+from ..job.checks.size import machines
 from ..march.state import State
-from ..parallel.fft import footprint, transform_name
+from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
 from ..parallel.slab import deal, dealt_to
 from ..physics.body import ElasticBody, ZenerBody
@@ -30,17 +33,18 @@ from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.preconditioner.extension import grids_for
 from ..steady_sliding.sliding import tolerance_of
 
-TRANSFORMS = "transforms"  # that every job has
+FREE_SHARE = 0.7  # of the memory that is free, which jobs may take
+MEMINFO = Path("/proc/meminfo")
+MOST_POINTS = 2**20  # tuning: of a small case, which gains little from several ranks
+SPARE = 2.0  # times the maps of steps: what a first contact or steady state on nested grids may hold besides
 
 
 @dataclass(frozen=True)
 class Holding:
-    """What one rank holds for a purpose [bytes]; of a transform its name in the tally, and what one sends."""
+    """What one rank holds for a purpose [bytes]."""
 
     what: str
     bytes: int
-    transform: str = ""
-    sent: int = 0
 
 
 @dataclass(frozen=True)
@@ -86,13 +90,36 @@ def saved(job: Job) -> int:
     return sum(maps.count.saved * (nx * ny * maps.itemsize + 4 * ny) for maps in _maps(job))
 
 
+def free_bytes() -> int:
+    """Bytes of memory that are free, as far as that is known."""
+    try:
+        facts = dict(line.split(":") for line in MEMINFO.read_text().splitlines())
+        return int(facts["MemAvailable"].split()[0]) << 10
+    except (OSError, KeyError, ValueError):
+        return sys.maxsize
+
+
+def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
+    """How many of these cases are run at a time on so many ranks: small ones one on each rank, as they gain little from
+    several; 1 where they are not small, or where so many do not fit into the memory."""
+    at_once = min(ranks, len(jobs))
+    if at_once < 2:
+        return 1
+    largest = max(jobs, key=lambda job: job.grid.nx * job.grid.ny)
+    if largest.grid.nx * largest.grid.ny > MOST_POINTS:
+        return 1
+    here = -(-at_once // machines())
+    held = here * SPARE * total(largest, max(1, ranks // at_once))
+    return at_once if held <= FREE_SHARE * free_bytes() else 1
+
+
 def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
     part = dealt_to(job.grid.ny, ranks, rank)
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, np.float64, ranks, rank)
     symbol = Convolution.footprint(spectrum, job.grid.ny)
     kept: type[np.floating] = np.float32 if decisions.single_operator(job).on else np.float64
-    yield _transform(TRANSFORMS, job, job.grid.points, np.float64, ranks, rank)
+    yield _transform("transforms", job, job.grid.points, np.float64, ranks, rank)
     if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
         yield _transform("padded transforms and operator", job, lengths, kept, ranks, rank, with_symbol=True)
     else:
@@ -159,9 +186,9 @@ def _transform(
     lent: bool = False,
 ) -> Holding:
     """A transform with its buffers, its spectrum perhaps `lent`, and the symbol of the operator that alone uses it."""
-    spectrum, blocks, sent = footprint(job.grid.points, lengths, dtype, ranks, rank, lent)
+    spectrum, blocks, _ = footprint(job.grid.points, lengths, dtype, ranks, rank, lent)
     symbol = Convolution.footprint(spectrum, lengths[1]) if with_symbol else 0
-    return Holding(what, (0 if lent else spectrum) + blocks + symbol, transform_name(lengths, dtype), sent)
+    return Holding(what, (0 if lent else spectrum) + blocks + symbol)
 
 
 def _maps(job: Job) -> Iterator[Maps]:

@@ -1,118 +1,124 @@
-"""A plan is made: the job is tried for a moment, and the machine too."""
+"""A plan is made: effects, memory per rank, and a trial of the job that says what it costs.
 
+Of a sweep the first case is planned in full, the last and one between are tried too, and the others are taken to be as
+long for their work, steps or steady states times N log N of their grids, as the next one that was tried.
+"""
+
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 
 from .. import progress
-from ..job import Job
+from ..history.timeline import Timeline
+from ..job import Case, Job
+from ..parallel.groups import Groups
 from ..parallel.slab import Slab
 from ..steady_sliding.curve import request
 from ..storage import wisdom
-from . import machine, other_ranks, price, report, trial
-from .report import Costs
-from .sample import Sample, sample
-from .scaling import Machine, Scaling
+from . import price, report
+from .costs import Costs, costs_of, measure_write_rate
+from .sample import sample
+from .trial import choose_grid
+
+TRIED_CASES = 3  # tuning: cases that are tried at most: the first, the last, and between them
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked of a plan: for how many `ranks`, tried for how many `seconds` by each number that this machine has.
+@dataclass
+class Planner:
+    """Plans jobs: memory for some numbers of `ranks`, each tried for about so many `seconds`; the program has run for
+    `started` seconds so far. What the jobs that were tried cost is in `found`."""
 
-    Of the machine that the job is for, as far as it is not this one: `cores` of a node, and the `latency` [s] and
-    `bandwidth` [byte/s] of its network. `words` name the job for another process.
-    """
+    ranks: Sequence[int]
+    seconds: float
+    started: float
+    found: list[Costs] = field(default_factory=list)
 
-    ranks: tuple[int, ...]
-    words: Sequence[str] = ()
-    seconds: float = 10.0
-    cores: int | None = None
-    network: tuple[float, float] | None = None
-
-
-def plan(
-    job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float, found: list[Costs] | None = None
-) -> Iterator[str]:
-    """Lines of the plan of a job, its run and its steady states; collective, all ranks must take every line.
-
-    `alone` is a slab of one rank; `started` the seconds of the program so far. The costs are left in `found`.
-    """
-    found = [] if found is None else found
-    yield from report.effects(job)
-    yield ""
-    if job.history:
-        yield from report.maps(job, wanted.ranks)
+    def plan(self, job: Job, slab: Slab) -> Iterator[str]:
+        """Lines of the plan of a job, its run and its steady states; collective, all ranks must take every line."""
+        yield from report.effects(job)
         yield ""
-        yield from _costs(job, slab, alone, wanted, started, found)
-    if job.steady:
-        steady, changes = only_steady_states(job)
-        yield from [""] * bool(job.history)
-        yield from _costs(steady, slab, alone, replace(wanted, words=[*wanted.words, *changes]), started, found)
+        if job.history:
+            yield from report.maps(job, self.ranks)
+            yield ""
+            yield from self._tell(job, slab)
+        if job.steady:
+            yield from [""] * bool(job.history)
+            yield from self._tell(only_steady_states(job), slab)
+
+    def plan_sweep(self, cases: Sequence[Case], groups: Groups) -> Iterator[str]:
+        """Lines of the plan of all cases, of which each group of ranks runs one at a time; collective like `plan`."""
+        first = cases[0]
+        slab = Slab(groups.comm, *first.job.grid.points)
+        yield f"first of {len(cases)} cases: {', '.join(f'{key} = {value}' for key, value in first.settings.items())}"
+        yield ""
+        yield from self.plan(first.job, slab)
+        if not self.found:
+            return
+        yield ""
+        tried = {0: self.found[0]}
+        for index in cases_to_try(len(cases))[1:]:
+            job = cases[index].job
+            if costs := self.try_job(job, slab.resized(*job.grid.points)):
+                tried[index] = costs
+        marked = any(costs.sample.disturbed for costs in tried.values())
+        times = case_times(cases, {index: costs.case for index, costs in tried.items()})
+        whole = tried[0].sample.starting + max(sum(times) / groups.count, *times)
+        yield f"sweep of {len(cases)} cases: {', '.join(str(cases[index].number) for index in tried)} were tried"
+        yield f"the others are taken to be like them; the longest takes {max(times) / times[0]:.3g} times the first"
+        how = f"{groups.count} cases at a time" if groups.count > 1 else "one case after the other"
+        on = report.ranks_text(groups.everyone.size)
+        yield f"on {on}: {report.duration_text(whole)}{report.MARK * marked} in all, {how}"
+
+    def try_job(self, job: Job, slab: Slab) -> Costs | None:
+        """Try a job, or the same on a grid that is coarse enough, with the transforms its run will have; collective."""
+        tried = slab.agree(choose_grid(job, slab.comm.size, self.seconds) if slab.root else None)
+        if tried is None:
+            return None
+        own = slab.resized(*tried.grid.points)
+        wisdom.recall(tried, own, None)
+        seen = sample(tried, own, self.seconds, self.started)
+        wisdom.keep(tried, own)
+        return costs_of(job, seen, slab.agree(measure_write_rate(job.output.directory) if slab.root else 0.0))
+
+    def _tell(self, job: Job, slab: Slab) -> Iterator[str]:
+        """What the steps, or the steady states, of a job cost; collective."""
+        bar = progress.Bar(1, f"trying the job for some {self.seconds:g} s", "trial", slab.root)
+        try:
+            costs = self.try_job(job, slab)
+        finally:
+            bar.close()
+        if costs is None:
+            yield "too large to be tried here: its time is unknown"
+            return
+        self.found.append(costs)
+        yield from report.steps(costs)
+        yield from report.times(costs)
+        yield ""
+        yield from price.table(costs)
 
 
-def only_steady_states(job: Job) -> tuple[Job, list[str]]:
-    """The job of `parcontact steady`, and the words that make it of this one for another process."""
-    pressures = request(job).pressures
-    section = job.steady.model_copy(update={"pressures": pressures}) if job.steady else None
-    listed = ", ".join(map(repr, pressures))
-    changes = ["--set", f"steady.pressures=[{listed}]", "--set", "history=[]", "--set", "initial={state: virgin}"]
-    return job.model_copy(update={"history": (), "steady": section, "initial": type(job.initial)()}), changes
+def only_steady_states(job: Job) -> Job:
+    """The job of `parcontact steady`."""
+    section = job.steady.model_copy(update={"pressures": request(job).pressures}) if job.steady else None
+    return job.model_copy(update={"history": (), "steady": section, "initial": type(job.initial)()})
 
 
-def _costs(job: Job, slab: Slab, alone: Slab, wanted: Wanted, started: float, found: list[Costs]) -> Iterator[str]:
-    """What the steps, or the steady states, of a job cost; collective."""
-    bar = progress.Bar(1, f"trying the job for some {wanted.seconds:g} s", "trial", slab.root)
-    try:
-        seen = try_job(job, slab, wanted.seconds, started)
-    finally:
-        bar.close()
-    if seen is None:
-        yield "too large to be tried here: its time is unknown"
-        return
-    others = [count for count in wanted.ranks if 1 < count <= machine.cores()] if slab.comm.size == 1 else []
-    more = other_ranks.samples(seen.job, wanted.words, sorted(others), wanted.seconds)
-    scaling = Scaling.of(job, [seen, *more], describe(seen.job, alone, wanted))
-    costs = Costs(scaling, machine.write_rate(job.output.directory))
-    found.append(costs)
-    yield from report.steps(costs)
-    yield ""
-    yield from report.times(costs, wanted.ranks)
-    yield ""
-    yield from price.table(costs, wanted.ranks)
+def cases_to_try(count: int) -> list[int]:
+    """Of so many cases: the first, the last, and between them."""
+    few = min(TRIED_CASES, count)
+    return sorted({round(number * (count - 1) / max(few - 1, 1)) for number in range(few)})
 
 
-def costs_on(like: Costs, job: Job, seen: Sample) -> Costs:
-    """Of another job, on the machine of one that was planned."""
-    return replace(like, scaling=Scaling.of(job, [seen], like.scaling.machine))
+def case_times(cases: Sequence[Case], tried: dict[int, float]) -> list[float]:
+    """The seconds of each case from those of some, by the work of each and the nearest that was tried."""
+    nearest = [min(tried, key=lambda index: abs(index - place)) for place in range(len(cases))]
+    return [
+        tried[index] * _work(case.job) / _work(cases[index].job) for index, case in zip(nearest, cases, strict=True)
+    ]
 
 
-def try_job(job: Job, slab: Slab, seconds: float, started: float, points: Sequence[int] = ()) -> Sample | None:
-    """Try a job, or the same on a grid that is coarse enough, or has so many points, with the transforms its run will
-    have; collective."""
-    tried = slab.agree(_grid_to_try(job, slab.comm.size, seconds, points) if slab.root else None)
-    if tried is None:
-        return None
-    own = slab.resized(*tried.grid.points)
-    wisdom.recall(tried, own, None)
-    found = sample(tried, own, seconds, started)
-    wisdom.keep(tried, own)
-    return found
-
-
-def _grid_to_try(job: Job, ranks: int, seconds: float, points: Sequence[int]) -> Job | None:
-    return trial.on_grid(job, points) if points else trial.grid_for(job, ranks, seconds)
-
-
-def leave_sample(job: Job, slab: Slab, wanted: Wanted, path: Path, points: Sequence[int]) -> None:
-    """Try a job, on the same grid, for a program that has started this one; collective."""
-    found = try_job(job, slab, wanted.seconds, 0.0, points)
-    if slab.root and found:
-        other_ranks.save(path, found)
-
-
-def describe(job: Job, alone: Slab, wanted: Wanted) -> Machine:
-    """The machine that a job is for: nodes like this one, but for what is known of it."""
-    crowding = machine.crowding(job.grid.points) if max(wanted.ranks) > 1 else 1.0
-    this = Machine(machine.cores(), crowding, machine.per_call(alone), machine.copy_rate())
-    other = replace(this, cores=wanted.cores or this.cores)
-    return replace(other, latency=wanted.network[0], bandwidth=wanted.network[1]) if wanted.network else other
+def _work(job: Job) -> float:
+    """Return the work of a case, in proportion."""
+    points = job.grid.nx * job.grid.ny
+    steps = Timeline.of(job).count if job.history else len(request(job).points)
+    return max(steps, 1) * points * math.log(points + 1)

@@ -11,11 +11,12 @@ cell add, and each takes as long as seen, in proportion to N log N.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
+from scipy.fft import next_fast_len
 
 from ..history.chosen import ChosenEnds
 from ..history.timeline import Timeline
@@ -25,9 +26,9 @@ from ..job.sections.listing import plain
 from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
 from ..physics.budget import SPOTS_ORDER, per_cent
 from ..physics.time_error import TIME_ORDER
-from .report import MARK, Costs, duration_text, ranks_text, unit_of
+from .costs import Costs
+from .report import MARK, duration_text, ranks_text, unit_of
 from .sample import Sample, StageCost
-from .scaling import Scaling
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
 MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
@@ -38,46 +39,13 @@ BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is n
 LONGER, COARSER, FINER = 4.0, 8.0, 16.0  # times the own steps, and the own cells, at most: no trial tells of more
 MULTIPLE = 16  # of which points along a side are, so that there are coarser grids to start from
 SAME = 1e-9  # relative: numbers this close are the same
-FAST = (2, 3, 5)  # factors of the lengths of fast transforms
 
 
-@dataclass(frozen=True)
-class Offer:
-    """A job at one accuracy, and what it costs; by how much the mesh makes the contact area wrong."""
-
-    accuracy: float
-    costs: Costs
-    area: float
-
-    @property
-    def job(self) -> Job:
-        return self.costs.job
-
-    @property
-    def steps(self) -> int:
-        return self.costs.scaling.steps
-
-
-def offers(costs: Costs) -> list[Offer]:
-    """The job at the accuracies of the table."""
-    return [offer(costs, accuracy) for accuracy in ACCURACIES]
-
-
-def offer(costs: Costs, accuracy: float) -> Offer:
-    """The job at one accuracy."""
-    own, scaling = costs.job, costs.scaling
-    job = _on_mesh(own, accuracy, mesh_for(own, scaling.samples[0], accuracy))
-    samples = tuple(_scaled(sample, own, job) for sample in scaling.samples)
-    return Offer(accuracy, Costs(Scaling(job, samples, scaling.machine), costs.write_rate), _area_error(costs, job))
-
-
-def _area_error(costs: Costs, job: Job) -> float:
-    """The part of the error of the contact area that the mesh makes, in the first order of the cell."""
-    sample = costs.scaling.samples[0]
-    return (mesh_error(sample, "area") or 0.0) * (sample.job.grid.nx / job.grid.nx) ** EDGE_ORDER
-
-
-# -- mesh --------------------------------------------------------------------------------------------------------------
+def offer(costs: Costs, accuracy: float) -> Costs:
+    """Return the costs of the job at another accuracy."""
+    own, sample = costs.job, costs.sample
+    job = _on_mesh(own, accuracy, mesh_for(own, sample, accuracy))
+    return Costs(job, _scaled(sample, own, job), costs.write_rate)
 
 
 def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
@@ -108,24 +76,19 @@ def mesh_error(sample: Sample, name: str) -> float | None:
     return None if name == "friction" and error is not None and error >= 1.0 else error
 
 
+def area_error(sample: Sample, job: Job) -> float:
+    """Return the part of the error of the contact area that the mesh of a job makes, in the first order of the cell."""
+    return (mesh_error(sample, "area") or 0.0) * (sample.job.grid.nx / job.grid.nx) ** EDGE_ORDER
+
+
 def shortest_wave(job: Job) -> float | None:
-    """Of the rough surfaces of a job [m]."""
+    """Return that of the rough surfaces of a job [m], None without one."""
     return min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None)
 
 
 def fast_length(least: float) -> int:
-    """The next multiple of MULTIPLE that transforms like."""
-    count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME)))
-    while _without_fast_factors(count) > 1:
-        count += 1
-    return MULTIPLE * count
-
-
-def _without_fast_factors(count: int) -> int:
-    for factor in FAST:
-        while count % factor == 0:
-            count //= factor
-    return count
+    """Return the next multiple of MULTIPLE that transforms like."""
+    return int(MULTIPLE * next_fast_len(max(1, math.ceil(least / MULTIPLE * (1.0 - SAME))), real=True))
 
 
 def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
@@ -202,40 +165,29 @@ def _with_calls(cost: StageCost, times: float) -> StageCost:
 # -- text --------------------------------------------------------------------------------------------------------------
 
 
-def table(costs: Costs, ranks: Sequence[int]) -> Iterator[str]:
-    """Mesh, steps, precision, memory and time of each accuracy on some numbers of ranks, and how far to trust them."""
-    own = Offer(costs.job.numerics.accuracy, costs, _area_error(costs, costs.job))
-    rows = [("this job", own), *((per_cent(one.accuracy), one) for one in offers(costs))]
-    unit, size = unit_of(max(each.costs.held(1) for _, each in rows))
-    slides = costs.scaling.samples[0].total("friction weight") > 0.0
+def table(costs: Costs) -> Iterator[str]:
+    """Mesh, steps, precision, memory and time of each accuracy on these ranks, and how far to trust them."""
+    rows = [("this job", costs), *((per_cent(accuracy), offer(costs, accuracy)) for accuracy in ACCURACIES)]
+    unit, size = unit_of(max(each.held for _, each in rows))
+    sample, mark = costs.sample, MARK * costs.sample.disturbed
+    slides = sample.total("friction weight") > 0.0
     yield f"what accuracy costs, in {'friction; the contact area is then within' if slides else 'contact area'}"
     heads = (("area", 9), ("mesh", 14), ("steps" if costs.job.history else "states", 9))
     head = "".join(f"{text:>{width}}" for text, width in heads if slides or text != "area")
-    yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11}" + "".join(f" {ranks_text(n):>10}" for n in ranks)
+    yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11} {ranks_text(sample.ranks):>11}"
     for name, each in rows:
-        grid, held = each.job.grid, each.costs.held(1) / size
-        area = f"{per_cent(each.area):>9}" if slides else ""
-        numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.steps:9d}  {each.job.numerics.precision:9}{held:11.4g}"
-        yield f"  {name:9}{area}{numbers}" + "".join(f" {_time(each.costs, count):>10}" for count in ranks)
-    yield from _basis(costs)
-
-
-def _time(costs: Costs, ranks: int) -> str:
-    """Of the whole run, marked where other programs have disturbed the trial."""
-    return duration_text(costs.whole(ranks)) + MARK * costs.scaling.sample(ranks).disturbed
-
-
-def _basis(costs: Costs) -> Iterator[str]:
-    """What was measured, and what is scaled from it."""
-    sample = costs.scaling.samples[0]
-    calls = sample.total("operator") / max(sample.steps, 1)
+        grid, whole = each.job.grid, duration_text(each.whole) + mark
+        area = f"{per_cent(area_error(sample, each.job)):>9}" if slides else ""
+        numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.sample.steps:9d}  {each.job.numerics.precision:9}"
+        yield f"  {name:9}{area}{numbers}{each.held / size:11.4g} {whole:>11}"
     mesh = mesh_error(sample, "friction")
     mesh = mesh_error(sample, "area") if mesh is None else mesh
     errors = [] if sample.job.steady else [f"errors of {per_cent(time_error(StageCost(0), sample))} by time steps"]
     errors.append("errors by the mesh unknown" if mesh is None else f"errors of {per_cent(mesh)} by the mesh")
     points, what = " x ".join(map(str, sample.job.grid.points)), "state" if sample.job.steady else "step"
+    calls = sample.total("operator") / max(sample.steps, 1)
     yield f"measured on {points} points: times, {calls:.3g} operator calls a {what}, {', '.join(errors)}"
     yield (
         "scaled: cells by what the shortest wave or a contact spot needs, steps by the order of the integrator, "
-        f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time by N log N; maps are those on 1 rank"
+        f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time by N log N"
     )

@@ -9,9 +9,10 @@ import resource
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
+from typing import TypeVar
 
 from .. import scene
 from ..errors import InputError, RunError
@@ -20,13 +21,13 @@ from ..job import Job
 from ..march.rest import steps_to_make
 from ..march.step import March
 from ..parallel.slab import Slab, deal
-from ..physics.budget import weight_of
+from ..physics.budget import ErrorBudget, weight_of
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
 from ..steady_sliding.sliding import Point, SteadySliding
-from ..storage.row import Row
-from . import trial
+from .trial import make_tiny
 
+T = TypeVar("T")
 SETTLING = 4  # steps after a long one until solves take as many iterations as ever
 BLOCK = 8  # steps of a block, these among them
 CALLS = 12  # operator calls expected of a step that starts from the one before
@@ -93,14 +94,6 @@ class Sample:
             stage.steps * (stage.sums.get(name, 0.0) / stage.weight if stage.weight else mean) for stage in self.stages
         )
 
-    def of(self, job: Job) -> "Sample":
-        """What this says of the same job on another grid: its number of steps may be another one in each stage."""
-        if job.grid == self.job.grid or not job.history:
-            return self
-        spans = Timeline.of(job).spans
-        stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(self.stages, spans, strict=True))
-        return replace(self, stages=tuple(stages))
-
 
 def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sample:
     """Try a job for about so long; `starting` [s] has passed before. Collective.
@@ -124,7 +117,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
 
 def _warm_up(job: Job, slab: Slab) -> None:
     """Make the first steps, or the first steady state, of a tiny scene: compiling is no part of what a job costs."""
-    small = trial.tiny(job)
+    small = make_tiny(job)
     if small is None:
         return
     own = Slab(slab.comm, *small.grid.points)
@@ -161,26 +154,16 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
         speed, pressure, temperature = states[index]
         if temperature == temperature:
             sliding.heat(temperature)
-        velocity = (speed * wanted.direction[0], speed * wanted.direction[1])
-        points: list[Point] = []
-        cost = _cost(slab, partial(_solve_or_fail, sliding, velocity, pressure, points))
-        stage.add(1.0, cost | dict(_errors_of_point(points)))
+        point, cost = _cost(slab, partial(_solve, sliding, wanted.velocity(speed), pressure))
+        stage.add(1.0, cost | (dict(_errors(point.errors, 1.0, 1.0)) if point else {}))
     return building, [stage]
 
 
-def _solve_or_fail(sliding: SteadySliding, velocity: tuple[float, float], pressure: float, points: list[Point]) -> None:
-    """Append the state to `points`; one that cannot be solved costs what it has cost."""
+def _solve(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> Point | None:
+    """The state; one that cannot be solved costs what it has cost."""
     with suppress(RunError):
-        points.append(sliding.solve(velocity, pressure))
-
-
-def _errors_of_point(points: list[Point]) -> Iterator[tuple[str, float]]:
-    """Yield the mesh errors of steady states, which all weigh the same."""
-    for point in points:
-        for name, parts in (("friction", point.errors.friction), ("area", point.errors.area)):
-            if parts is not None:
-                yield f"{name} weight", 1.0
-                yield f"{name} mesh error", parts.mesh
+        return sliding.solve(velocity, pressure)
+    return None
 
 
 def _spread(count: int) -> list[int]:
@@ -241,32 +224,27 @@ def _make_as_run(march: March, step: Step, stages: list[StageCost]) -> dict[str,
 
 def _make(march: March, step: Step) -> dict[str, float]:
     """Make a step; what it cost, and how wrong it is."""
-    cost = _cost(march.scene.slab, partial(march.advance, step))
-    return cost | dict(_errors(march.row, weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)))
+    _, cost = _cost(march.scene.slab, partial(march.advance, step))
+    far = weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)
+    return cost | dict(_errors(march.row.errors, far, march.row.measures.friction))
 
 
-def _errors(row: Row, far: float) -> Iterator[tuple[str, float]]:
+def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator[tuple[str, float]]:
     """The parts of the errors of friction and area that time steps and mesh make, and what they weigh in a mean, as in
     that of a run."""
-    if row.errors is None:
-        return
-    for name, parts, weight in (
-        ("friction", row.errors.friction, far * row.measures.friction),
-        ("area", row.errors.area, far),
-    ):
-        if parts is not None:
+    for name, weight in (("friction", far * friction), ("area", far)):
+        if (parts := getattr(errors, name, None)) is not None:
             yield f"{name} weight", weight
             yield f"{name} time error", weight * parts.time
             yield f"{name} mesh error", weight * parts.mesh
 
 
-def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:
-    """Seconds, and what is counted, of a step or a steady state."""
-    tally, began = slab.tally, time.perf_counter()
-    before = tally.copy()
-    call()
-    counts = {"operator": 0, **tally.since(before)}
-    return {**counts, "seconds": time.perf_counter() - began}
+def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:
+    """What a call returns, its seconds, and what is counted in it."""
+    before, began = slab.tally.copy(), time.perf_counter()
+    found = call()
+    seconds = time.perf_counter() - began
+    return found, {"operator": 0, **slab.tally.since(before), "seconds": seconds}
 
 
 def chosen(timeline: Timeline, numbers: range, share: float) -> Iterator[tuple[Step, float]]:

@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 import shlex
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -19,8 +18,7 @@ from marching import ROOT
 from pydantic import TypeAdapter
 
 from parcontact import __main__, job
-from parcontact.command import words
-from parcontact.command.completion import bash, verbs_of
+from parcontact.command.arguments import parse_arguments
 from parcontact.effects.interface import InterfaceColumns
 from parcontact.errors import InputError
 from parcontact.job import keys
@@ -41,7 +39,7 @@ WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put
     "history": [{"pressure": 1.0e5, "velocity": 1.0, "distance": 1.0e-4, "cells_per_step": 1}],
 }
 OTHER_PROGRAMS = {  # in shell blocks; what is parcontact's is parsed
-    *("apptainer", "cp", "docker", "env", "env/bin/pip", "eval", "module", "python3", "sbatch"),
+    *("apptainer", "cp", "docker", "env", "env/bin/pip", "module", "python3", "sbatch"),
     *("scripts/manual", "scripts/setup", "scripts/test", "."),
 }
 
@@ -195,7 +193,7 @@ def parse_command(line: str) -> None:
         return
     assert asked[0] in ("parcontact", "env/bin/parcontact"), line
     if asked[1] != "--version":
-        words.understand(asked[1:])
+        parse_arguments(asked[1:])
 
 
 @pytest.mark.parametrize("name", [name for name in PAGES if blocks("python", name) and name != "effects"])
@@ -254,17 +252,6 @@ def test_what_to_cite(tmp_path: Path) -> None:
     assert "Bugnicourt" in rubber
     assert "Persson" in rubber
     assert "Taylor" in rubber
-
-
-def test_completion(tmp_path: Path) -> None:
-    script = bash(words._parser())
-    assert set(verbs_of(words._parser())) == set(words.VERBS)
-    ask = 'COMP_WORDS=(parcontact {}); COMP_CWORD=$((${{#COMP_WORDS[@]}}-1)); _parcontact; echo "${{COMPREPLY[@]}}"\n'
-    lines = "".join(map(ask.format, ("st", "plan job.yaml --ra", 'doctor --precision ""', "job.yaml --un")))
-    done = subprocess.run(
-        ["bash", "-c", script + "\n" + lines], capture_output=True, text=True, cwd=tmp_path, timeout=20
-    )
-    assert done.stdout.splitlines() == ["steady study", "--ranks", "double mixed", "--until"]
 
 
 # -- gallery ---------------------------------------------------------------------------------------------------------

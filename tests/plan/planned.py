@@ -3,7 +3,6 @@
 from typing import Any
 
 from parcontact.job import Job
-from parcontact.plan.scaling import Machine
 
 Json = dict[str, Any]
 ROUGH: Json = {
@@ -55,4 +54,3 @@ JOBS: dict[str, Json] = {
     },
 }
 SWEEP = {"history": [SLIDE], "sweep": [{"history.0.duration": [1e-3, 2e-3, 4e-3]}]}
-MACHINE = Machine(cores=8, crowding=1.5, per_call=1e-5, copy_rate=1e10)

@@ -10,12 +10,12 @@ from mpi4py import MPI
 
 from parcontact.parallel import pyramid
 from parcontact.parallel.slab import Slab, deal
-from parcontact.plan import memory, report, trial
-from parcontact.plan.report import Costs
+from parcontact.plan import memory, report
+from parcontact.plan.costs import Costs
 from parcontact.plan.sample import sample
-from parcontact.plan.scaling import Scaling
+from parcontact.plan.trial import choose_grid
 
-from .planned import JOBS, MACHINE, ROUGH, job
+from .planned import JOBS, ROUGH, job
 
 
 @pytest.mark.mpi(2, 3)
@@ -47,14 +47,14 @@ def test_the_most_that_is_held() -> None:
     march, _ = marched(planned)
     tally = march.scene.slab.tally
     assert tally["map bytes at most"] > 1.1 * tally["map bytes"]
-    assert Costs(Scaling.of(planned, [seen], MACHINE), 1e9).held(1) == tally["map bytes at most"]
-    assert Costs(Scaling.of(planned, [replace(seen, held=0)], MACHINE), 1e9).held(1) == tally["map bytes"]
+    assert Costs(planned, seen, 1e9).held == tally["map bytes at most"]
+    assert Costs(planned, replace(seen, held=0), 1e9).held == tally["map bytes"]
 
 
 def test_too_large_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no memory for any grid, nothing is tried."""
-    monkeypatch.setattr(trial, "free_bytes", lambda: 1000)
-    assert trial.grid_for(job(), 1, 10.0) is None
+    monkeypatch.setattr(memory, "free_bytes", lambda: 1000)
+    assert choose_grid(job(), 1, 10.0) is None
 
 
 @pytest.mark.parametrize(("points", "unit"), [(64, "MB"), (2**15, "GB")])

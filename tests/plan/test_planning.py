@@ -1,7 +1,6 @@
 """The plan of a job as a user reads it: of runs, steady states and sweeps, also on a busy machine."""
 
 import re
-import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -11,16 +10,19 @@ import yaml
 from mpi4py import MPI
 
 import parcontact as pc
-from parcontact import __main__, private
+from parcontact import __main__
+from parcontact.history.timeline import Timeline
+from parcontact.job import load_cases
 from parcontact.job.sections.listing import plain
+from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
-from parcontact.plan import machine, other_ranks, report
-from parcontact.plan.planning import only_steady_states
-from parcontact.plan.report import Costs
+from parcontact.plan import report
+from parcontact.plan.costs import SLOW_WRITE, Costs, costs_of, measure_write_rate
+from parcontact.plan.planning import Planner, case_times, cases_to_try, only_steady_states
 from parcontact.plan.sample import Sample, StageCost, sample
-from parcontact.plan.scaling import Scaling
+from parcontact.plan.trial import choose_grid
 
-from .planned import CELLS, MACHINE, SWEEP, TWO, job
+from .planned import CELLS, SWEEP, TWO, job
 
 
 def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,18 +32,18 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     text += "material: {model: elastic, shear_modulus: 1.0e6}\nhistory: [{pressure: 1.0e4}]\n"
     (tmp_path / "job.yaml").write_text(text)
     (tmp_path / "parcontact.py").write_text("open('executed', 'w')")  # where Python would look first
-    assert __main__.main(["plan", "job.yaml", "--ranks", "1,2,1000", "--cores", "4", "--seconds", "1"]) == 0
+    assert __main__.main(["plan", "job.yaml", "--ranks", "1,2,1000", "--seconds", "1"]) == 0
     said = capsys.readouterr().out
     assert "on   checkpoints" in said
     assert "off  viscoelasticity" in said
     assert "1 steps: stage 1 1" in said
-    assert "scaling ends at" in said
+    assert re.search(r"memory per rank \[MB\] +1 rank +2 ranks +1000 ranks", said)
+    assert re.search(r"time on 1 rank: \S+ s\*? a step, .* in all", said)
     assert "tried: 1 steps on 1 rank in" in said
-    assert ("tried: 1 steps on 2 ranks in" in said) == (machine.cores() > 1)  # by two processes started for it
     assert sorted(path.name for path in tmp_path.iterdir()) == ["job.yaml", "parcontact.py"]
 
 
-@pytest.mark.parametrize("words", [["--ranks", "0"], ["--ranks", "two"], ["--network", "1"], ["--cores", "-1"]])
+@pytest.mark.parametrize("words", [["--ranks", "0"], ["--ranks", "two"], ["--seconds", "-1"]])
 def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         __main__.main(["plan", "job.yaml", *words])
@@ -49,34 +51,24 @@ def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert "must be" in capsys.readouterr().err
 
 
-def test_what_cannot_be_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No mpirun, no sample; a place that cannot be written to, a guess."""
-    monkeypatch.setattr(other_ranks, "MPIRUN", tmp_path / "absent")
-    assert list(other_ranks.samples(job(), ["job.yaml"], [2], 1.0)) == []
-    assert machine.write_rate(Path("/proc/out")) == machine.SLOW_WRITE
-    assert machine.write_rate(tmp_path / "not" / "yet") > 0.0
-    assert list(tmp_path.iterdir()) == []
-
-
-def planned_times(shares: dict[int, float], points: int = 64) -> list[str]:
-    """The table of a job that was tried on some ranks, which had such a share of their cores."""
-    planned = job(grid={"points": points})
-    counts = {"seconds": 1.0, "operator": 10.0}
-    samples = [
-        Sample(planned, ranks, 0.0, 1.0, 0.0, 0, (StageCost(1, 1, 1.0, counts),), share=share)
-        for ranks, share in shares.items()
-    ]
-    return list(report.times(Costs(Scaling.of(planned, samples, MACHINE), 1e9), (1, 2, 4)))
+def costs_of_a_trial(share: float = 1.0) -> Costs:
+    stage = StageCost(1, 1, 1.0, {"seconds": 1.0, "operator": 10.0})
+    return Costs(job(), Sample(job(), 2, 0.0, 1.0, 0.0, 0, (stage,), share=share), 1e9)
 
 
 def test_what_other_programs_have_disturbed_is_marked() -> None:
     """A trial that waited for its cores: a warning, and a mark on all that follows from it."""
-    quiet, busy = planned_times({1: 1.0, 2: 0.95}), planned_times({1: 1.0, 2: 0.46})
-    assert not [line for line in quiet if "busy" in line or report.MARK in line]
-    assert "busy with other programs" in busy[0]
-    assert "46% of a core each on 2 ranks" in busy[0]
-    assert [report.MARK in line for line in busy[2:5]] == [False, True, True]  # 4 ranks follow from 2
-    assert "rank*:" in busy[5] or "ranks*:" in busy[5]
+    (quiet, _), (warning, busy, _) = report.times(costs_of_a_trial(0.95)), report.times(costs_of_a_trial(0.46))
+    assert report.MARK not in quiet
+    assert "busy with other programs" in warning
+    assert "46% of a core for each rank" in warning
+    assert busy.count(report.MARK) == 2
+
+
+def test_places_that_cannot_be_written_to(tmp_path: Path) -> None:
+    assert measure_write_rate(Path("/proc/out")) == SLOW_WRITE
+    assert measure_write_rate(tmp_path / "not" / "yet") > 0.0
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_waiting_for_a_core_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,23 +98,15 @@ def test_times_as_people_tell_them(seconds: float, text: str) -> None:
 
 def test_steady_states_beside_a_history() -> None:
     """They are planned on their own, under the pressures that the verb would take."""
-    planned = job(material=TWO, history=[CELLS], steady={"velocities": [0.1]})
-    steady, words = only_steady_states(planned)
+    steady = only_steady_states(job(material=TWO, history=[CELLS], steady={"velocities": [0.1]}))
     assert steady.history == ()
     assert steady.steady is not None
     assert steady.steady.pressures == (1e4,)
-    assert words == ["--set", "steady.pressures=[10000.0]", "--set", "history=[]", "--set", "initial={state: virgin}"]
 
 
 def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:
-    """As a user reads it, for the steady section of a job with a history; by two processes too."""
+    """As a user reads it, for the steady section of a job with a history."""
     monkeypatch.chdir(tmp_path)
-    compiled = private.directory("compiled")
-    assert compiled is not None
-    unfinished = shutil.ignore_patterns("*.tmp.*")  # of others that compile now: gone when they are done
-    kept = tmp_path / "cache" / "parcontact" / "compiled"  # processes need not compile anew
-    shutil.copytree(compiled, kept, ignore=unfinished)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     planned = job(grid={"points": 20}, material=TWO, steady={"velocities": [1e-2, 0.1]}, numerics={"accuracy": 0.5})
     (tmp_path / "job.yaml").write_text(planned.resolved())
     assert __main__.main(["plan", "job.yaml", "--ranks", "1,2", "--seconds", "1"]) == 0
@@ -130,8 +114,7 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert "1 steps: stage 1 1" in said
     assert "parcontact steady: 2 steady states, 2 velocities" in said
     assert re.search(r"tried: [12] states on 1 rank in", said)
-    assert bool(re.search(r"tried: [12] states on 2 ranks in", said)) == (machine.cores() > 1)
-    assert "state [s]" in said
+    assert re.search(r"time on 1 rank: \S+ s\*? a state, ", said)
     steady = said[said.index("parcontact steady:") :]
     told = re.search(r"operator calls a state, errors of ([\d.]+) % by the mesh", steady)
     assert told
@@ -145,5 +128,39 @@ def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str
     lines = capsys.readouterr().out.splitlines()
     assert "first of 3 cases: history.0.duration = 0.001" in lines
     assert lines[-3] == "sweep of 3 cases: 0, 1, 2 were tried"
-    assert re.fullmatch(r" +1 rank: \S+( s)?\*? in all, one case after the other", lines[-1])
+    assert re.fullmatch(r"on 1 rank: \S+( s)?\*? in all, one case after the other", lines[-1])
     assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
+
+
+def test_times_of_a_sweep_add_up() -> None:
+    """Work goes with the steps; a case that was not tried is like the nearest one that was."""
+    cases = load_cases({**plain(job()), **SWEEP})
+    steps = [11, 21, 41]  # with the jump of the load
+    assert case_times(cases, {0: 1.0}) == pytest.approx([count / 11 for count in steps])
+    assert case_times(cases, {0: 1.0, 2: 3.0}) == pytest.approx([1, 21 / 11, 3.0])
+    assert [cases_to_try(count) for count in (1, 2, 3, 21)] == [[0], [0, 1], [0, 1, 2], [0, 10, 20]]
+
+
+@pytest.mark.mpi(2)
+def test_small_cases_are_planned_side_by_side(comm: MPI.Intracomm) -> None:
+    """Each group tries the first case on its own ranks; all have the same lines."""
+    cases = load_cases({**plain(job()), **SWEEP})
+    lines = list(Planner([1], 0.1, 0.0).plan_sweep(cases, Groups(comm, 2)))
+    assert any("on 1 rank in" in line for line in lines)
+    assert re.fullmatch(
+        rf"on {comm.size} ranks?: .* in all, {'2 cases at a time' if comm.size > 1 else '.*'}", lines[-1]
+    )
+
+
+def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
+    large = job(grid={"points": 2**14}, history=[CELLS])
+    tried = choose_grid(large, 1, 1.0)
+    assert tried is not None
+    assert max(tried.grid.points) <= 1024
+    assert tried.grid.size == large.grid.size
+    assert len(Timeline.of(tried)) < len(Timeline.of(large))
+    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (StageCost(9, 9, 9.0, {"seconds": 9.0}),))
+    assert costs_of(large, seen, 1e9).sample.steps == len(Timeline.of(large))
+    ratio = costs_of(large, seen, 1e9).step / costs_of(tried, seen, 1e9).step
+    assert ratio > large.grid.nx**2 / tried.grid.nx**2
+    assert choose_grid(job(), 1, 10.0) == job()

@@ -18,9 +18,8 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import SPOTS_ORDER, Summary
 from parcontact.physics.time_error import TIME_ORDER
 from parcontact.plan import price
-from parcontact.plan.report import Costs
+from parcontact.plan.costs import Costs, costs_of
 from parcontact.plan.sample import Sample, StageCost, sample
-from parcontact.plan.scaling import Machine, Scaling
 
 Json = dict[str, Any]
 WAVE = 1.25e-4
@@ -28,7 +27,6 @@ ROUGH: Json = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short
 SOLID = {"model": "zener", "modulus_inf": 0.3e6, "branches": [{"modulus": 2.5e6, "relaxation_time": 1e-3}]}
 SLIDE = {"pressure": 1e4, "velocity": 0.1, "distance": 1e-3, "cells_per_step": 1}
 FINE: Json = {"points": 80, "size": 1e-3}  # 10 cells per shortest wave, as 1 % asks for
-MACHINE = Machine(cores=8, crowding=1.5, per_call=0.0, copy_rate=1e10)
 
 
 def job(**changes: Any) -> Job:
@@ -44,17 +42,18 @@ def costs(planned: Job, time: float = 0.0, mesh: float = 0.0, of: str = "frictio
         sums = {"seconds": n, "operator": n * calls, f"{of} weight": n, f"{of} time error": n * time}
         stages.append(StageCost(n, n, float(n), {**sums, f"{of} mesh error": n * mesh}))
     seen = Sample(planned, 1, 0.0, 0.0, 0.0, 0, tuple(stages))
-    return Costs(Scaling.of(planned, [seen], MACHINE), 1e30)
+    return costs_of(planned, seen, 1e30)
 
 
 def test_meshes_have_the_cells_that_waves_need() -> None:
     """8 of them in the box: 1 % takes 10 cells each, for 0.6 % by the mesh; the least length that transforms like.
     Where the trial has seen a larger error, as of small friction, it takes more: it falls with the power 2.3 of the
     cell."""
-    found = price.offers(costs(job(), mesh=0.005))
-    assert [each.job.grid.nx for each in found] == [48, 80, 128, 240]
-    for each in found:
-        assert each.job.grid.nx >= 8 * cells_per_wave(price.MESH_SHARE * each.accuracy)
+    seen = costs(job(), mesh=0.005)
+    found = [price.offer(seen, accuracy).job.grid.nx for accuracy in price.ACCURACIES]
+    assert found == [48, 80, 128, 240]
+    for points, accuracy in zip(found, price.ACCURACIES, strict=True):
+        assert points >= 8 * cells_per_wave(price.MESH_SHARE * accuracy)
     assert price.offer(costs(job(), mesh=0.06), 0.01).job.grid.nx == 192  # 64 * 10^(1/2.3) is 174
 
 
@@ -73,7 +72,8 @@ def test_meshes_of_spots_go_by_their_error() -> None:
 def test_heights_from_a_file_stay(tmp_path: Any) -> None:
     np.save(tmp_path / "road.npy", np.zeros((64, 64)))
     given = job(surface={"shape": "file", "path": str(tmp_path / "road.npy")})
-    assert all(each.job.grid == given.grid for each in price.offers(costs(given, mesh=0.1)))
+    seen = costs(given, mesh=0.1)
+    assert all(price.offer(seen, accuracy).job.grid == given.grid for accuracy in price.ACCURACIES)
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 100, 416, 1000])
@@ -90,7 +90,7 @@ def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) 
     stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-5}
     planned = job(grid=FINE, history=[stage, SLIDE], numerics={"integrator": integrator})
     found = price.offer(costs(planned, time=3.0**order * price.TIME_SHARE * 0.01), 0.01)
-    steps = [stage.steps for stage in found.costs.scaling.samples[0].stages]
+    steps = [stage.steps for stage in found.sample.stages]
     assert steps == [1 + 300, 3 * 80]
 
 
@@ -101,38 +101,38 @@ def test_chosen_steps_make_what_they_are_chosen_for() -> None:
     seen = costs(planned, time=price.CHOSEN_SHARE * 0.01)
     lasting = Timeline.of(planned).spans[0].count
     for accuracy, times in ((0.01, 1.0), (1e-3, 10 ** (1 / TIME_ORDER))):
-        assert price.offer(seen, accuracy).steps == pytest.approx(1 + lasting * times, abs=1.0)
+        assert price.offer(seen, accuracy).sample.steps == pytest.approx(1 + lasting * times, abs=1.0)
 
 
 def test_steps_are_never_longer_than_a_cell() -> None:
     """However accurate they are; half the mesh needs half as many."""
     found = price.offer(costs(job(), time=1e-9), 0.05)
-    assert (found.job.grid.nx, found.steps) == (48, 1 + 48)
+    assert (found.job.grid.nx, found.sample.steps) == (48, 1 + 48)
 
 
 def test_single_solves_stay() -> None:
     found = price.offer(costs(job(history=[{"pressure": 1e4}, {"pressure": 2e4}]), of="area"), 1e-3)
-    assert found.steps == 2
+    assert found.sample.steps == 2
 
 
 def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
     """1.5 times for a tenth; steps of half a cell 1.4 times more; time with N log N."""
     planned = job(grid=FINE)
     one, ten = (price.offer(costs(planned), accuracy) for accuracy in (1e-2, 1e-3))
-    seconds = [each.costs.marching(1) / each.steps for each in (one, ten)]
+    seconds = [each.marching / each.sample.steps for each in (one, ten)]
     assert seconds[0] == pytest.approx(1.0)
     assert seconds[1] == pytest.approx(1.5 * (240**2 * math.log(240**2 + 1)) / (80**2 * math.log(80**2 + 1)))
     halves = price.offer(costs(planned, time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01), 1e-2)
-    assert halves.costs.marching(1) / halves.steps == pytest.approx(price.BETWEEN_CELLS)
+    assert halves.marching / halves.sample.steps == pytest.approx(price.BETWEEN_CELLS)
 
 
 def test_from_a_coarser_grid() -> None:
     """What was tried on twice the cell, and so twice the step, has 2^1.7 times the error of the own steps."""
     own = job(grid={"points": 160, "size": 1e-3})
-    tried = costs(job(grid=FINE), time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01).scaling.samples[0]
-    seen = Costs(Scaling.of(own, [tried], MACHINE), 1e30)
-    assert seen.scaling.steps == 1 + 160
-    assert price.offer(seen, 0.01).steps == 1 + 160  # on 80 points: halves of a cell
+    tried = costs(job(grid=FINE), time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01).sample
+    seen = costs_of(own, tried, 1e30)
+    assert seen.sample.steps == 1 + 160
+    assert price.offer(seen, 0.01).sample.steps == 1 + 160  # on 80 points: halves of a cell
 
 
 @pytest.mark.parametrize("accuracy", [0.05, 0.01])
@@ -141,19 +141,21 @@ def test_what_is_offered_keeps_its_promise(accuracy: float) -> None:
     many steps, and as many calls to a factor of 1.5 (small jobs differ by that from mesh to mesh)."""
     planned = job()
     seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
-    found = price.offer(Costs(Scaling.of(planned, [seen], MACHINE), 1e30), accuracy)
-    stage = {**{k: v for k, v in SLIDE.items() if k != "cells_per_step"}, "time_step": 0.01 / (found.steps - 1)}
+    found = price.offer(costs_of(planned, seen, 1e30), accuracy)
+    stage = {**{k: v for k, v in SLIDE.items() if k != "cells_per_step"}, "time_step": 0.01 / (found.sample.steps - 1)}
     _, rows = marched(Job.model_validate({**plain(found.job), "history": [stage]}))
     budget, calls = Summary(), sum(row.operator_calls for row in rows)
     for before, row in pairwise(rows):
         assert row.errors is not None
         budget.add(row.errors, row.measures.friction, row.time - before.time)
     assert budget.friction is not None
-    assert len(rows) == 1 + found.steps  # the initial state, and the jump of the load among the steps
+    assert len(rows) == 1 + found.sample.steps  # the initial state, and the jump of the load among the steps
     assert budget.friction.total <= accuracy
     assert budget.area is not None
-    assert budget.area.mesh == pytest.approx(found.area, rel=0.3)  # of the first order but for the waves' own corners
-    assert 1 / 1.5 < calls / found.costs.scaling.samples[0].total("operator") < 1.5
+    assert budget.area.mesh == pytest.approx(
+        price.area_error(seen, found.job), rel=0.3
+    )  # of the first order but for the waves' own corners
+    assert 1 / 1.5 < calls / found.sample.total("operator") < 1.5
 
 
 def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
@@ -173,11 +175,11 @@ def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
 def test_the_table() -> None:
     """As a user reads it: one line for the job, one for each accuracy; a disturbed trial is marked."""
     seen = costs(job(), time=1e-3, mesh=8.8e-3)
-    head, names, own, *rows = list(price.table(seen, [1, 2]))[:7]
+    head, names, own, *rows = list(price.table(seen))[:7]
     assert "friction" in head
-    assert " ".join(names.split()) == "accuracy area mesh steps precision maps [MB] 1 rank 2 ranks"
+    assert " ".join(names.split()) == "accuracy area mesh steps precision maps [MB] 1 rank"
     assert " ".join(own.split()).startswith("this job 0 % 64 x 64 65 double")
     assert [row.split()[0] for row in rows] == ["5", "1", "0.3", "0.1"]
     assert not any("*" in row for row in rows)
-    busy = Costs(replace(seen.scaling, samples=(replace(seen.scaling.samples[0], share=0.5),)), 1e30)
-    assert all("*" in row for row in list(price.table(busy, [1]))[2:7])
+    busy = replace(seen, sample=replace(seen.sample, share=0.5))
+    assert all("*" in row for row in list(price.table(busy))[2:7])

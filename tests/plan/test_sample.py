@@ -1,6 +1,5 @@
 """What a plan tries: steps and steady states that stand for others, also on coarser grids; counts, never times."""
 
-import subprocess
 from itertools import pairwise
 
 import pytest
@@ -8,17 +7,21 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.command import words
 from parcontact.effects import decisions
 from parcontact.history.timeline import Timeline
 from parcontact.parallel.slab import Slab
-from parcontact.plan import other_ranks, trial
-from parcontact.plan.planning import try_job
 from parcontact.plan.sample import Sample, StageCost, chosen, sample
-from parcontact.plan.scaling import Scaling
+from parcontact.plan.trial import make_tiny
 from parcontact.steady_sliding.sliding import SteadySliding
 
-from .planned import CELLS, JOBS, MACHINE, SLIDE, TWO, Json, job
+from .planned import CELLS, JOBS, SLIDE, TWO, Json, job
+
+
+def test_stages_not_tried_are_like_the_others() -> None:
+    stages = (StageCost(4, 4, 4.0, {"fft": 40.0}), StageCost(6))
+    seen = Sample(job(), 1, 0.0, 0.0, 0.0, 0, stages)
+    assert seen.total("fft") == 100.0
+    assert seen.total("never counted") == 0.0
 
 
 @pytest.mark.mpi(2, 3)
@@ -81,45 +84,15 @@ def test_chosen_steps_stand_for_all(stage: Json, share: float) -> None:
     assert set(weighed) <= set(whole)
 
 
-def test_all_ranks_try_the_same_grid(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four ranks could try a finer grid than one in the time given; they are told not to."""
-    large = job(grid={"points": 512}, history=[CELLS])
-    alone = trial.grid_for(large, 1, 0.5)
-    assert alone is not None
-    assert alone.grid.points != trial.grid_for(large, 4, 0.5).grid.points  # type: ignore[union-attr]
-    asked: list[list[str]] = []
-    monkeypatch.setattr(subprocess, "run", lambda command, **_: asked.append(command))
-    assert list(other_ranks.samples(alone, ["job.yaml"], [2, 4], 0.5)) == []  # nothing was left
-    options = [words.understand(command[command.index("plan") :]) for command in asked]
-    assert [option.sample_points for option in options] == 2 * [alone.grid.points]
-    seen = try_job(large, Slab(MPI.COMM_SELF, 512, 512), 1e-3, 0.0, options[0].sample_points)
-    assert seen is not None
-    assert seen.job == alone
-
-
 @pytest.mark.parametrize("name", JOBS)
 def test_a_tiny_scene_has_all_that_runs(name: str) -> None:
     """The same effects as the job, on 16 points along each side: what is compiled for it is compiled for the job."""
     planned = job(**JOBS[name])
-    small = trial.tiny(planned)
+    small = make_tiny(planned)
     assert small is not None
     assert max(small.grid.points) == 16
     assert decisions.isolated(small).on == decisions.isolated(planned).on
     assert (small.material, small.history) == (planned.material, planned.history)
-
-
-def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
-    large = job(grid={"points": 2**14}, history=[CELLS])
-    tried = trial.grid_for(large, 1, 1.0)
-    assert tried is not None
-    assert max(tried.grid.points) <= 1024
-    assert tried.grid.size == large.grid.size
-    assert len(Timeline.of(tried)) < len(Timeline.of(large))
-    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (StageCost(9, 9, 9.0, {"seconds": 9.0}),))
-    assert Scaling.of(large, [seen], MACHINE).steps == len(Timeline.of(large))
-    ratio = Scaling.of(large, [seen], MACHINE).step(1) / Scaling.of(tried, [seen], MACHINE).step(1)
-    assert ratio > large.grid.nx**2 / tried.grid.nx**2
-    assert trial.grid_for(job(), 1, 10.0) == job()
 
 
 CURVE: Json = {"velocities": [1e-3, 1e-2, 0.1, 1.0], "pressures": [1e4, 3e4]}

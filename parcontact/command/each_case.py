@@ -32,13 +32,13 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     if not cases[0].settings:
         return act(options, cases[0].job, Slab(world, *cases[0].job.grid.points), always)
     from ..parallel.groups import Groups
-    from ..plan import side_by_side
+    from ..plan.memory import count_side_by_side
     from ..run import sweep, sweep_warnings, watch
 
     on_root(world, lambda: sweep.refuse_foreign(cases))
     told = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
     afresh = getattr(options, "restart", "") == "never" or not runs
-    groups = Groups(world, on_root(world, lambda: side_by_side.count(sweep.to_do(chosen, afresh), world.size)))
+    groups = Groups(world, on_root(world, lambda: count_side_by_side(sweep.to_do(chosen, afresh), world.size)))
     limit = watch.limit(getattr(options, "wall", None))
     manner = sweep.Manner(options.quiet, limit, told, runs)
     own = argparse.Namespace(**vars(options))

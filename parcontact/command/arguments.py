@@ -1,0 +1,229 @@
+"""Arguments of the command line: one table of verbs with their options."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+from .. import __version__
+from ..errors import InputError
+from . import ranks, values, verbs
+
+FIRST = """\
+a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
+
+  parcontact check job.yaml             list its mistakes, or all that it says with every default
+  parcontact plan job.yaml              say what it will do and cost
+  parcontact job.yaml                   run it, or go on with it (on two cores: mpirun -n 2 parcontact job.yaml)
+  parcontact plot out/job               draw what came out
+
+parcontact --help lists all verbs, parcontact VERB --help the options of one, parcontact manual the manual"""
+CODES = """\
+exit codes: 0 as asked; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
+checkpoint, run again"""
+
+
+Add = Callable[..., Any]  # argparse's add_argument of one verb
+
+
+def _job(add: Add, text: str = "job file (YAML)") -> None:
+    add("job", help=text)
+    add("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
+    add("--out", metavar="DIR", type=values.directory, help="output directory")
+    text = "one case of the job's sweep, from 0 (default: all)"
+    add("--case", metavar="I", type=values.natural, help=text)
+
+
+def _quiet(add: Add) -> None:
+    add("--quiet", action="store_true", help="print only warnings and errors")
+
+
+def _run(add: Add) -> None:
+    text = (
+        "go on from the newest good checkpoint if there is one (auto, the default), start afresh and replace what is "
+        "there (never), or go on from the checkpoint PATH"
+    )
+    add("--restart", metavar="auto|never|PATH", default="auto", help=text)
+    text = (
+        "stop after the first step that reaches the time T [s] of the history; one that ends before goes on with its "
+        "last stage"
+    )
+    add("--until", metavar="T", type=values.seconds, help=text)
+    text = "stop early, with a checkpoint, to end within this wall time"
+    add("--wall", metavar="HH:MM:SS", type=values.wall, help=text)
+
+
+def _steady(add: Add) -> None:
+    for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
+        text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
+        add(f"--{name}", metavar="A:B:N", type=values.numbers, default=(), help=text)
+    text = "temperatures [deg C], T,T,... (negative ones first: --temperatures=-20,0); the material needs a shift"
+    add("--temperatures", metavar="T,...", type=values.degrees, default=(), help=text)
+    text = "go on with the points that lack (auto, the default), or start afresh and replace what is there (never)"
+    add("--restart", metavar="auto|never", choices=("auto", "never"), default="auto", help=text)
+
+
+def _plan(add: Add) -> None:
+    text = "numbers of ranks whose memory is told, N,N,... (default: 1, as many as plan, as many as cores here)"
+    add("--ranks", metavar="N,...", type=values.counts, default=(), help=text)
+    add("--seconds", metavar="T", type=values.seconds, default=10.0, help="for how long the job is tried [s]")
+
+
+def _theory(add: Add) -> None:
+    text = "factor that corrects friction in partial contact, 0 to 1 (1: not at all; default: 0.45)"
+    add("--gamma", metavar="G", type=values.share, default=0.45, help=text)
+    text = "waves of the job's spectrum (continuum, the default), or those of the surface in its box (lattice)"
+    add("--waves", choices=("continuum", "lattice"), default="continuum", help=text)
+
+
+def _fit(add: Add) -> None:
+    add("table", type=Path, help="measured moduli: a table with the names and units of its columns")
+    add("--out", metavar="FILE", type=Path, help="material file (default: the table's name with .yaml)")
+    text = "temperature [deg C] at which relaxation times are given (default: the middle one of those measured)"
+    add("--reference", metavar="T", type=float, help=text)
+    text = (
+        "how times depend on temperature: wlf (default) or arrhenius with fitted constants, free factors, or given "
+        "ones: wlf:C1,C2 or arrhenius:J/mol or a file with the columns T[C] and log_aT"
+    )
+    add("--shift", metavar="LAW", default="wlf", help=text)
+    text = "rms error of the logarithms of the moduli that is allowed beside the scatter of the data (default: 0.02)"
+    add("--error", metavar="E", type=values.positive, default=0.02, help=text)
+    text = "which moduli the fit meets, where storage and loss contradict each other (default: both)"
+    add("--weight", choices=("both", "storage", "loss"), default="both", help=text)
+    add("--poisson", metavar="NU", type=values.poisson, default=0.5, help="Poisson's ratio (default: 0.5)")
+    add("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
+
+
+def _surface(add: Add) -> None:
+    _job(add, "job file (YAML), or a measured map; of one without unit: --set surface.unit=um ...")
+    add("--job", dest="start", metavar="FILE", type=Path, help="write a job to start from (of a map)")
+
+
+def _plot(add: Add) -> None:
+    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run or curve")
+    add("--format", choices=("png", "pdf", "svg"), default="", help="default: that of --out, else png")
+    text = "which panels, in this order: friction,area,approach,gap,pressure,load,energy,steady,maps (default: all)"
+    add("--panels", metavar="NAME,...", type=values.names, default=(), help=text)
+    text = "what is along the x axis (default: as the job suggests)"
+    add("--over", choices=("time", "distance", "velocity", "load"), default="", help=text)
+    add("--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y, x,y or none")
+    add("--compare", action="store_true", help="several directories in one picture, comparison.png")
+    text = "a movie of this map over its saved instants instead (GIF): pressure, displacement, gap or height"
+    add("--movie", metavar="FIELD", default="", help=text)
+    text = "draw the maps saved after this step (a whole number), or nearest to this time [s]; default: the last ones"
+    add("--at", metavar="TIME|STEP", type=values.instant, help=text)
+    add("--out", metavar="FILE", type=Path, help="the picture (default: picture.png in the directory)")
+
+
+def _info(add: Add) -> None:
+    add("file", type=Path, nargs="+", help="a file, or the output directory of a run")
+
+
+def _report(add: Add) -> None:
+    add("directories", metavar="OUT", nargs="+", type=Path, help="an output directory")
+    add("--out", metavar="FILE", type=Path, help="default: report.html in the first directory")
+
+
+def _doctor(add: Add) -> None:
+    add("--precision", choices=("double", "mixed"), default="double")
+
+
+def _manual(add: Add) -> None:
+    add("page", nargs="?", default="", help="the name of a page (default: list them)")
+    add("--open", action="store_true", help="open the page in a browser, where scripts/manual has run")
+
+
+def _cite(add: Add) -> None:
+    add("directory", metavar="OUT", type=Path, help="output directory of a run or curve")
+
+
+class Verb(NamedTuple):
+    """A verb: its function in `verbs`, what adds its arguments, and what it does in one line."""
+
+    name: str
+    act: Callable[[argparse.Namespace], int]
+    arguments: tuple[Callable[[Add], None], ...]
+    help: str
+
+
+VERBS = (
+    Verb("run", verbs.run, (_job, _run, _quiet), "run a job, or go on with it (the default verb)"),
+    Verb("steady", verbs.steady, (_job, _steady, _quiet), "solve steady sliding directly: a friction curve"),
+    Verb("check", verbs.check, (_job,), "list all mistakes of a job, or what it says with every default"),
+    Verb("plan", verbs.plan, (_job, _plan), "say what a job will do, and what it costs; writes nothing"),
+    Verb("theory", verbs.theory, (_job, _theory, _quiet), "say what Persson's theory predicts, into theory.csv"),
+    Verb("fit", verbs.fit, (_fit,), "fit a compound to measured moduli: a material file and a picture"),
+    Verb("study", verbs.study, (_job, _quiet), "compare settings of a job: what accuracy costs; goes on after a stop"),
+    Verb("surface", verbs.surface, (_surface,), "say what the surface of a job, or a measured map, is like; draw it"),
+    Verb("info", verbs.info, (_info,), "say what checkpoints, files of fields and directories hold, and if sound"),
+    Verb("plot", verbs.plot, (_plot,), "draw pictures of runs and friction curves, compare them, make a movie"),
+    Verb("report", verbs.report, (_report,), "write one HTML file to send: what was asked, results, data, origin"),
+    Verb("doctor", verbs.doctor, (_doctor,), "check this installation: exact cases, ranks, files and times"),
+    Verb("manual", verbs.manual, (_manual,), "print a page of the manual, or say which there are"),
+    Verb("schema", verbs.schema, (), "print a JSON Schema of job files, for editors"),
+    Verb("cite", verbs.cite, (_cite,), "say what to cite for a run"),
+)
+NAMES = tuple(verb.name for verb in VERBS)
+
+
+def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
+    """The options of a command line; `act` is its verb. Raises InputError or SystemExit for what cannot be meant."""
+    if not words:
+        raise InputError(FIRST)
+    first, *rest = words
+    if first == "help":
+        words = [*(word for word in rest if word in NAMES), "--help"]
+    elif first not in (*NAMES, "-h", "--help", "--version"):
+        _refuse_misspelt(first)
+        words = ["run", *words]
+    return make_parser().parse_args(words)
+
+
+def _refuse_misspelt(word: str) -> None:
+    """Raise InputError for a word that is no file, does not look like a job and is close to a verb."""
+    path = Path(word)
+    close = difflib.get_close_matches(word.lower(), (*NAMES, "help"), n=1)
+    if close and not path.suffix and path.name == word and not path.exists():
+        raise InputError(f"{word!r} is neither a verb nor a job file; did you mean {close[0]}?")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Speaks on root only, and ends the other ranks well unless MPI ends them together."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        if ranks.is_root():
+            super()._print_message(message, file)
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        super().exit(status if ranks.is_root() or ranks.started() else 0, message)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    parser = _Parser(
+        prog="parcontact",
+        description="Transient contact of a rough rigid surface on a viscoelastic half space.",
+        epilog=f"A first argument that is no verb is a job: mpirun -n 2 parcontact job.yaml\n\n{CODES}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"parcontact {__version__}")
+    found = parser.add_subparsers(dest="verb", required=True, metavar="verb")
+    for verb in VERBS:
+        _add_arguments(found.add_parser(verb.name, help=verb.help), verb)
+    return parser
+
+
+def _add_arguments(parser: argparse.ArgumentParser, verb: Verb) -> argparse.ArgumentParser:
+    for add_arguments in verb.arguments:
+        add_arguments(parser.add_argument)
+    parser.set_defaults(act=verb.act, describe_verbs=describe_verbs)
+    return parser
+
+
+def describe_verbs() -> str:
+    """What the manual says of the verbs: the help of each."""
+    parsers = [_add_arguments(_Parser(prog=f"parcontact {verb.name}"), verb) for verb in VERBS]
+    return "\n".join(f"\n## `{own.prog.split()[1]}`\n\n```text\n{own.format_help().rstrip()}\n```" for own in parsers)

@@ -1,0 +1,124 @@
+"""What a job costs on the ranks that have tried it: the time of its steps, scaled from a coarser grid where need be."""
+
+import math
+import os
+import time
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryFile
+
+from ..effects import decisions
+from ..history.timeline import Timeline
+from ..job import Job
+from . import memory
+from .sample import Sample
+
+TRIED_BYTES = 32 << 20  # tuning: written to see how fast that is
+SLOW_WRITE = 100e6  # bytes per second, where that cannot be seen
+HALF_MESH = 0.3  # of the time of a run, that on half the mesh: a quarter of the points, some more calls
+HALF_MESH_CHOSEN = 0.2  # the same in steps that are chosen, half as many
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Costs of a job: a `sample` of it, whose stages have the steps of this job but may have been tried on a coarser
+    grid, and the bytes per second that reach the disk."""
+
+    job: Job
+    sample: Sample
+    write_rate: float
+
+    @property
+    def held(self) -> float:
+        """Return the bytes that a rank holds in maps at once: those of steps, to the byte, or more while a first
+        contact or steady state is found on nested grids, which was seen when the job was tried."""
+        ranks = self.sample.ranks
+        known = max(memory.total(self.job, ranks), memory.steady_start(self.job, ranks)) if self.job.history else 0
+        return max(float(known), self.sample.held * _points(self.job) / _points(self.sample.job))
+
+    @property
+    def resident(self) -> float:
+        """Return the bytes that the system counts for a rank."""
+        return self.held + self.sample.resident + self.instant_bytes // self.sample.ranks
+
+    @property
+    def finer(self) -> float:
+        """Return how many times the work of the sample's grid that of the job's is, N log N."""
+        mine, tried = _points(self.job), _points(self.sample.job)
+        return mine * math.log(mine + 1) / (tried * math.log(tried + 1))
+
+    @property
+    def step(self) -> float:
+        """Return the seconds of a step, on average over the job."""
+        return self.sample.total("seconds") * self.finer / max(self.sample.steps, 1)
+
+    @property
+    def marching(self) -> float:
+        """Return the seconds of all steps, or steady states; with those on half the mesh, which comes first."""
+        part = HALF_MESH_CHOSEN if Timeline.of(self.job).chooses else HALF_MESH
+        beside = part if self.job.history and decisions.mesh_check(self.job).on else 0.0
+        return self.sample.steps * self.step * (1.0 + beside)
+
+    @property
+    def building(self) -> float:
+        """Return the seconds in which the scene is made."""
+        return self.sample.building * self.finer
+
+    @property
+    def writing(self) -> float:
+        """Return the seconds of all checkpoints and fields."""
+        if not self.job.history:
+            return 0.0
+        rules, count = self.job.checkpoint, self.sample.steps
+        if rules.every is not None:
+            checkpoints = -(-count // rules.every)
+        else:
+            checkpoints = int(self.marching / (60.0 * (rules.minutes or math.inf))) + 1
+        return (checkpoints * memory.saved(self.job) + self.instants * self.instant_bytes) / self.write_rate
+
+    @property
+    def case(self) -> float:
+        """Return the seconds of a run without the start of the program."""
+        return self.building + self.marching + self.writing
+
+    @property
+    def whole(self) -> float:
+        """Return the seconds of the whole run."""
+        return self.sample.starting + self.case
+
+    @property
+    def instants(self) -> int:
+        """Return how often fields are saved."""
+        saved = self.job.history and decisions.fields(self.job).on
+        return -(-self.sample.steps // self.job.output.every) if saved else 0
+
+    @property
+    def instant_bytes(self) -> int:
+        return len(self.job.output.fields) * _points(self.job) * 8
+
+
+def costs_of(job: Job, sample: Sample, write_rate: float) -> Costs:
+    """Costs of a job from a sample of it, perhaps on a coarser grid, where stages may have fewer steps."""
+    if job.grid == sample.job.grid or not job.history:
+        return Costs(job, sample, write_rate)
+    spans = Timeline.of(job).spans
+    stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(sample.stages, spans, strict=True))
+    return Costs(job, replace(sample, stages=tuple(stages)), write_rate)
+
+
+def _points(job: Job) -> int:
+    return job.grid.nx * job.grid.ny
+
+
+def measure_write_rate(directory: Path) -> float:
+    """Bytes per second that reach the disk of the nearest directory that there is; a file without a name is written."""
+    place = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
+    with suppress(OSError), TemporaryFile(dir=place) as file:
+        data = os.urandom(TRIED_BYTES)
+        began = time.perf_counter()
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+        return TRIED_BYTES / (time.perf_counter() - began)
+    return SLOW_WRITE
