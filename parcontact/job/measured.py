@@ -11,8 +11,8 @@ from ..errors import InputError
 from .sections.part import Context
 from .sections.topography import Topography
 from .sections.values import FROM_SURFACE
+from .text.places import UNREADABLE, Source
 from .text.python_data import is_array
-from .text.source import Mistake, Source
 
 KEYS = ("points", "size")
 READER = EntryPoint("extent", "parcontact.road.extent:of", "")  # what reads maps; jobs that name none do without
@@ -33,8 +33,8 @@ def take_grid(source: Source, context: Context) -> None:
         grid.update({key: list(found[key] or ()) for key in wanted})
     except InputError as error:
         names = " and ".join(f"grid.{key}" for key in wanted)
-        source.mistakes.append(Mistake(source.place(("grid", wanted[0])), f"{names}: {FROM_SURFACE}: {error}"))
-        source.broken.update(("grid", key) for key in wanted)
+        source.note(source.locate(("grid", wanted[0])).place, f"{names}: {FROM_SURFACE}: {error}")
+        grid.update(dict.fromkeys(wanted, UNREADABLE))
 
 
 def _extent(surface: Any, box: Any, context: Context) -> Extent:

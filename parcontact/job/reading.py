@@ -13,10 +13,10 @@ from ..errors import InputError, JobError
 from .measured import take_grid
 from .model import Job, Origin
 from .sections.part import Context
-from .text.fault import faults_of
+from .text.fault import faults_of, shorten
 from .text.overrides import read_job
-from .text.python_data import NOWHERE, numbers_for_texts, source_of
-from .text.source import Key, Mistake, Place, Source, shorten
+from .text.places import NOWHERE, UNREADABLE, Mistake, Place, Source
+from .text.python_data import source_of
 from .text.sweep_cases import Sweep
 
 MANY_MISTAKES = 40  # more are not shown one by one
@@ -43,7 +43,7 @@ class Case(NamedTuple):
 
 
 def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
-    """Reads a job file, or takes a mapping like one, whose files are looked for from the working directory.
+    """Read a job file, or take a mapping like one, whose files are looked for from the working directory.
 
     `overrides` are texts like `grid.points=512`, or values by such keys. Raises JobError with every mistake.
 
@@ -53,7 +53,7 @@ def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
         return choose(load_cases(given, overrides), case)[0].job
     found, mistakes, sweep = _read(given, overrides, 0)
     if found is None:
-        raise JobError(_told(given, mistakes))
+        raise _job_error(given, mistakes)
     if sweep:
         advice = "choose one of them (--case) or leave it out (--set sweep=null)"
         sentence = f"sweep has {len(sweep)} cases, numbered from 0; {advice}"
@@ -62,22 +62,22 @@ def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
 
 
 def load_cases(given: Given, overrides: Changes = ()) -> tuple[Case, ...]:
-    """Reads all cases of a job, one if it has no sweep; else as `load`. A mistake names the first case that has it."""
+    """Read all cases of a job, one if it has no sweep; else as `load`. A mistake names the first case that has it."""
     first, mistakes, sweep = _read(given, overrides, 0)
     if not sweep:
         if first is None:
-            raise JobError(_told(given, mistakes))
+            raise _job_error(given, mistakes)
         return (first,)
     read = [(first, mistakes), *(_read(given, overrides, index)[:2] for index in range(1, len(sweep)))]
-    common = set(mistakes).intersection(*(told for _, told in read))
-    found = {mistake: index for index, (_, told) in reversed(list(enumerate(read))) for mistake in told}
-    if found:
-        raise JobError(_told(given, [_in_case(*one, sweep, one[0] in common) for one in found.items()]))
+    common = set(mistakes).intersection(*(found for _, found in read))
+    first_with = {mistake: index for index, (_, found) in reversed(list(enumerate(read))) for mistake in found}
+    if first_with:
+        raise _job_error(given, [_in_case(*one, sweep, one[0] in common) for one in first_with.items()])
     return tuple(case for case, _ in read if case)
 
 
 def choose(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
-    """All cases, or the one of a number; raises InputError if there is none."""
+    """Return all cases, or the one of a number; raises InputError if there is none."""
     if number is None:
         return cases
     if not cases[0].settings:
@@ -88,7 +88,7 @@ def choose(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
 
 
 def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistake:
-    """A mistake, with the case that has it unless all have it or it points at the sweep itself."""
+    """Return a mistake with the case that has it, unless all have it or it points at the sweep itself."""
     settings = sweep.case(index)
     if common or any(mistake.place in (one.place, one.key_place) for one in settings):
         return mistake
@@ -96,60 +96,37 @@ def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistak
 
 
 def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, list[Mistake], Sweep | None]:
-    """A case, or its mistakes; and the sweep that it belongs to, if that is sound."""
+    """Return a case, or its mistakes; and the sweep that it belongs to, if that is sound."""
     _refuse_no_job(given, overrides)
-    changes = tuple(overrides.items()) if isinstance(overrides, Mapping) else tuple(overrides)
-    source, included, sweep = read_job(_path(given), changes, index, _data(given))
-    if () not in source.broken:
-        try:
-            context = Context(_path(given).absolute(), included)
-            take_grid(source, context)
-            job = _validated(source, context)
-            if job.numerics.strict:
-                source.mistakes += [Mistake(_place(given), f"{text} ({STRICT})") for text in job.warnings]
-            if not source.mistakes:
-                origin = Origin(not isinstance(given, Mapping), _names_directory(source.data))
-                return _case(job.of(origin), index, sweep), [], sweep
-        except ValidationError as error:
-            source.mistakes += _mistakes(source, error)
-    return None, source.mistakes, sweep
+    from_python = isinstance(given, Mapping)
+    path = Path("job.yaml" if isinstance(given, Mapping) else given)
+    changes = overrides.items() if isinstance(overrides, Mapping) else overrides
+    source, included, sweep = read_job(path, changes, index, source_of(given) if from_python else None)
+    if source.data is UNREADABLE:
+        return None, source.mistakes, sweep
+    context = Context(path.absolute(), included, numbers_as_texts=from_python or isinstance(overrides, Mapping))
+    take_grid(source, context)
+    try:
+        job = Job.model_validate(source.data, context=context)
+    except ValidationError as error:
+        return None, [*source.mistakes, *_mistakes(source, error)], sweep
+    if job.numerics.strict:
+        place = NOWHERE if from_python else Place(str(path))
+        source.mistakes += [Mistake(place, f"{text} ({STRICT})") for text in job.warnings]
+    if source.mistakes:
+        return None, source.mistakes, sweep
+    names_directory = bool(source.data.get("output")) and source.data["output"].get("directory") is not None
+    return _case(job.of(Origin(not from_python, names_directory)), index, sweep), [], sweep
 
 
 def _refuse_no_job(given: Any, overrides: Any) -> None:
-    """What Python gives may be anything."""
+    """Raise JobError for arguments from Python that are no job, or no changes of one."""
     if not isinstance(given, str | os.PathLike | Mapping):
         raise JobError([f"the job must be the path of a file or a mapping, got {shorten(repr(given), 60)}"])
     if not isinstance(overrides, Sequence | Mapping) or isinstance(overrides, str):
         raise JobError([f"set must be a mapping of keys and values, got {shorten(repr(overrides), 60)}"])
     if wrong := [key for key in overrides if not isinstance(key, str)]:
         raise JobError([f"set has a key that is no word, {shorten(repr(wrong[0]), 60)}; give words like 'grid.points'"])
-
-
-def _path(given: Given) -> Path:
-    return Path("job.yaml") if isinstance(given, Mapping) else Path(given)
-
-
-def _place(given: Given) -> Place:
-    return NOWHERE if isinstance(given, Mapping) else Place(str(Path(given)))
-
-
-def _data(given: Given) -> Source | None:
-    return source_of(given) if isinstance(given, Mapping) else None
-
-
-def _validated(source: Source, context: Context) -> Job:
-    """The job of a source; texts of Python data at which it fails are tried as numbers."""
-    try:
-        return Job.model_validate(source.data, context=context)
-    except ValidationError as error:
-        if not numbers_for_texts(source, [source.written(fault.path) for fault in faults_of(error)]):
-            raise
-    return _validated(source, context)
-
-
-def _names_directory(data: Any) -> bool:
-    output = data.get("output")
-    return isinstance(output, dict) and output.get("directory") is not None
 
 
 def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
@@ -160,28 +137,20 @@ def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
     return Case(index, settings, job.model_copy(update={"output": output}))
 
 
-def _told(given: Given, mistakes: list[Mistake]) -> list[str]:
-    ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != _place(given).origin, mistake.place))
-    return _first(list(dict.fromkeys(map(str, ordered))))
-
-
-def _first(mistakes: list[str]) -> list[str]:
-    """All mistakes, or the first of them and a count where they are more than anybody reads."""
-    if len(mistakes) <= MANY_MISTAKES:
-        return mistakes
-    return [*mistakes[:SHOWN_MISTAKES], f"... and {len(mistakes) - SHOWN_MISTAKES} more mistakes"]
+def _job_error(given: Given, mistakes: list[Mistake]) -> JobError:
+    """Return the error with all mistakes in the order of the file, those elsewhere last; many are cut short."""
+    own = "" if isinstance(given, Mapping) else str(Path(given))
+    ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != own, mistake.place))
+    sentences = list(dict.fromkeys(map(str, ordered)))
+    if len(sentences) > MANY_MISTAKES:
+        sentences[SHOWN_MISTAKES:] = [f"... and {len(sentences) - SHOWN_MISTAKES} more mistakes"]
+    return JobError(sentences)
 
 
 def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
-    """The faults that the sections found, at their places; not those about data that could not be read."""
-    untrusted = source.untrusted()
+    """Yield the faults that the sections found, at their places; not those about data that could not be read."""
     for fault in faults_of(error):
-        path = source.written(fault.path)
-        if path in untrusted or source.within_broken(path):
-            continue
-        place = source.key_place(path) if fault.at_key else source.place(path)
-        yield Mistake(place, f"{_name(path)} {fault.predicate}")
-
-
-def _name(path: Key) -> str:
-    return ".".join(shorten(str(step)) for step in path) or "the job"
+        found = source.locate(fault.path)
+        if found.readable:
+            name = ".".join(shorten(str(step)) for step in found.path) or "the job"
+            yield Mistake(found.key_place if fault.at_key else found.place, f"{name} {fault.predicate}")

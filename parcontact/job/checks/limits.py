@@ -16,7 +16,7 @@ from ..sections.materials import Elastic, Zener, ZenerBranch
 from ..sections.settings import Grid
 from ..sections.stages import AUTO, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
-from ..text.source import Key
+from ..text.places import Key
 
 SMALLEST, LARGEST = 1e-70, 1e70  # fourth powers and their reciprocals are normal numbers of double precision
 MOST_STEPS = 10**18  # of a history: instants are counted in 64 bits

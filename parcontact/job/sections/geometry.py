@@ -12,7 +12,7 @@ from ..text.fault import Fault, refuse
 from .height_arrays import HeightArray
 from .part import Context, Part, Rule, chosen, existing_file
 from .topography import RoughSpectrum, Topography
-from .values import Positive, Real, Seed, Whole
+from .values import Number, Positive, Real, Seed, Whole
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
@@ -41,7 +41,7 @@ class Rough(Part):
 
     label: ClassVar[str] = "shape rough"
     shape: Literal["rough"] = "rough"
-    hurst: float = Field(gt=0, le=1, strict=True, description="a Hurst exponent above 0 and up to 1")
+    hurst: Number = Field(gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
     long_wavelength: Wavelength
     rolloff_wavelength: Wavelength  # default: long_wavelength, no plateau
     short_wavelength: Wavelength

@@ -14,10 +14,10 @@ from ...rubber import compound
 from ..text.fault import Fault, quote, refuse
 from .part import Part, Rule, chosen, existing_file
 from .temperature import Celsius, Shift, shifted
-from .values import NonNegative, Positive
+from .values import NonNegative, Number, Positive
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
-Poisson = Annotated[float, Field(gt=-1, le=0.5, strict=True, description="a Poisson ratio [-] above -1 and up to 0.5")]
+Poisson = Annotated[Number, Field(gt=-1, le=0.5, description="a Poisson ratio [-] above -1 and up to 0.5")]
 
 
 class ZenerBranch(Part):
@@ -26,7 +26,7 @@ class ZenerBranch(Part):
     label: ClassVar[str] = "a branch of the form G0, G1, eta1"
     G0: Positive = Field(description="a positive shear modulus [Pa]")
     G1: Modulus
-    eta1: float = Field(ge=0, strict=True, description="a viscosity [Pa s] of zero or more, or .inf")
+    eta1: Number = Field(ge=0, description="a viscosity [Pa s] of zero or more, or .inf")
 
     @property
     def relaxation_time(self) -> float:

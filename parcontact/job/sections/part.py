@@ -17,19 +17,19 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError, Valida
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse
+from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse, shorten
 from ..text.overrides import Included
-from ..text.source import shorten
 from .values import from_home
 
 
 @dataclass(frozen=True)
 class Context:
-    """What a section may need to know about the job file: its absolute path, and the file of its material if it
-    includes one."""
+    """What a section may need to know about the job: its absolute path, the file of its material if it includes one,
+    and whether it comes from Python, where PyYAML's own `safe_load` leaves texts for some numbers: 1.0e6, 1e-3."""
 
     path: Path
     included: Included | None = None
+    numbers_as_texts: bool = False
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
@@ -61,136 +61,109 @@ class Part(BaseModel):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
-        """`data` with the defaults that depend on other keys or on the job file."""
+        """Return `data` with the defaults that depend on other keys or on the job file."""
         return data
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
-        """The keys as they are written in a job."""
+        """Return the keys as they are written in a job."""
         return tuple(field.alias or name for name, field in cls.model_fields.items())
 
     @classmethod
     def field(cls, word: str) -> FieldInfo:
-        """The field that is written as `word`."""
+        """Return the field that is written as `word`."""
         return next(field for name, field in cls.model_fields.items() if word in (field.alias, name))
 
     @model_validator(mode="wrap")
     @classmethod
     def _every_mistake(cls, data: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
+        """Run pydantic's own validation, then the checks of keys, then the rules; refuse with all faults together."""
         if isinstance(data, cls):
             return data
         if not isinstance(data, dict):
             refuse(Fault(f"must be a mapping of keys, got {quote(data)}"))
         known = cls.words()  # an empty value is an absent key, but no excuse for one that there is not
         given = {key: value for key, value in data.items() if value is not None or key not in known}
-        attempt = Attempt(cls, given, cls.filled(dict(given), info.context), info.context)
-        faults = list(attempt.faults(handler))
+        filled = cls.filled(dict(given), info.context)
+        part, errors = None, list[ErrorDetails]()
+        try:
+            part = handler(filled)
+        except ValidationError as failure:
+            errors = failure.errors()
+        # a default that was made of a wrong value is no second mistake
+        of_user = [error for error in errors if _absent(error) or error["loc"][:1] in {(), *((key,) for key in given)}]
+        faults = [cls._fault(error, filled) for error in of_user or errors]
+        faults += cls._exclusive_faults(given)
+        for rule in cls.rules:
+            values = [_value(cls, name, part, filled, errors, info.context) for name in rule.needs]
+            if not any(value is WRONG for value in values):
+                faults += rule.check(*values)
         if faults:
             refuse(*faults)
-        return attempt.part
+        return part
 
-
-WRONG = object()  # stands for the value of a field that has mistakes
-
-
-class Attempt:
-    """One attempt to make a part out of data: the part if all went well, and what is wrong otherwise."""
-
-    def __init__(self, kind: type[Part], given: Mapping[str, Any], filled: Mapping[str, Any], context: Any):
-        self.kind = kind
-        self.given = given  # what the user wrote
-        self.filled = filled  # with computed defaults
-        self.context = context
-        self.part: Any = None
-        self.errors: list[ErrorDetails] = []
-
-    def faults(self, handler: Callable[[Any], Any]) -> Iterator[Fault]:
-        """Runs pydantic's own validation, then the checks of keys, then the rules."""
-        try:
-            self.part = handler(self.filled)
-        except ValidationError as failure:
-            self.errors = failure.errors()
-        of_user = [error for error in self.errors if self.concerns_user(error)]
-        for error in of_user or self.errors:
-            yield self.fault(error)
-        yield from self.exclusive_faults()
-        for rule in self.kind.rules:
-            values = [self.value(name) for name in rule.needs]
-            if not any(value is WRONG for value in values):
-                yield from rule.check(*values)
-
-    def concerns_user(self, error: ErrorDetails) -> bool:
-        """Whether the error is in what was written: a default copied from a wrong value is no second mistake."""
-        return not error["loc"] or error["loc"][0] in self.given or _absent(error)
-
-    def fault(self, error: ErrorDetails) -> Fault:
-        """Pydantic's error as the rest of a sentence."""
+    @classmethod
+    def _fault(cls, error: ErrorDetails, filled: dict[str, Any]) -> Fault:
+        """Return pydantic's error as the rest of a sentence."""
         kind, path, value = error["type"], error["loc"], error["input"]
         if kind in (AT_VALUE, AT_KEY):
             return Fault(error["msg"], path, kind == AT_KEY)
         name = str(path[0])
         if kind == "extra_forbidden":
-            return Fault(self.unknown(name), path, at_key=True)
-        field = self.kind.field(name)
-        if kind == "literal_error" or (_absent(error) and literal_words(field.annotation)):
-            words = literal_words(field.annotation)
-            expected, hint = f"must be {choices(words)}", did_you_mean(value, words)
-        else:
-            expected, hint = f"must be {field.description}", ""
+            what = f"is not a key of {cls.label}" if cls.label else "is not a known key"
+            advice = did_you_mean(shorten(name), cls.words()) or f"; there are {', '.join(cls.words())}"
+            return Fault(what + advice, path, at_key=True)
+        field = cls.field(name)
+        words = literal_words(field.annotation) if _absent(error) or kind == "literal_error" else ()
+        expected = f"must be {choices(words) if words else field.description}"
         if _absent(error):
             return Fault(f"is missing; it {expected}", path)
-        return Fault(f"{expected}, got {quote(self.filled[name] if kind == 'missing' else value)}{hint}", path)
+        got = quote(filled[name] if kind == "missing" else value)
+        return Fault(f"{expected}, got {got}{did_you_mean(value, words)}", path)
 
-    def unknown(self, word: str) -> str:
-        """What to say about a key that the part does not have."""
-        words, word = self.kind.words(), shorten(word)
-        what = f"is not a key of {self.kind.label}" if self.kind.label else "is not a known key"
-        return what + (did_you_mean(word, words) or f"; there are {', '.join(words)}")
+    @classmethod
+    def _exclusive_faults(cls, given: Mapping[str, Any]) -> Iterator[Fault]:
+        """Check which keys were given, whatever their values."""
+        for group in (*cls.one_of, *cls.at_most_one):
+            present = [word for word in group if word in given]
+            if len(present) > 1 or (not present and group in cls.one_of):
+                number = "needs exactly one of" if group in cls.one_of else "takes at most one of"
+                yield Fault(f"{number} {choices(group)}, got {' and '.join(present) or 'none'}")
 
-    def exclusive_faults(self) -> Iterator[Fault]:
-        """Checks which keys were given, whatever their values."""
-        for group in self.kind.one_of:
-            present = [word for word in group if word in self.given]
-            if len(present) != 1:
-                yield Fault(f"needs exactly one of {choices(group)}, got {' and '.join(present) or 'none'}")
-        for group in self.kind.at_most_one:
-            present = [word for word in group if word in self.given]
-            if len(present) > 1:
-                yield Fault(f"takes at most one of {choices(group)}, got {' and '.join(present)}")
 
-    def value(self, name: str) -> Any:
-        """The value of one field, also when other fields have mistakes; None for bad items of a list, or else WRONG."""
-        if self.part is not None:
-            return getattr(self.part, name)
-        field = self.kind.model_fields[name]
-        wrong = [error["loc"] for error in self.errors if error["loc"][:1] == (name,)]
-        if not wrong and name not in self.filled:
-            return field.get_default(call_default_factory=True)
-        if not wrong:
-            return self.validated(_annotated(field), self.filled[name])
-        item, *more = get_args(field.annotation) or (None,)
-        if more != [...] or not isinstance(self.filled.get(name), list):
-            return WRONG
-        if not all(len(loc) > 1 and isinstance(loc[1], int) for loc in wrong):
-            return WRONG
-        bad = {loc[1] for loc in wrong}
-        return tuple(None if i in bad else self.validated(item, value) for i, value in enumerate(self.filled[name]))
+WRONG = object()  # stands for the value of a field that has mistakes
 
-    def validated(self, annotation: Any, value: Any) -> Any:
-        """A value that is known to be right, as the model holds it."""
-        return TypeAdapter(annotation).validate_python(value, context=self.context)
+
+def _value(
+    kind: type[Part], name: str, part: Part | None, filled: Mapping[str, Any], errors: list[ErrorDetails], context: Any
+) -> Any:
+    """Return the value of one field, also when other fields have mistakes.
+
+    It is WRONG if it has mistakes itself; in a list they are of single items, for which None stands.
+    """
+    if part is not None:
+        return getattr(part, name)
+    field, wrong = kind.model_fields[name], [error["loc"] for error in errors if error["loc"][:1] == (name,)]
+    if not wrong and name not in filled:
+        return field.get_default(call_default_factory=True)
+    if not wrong:
+        annotation = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        return TypeAdapter(annotation).validate_python(filled[name], context=context)
+    item, *more = get_args(field.annotation) or (Any,)
+    bad = {loc[1] if len(loc) > 1 else "" for loc in wrong}
+    if more != [...] or not isinstance(filled.get(name), list) or not all(isinstance(index, int) for index in bad):
+        return WRONG
+    adapter: TypeAdapter[Any] = TypeAdapter(item)
+    items = enumerate(filled[name])
+    return tuple(None if index in bad else adapter.validate_python(one, context=context) for index, one in items)
 
 
 def _absent(error: ErrorDetails) -> bool:
     return error["type"] == "missing" and len(error["loc"]) == 1
 
 
-def _annotated(field: FieldInfo) -> Any:
-    return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
-
-
 def literal_words(annotation: Any) -> tuple[str, ...]:
-    """The words of a Literal, also inside a tuple or a union."""
+    """Return the words of a Literal, also inside a tuple or a union."""
     words = [word for word in get_args(annotation) if isinstance(word, str)]
     for inner in get_args(annotation):
         words += literal_words(inner) if get_origin(inner) else ()
@@ -200,11 +173,7 @@ def literal_words(annotation: Any) -> tuple[str, ...]:
 def chosen(
     key: str, kinds: Mapping[str, type[Part]], called: Mapping[str, str] | None = None
 ) -> Callable[[Any, ValidationInfo], Any]:
-    """A validator that takes the kind of a part from its `key`; `called` are other names of kinds, to advise on."""
-
-    def advice(word: Any) -> str:
-        other = (called or {}).get(str(word).lower())
-        return f"; did you mean {other}?" if other else did_you_mean(word, kinds)
+    """Return a validator that takes the kind of a part from its `key`; `called` are other names of kinds."""
 
     def choose(data: Any, info: ValidationInfo) -> Any:
         if isinstance(data, tuple(kinds.values())):
@@ -215,7 +184,9 @@ def chosen(
         if word is None:
             refuse(Fault(f"is missing; it must be {choices(kinds)}", (key,)))
         if not isinstance(word, str) or word not in kinds:
-            refuse(Fault(f"must be {choices(kinds)}, got {quote(word)}{advice(word)}", (key,)))
+            other = (called or {}).get(str(word).lower())
+            advice = f"; did you mean {other}?" if other else did_you_mean(word, kinds)
+            refuse(Fault(f"must be {choices(kinds)}, got {quote(word)}{advice}", (key,)))
         return kinds[word].model_validate(data, context=info.context)
 
     return choose

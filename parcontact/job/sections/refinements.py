@@ -9,10 +9,9 @@ from pydantic import BeforeValidator, Field
 
 from ..text.fault import Fault
 from .part import Part, Rule
-from .values import Count, Positive, listed
+from .values import Count, Fraction, Positive, listed
 
 NAMES = ("mesh", "cells_per_step", "integrator", "tolerance", "precision", "kernel")
-Tolerance = Annotated[float, Field(gt=0, lt=1, strict=True)]
 
 
 def _different(name: str) -> Rule:
@@ -41,7 +40,7 @@ class Study(Part):
     integrator: Annotated[tuple[Literal["exponential", "backward-euler"], ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of integrators"
     )
-    tolerance: Annotated[tuple[Tolerance, ...], BeforeValidator(listed)] = Field(
+    tolerance: Annotated[tuple[Fraction, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of tolerances [-] above 0 and below 1"
     )
     precision: Annotated[tuple[Literal["double", "mixed"], ...], BeforeValidator(listed)] = Field(

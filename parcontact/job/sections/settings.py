@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..text.fault import Fault
 from .part import Context, Part, Rule
-from .values import FROM_SURFACE, Count, Flag, Positive, both, from_home, listed
+from .values import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, Whole, both, from_home, listed
 
 
 class Grid(Part):
@@ -62,14 +62,12 @@ class Numerics(Part):
     """How the equations are solved; `accuracy` chooses the tolerance and what branches may be folded, where these are
     not given, and says how fine the mesh should be."""
 
-    accuracy: float = Field(
-        default=1e-2, gt=0, lt=1, strict=True, description="an error of friction and area [-] above 0 and below 1"
-    )
+    accuracy: Fraction = Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1")
     integrator: Literal["exponential", "backward-euler"] = "exponential"
-    tolerance: float = Field(default=5e-3, gt=0, lt=1, strict=True, description="a tolerance [-] above 0 and below 1")
+    tolerance: Fraction = Field(default=5e-3, description="a tolerance [-] above 0 and below 1")
     max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
-    branch_error: float = Field(
-        default=1e-3, ge=0, lt=1, strict=True, description="an error of friction [-] of zero or more and below 1"
+    branch_error: Number = Field(
+        default=1e-3, ge=0, lt=1, description="an error of friction [-] of zero or more and below 1"
     )
     kernel: Literal["spectral", "love"] = "spectral"  # in a free scene: love
     precision: Literal["double", "mixed"] = "double"
@@ -122,7 +120,7 @@ class Checkpoint(Part):
 
     every: Count | None = Field(default=None, description="a positive whole number of steps")
     minutes: Positive | None = Field(default=None, description="a positive wall time in minutes [min]")
-    keep: int = Field(default=2, ge=0, strict=True, description="a whole number of checkpoints, zero or more")
+    keep: Whole = Field(default=2, ge=0, description="a whole number of checkpoints, zero or more")
 
     at_most_one = (("every", "minutes"),)
 

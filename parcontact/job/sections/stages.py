@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, create_model
+from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, ValidationInfo, create_model
 
 from ..text.fault import Fault, quote, refuse
 from .part import Context, Part, Rule
@@ -48,10 +48,11 @@ def _ramp(number: Any, description: str) -> PlainValidator:
     end = (number, Field(alias="to", description=description))
     keys = create_model("Ends", __base__=Part, start=start, end=end)
 
-    def read(value: Any) -> Ramp:
+    def read(value: Any, info: ValidationInfo) -> Ramp:
         if isinstance(value, Ramp):
             return value
-        ends = keys.model_validate(value if isinstance(value, dict) else {"from": value, "to": value})
+        given = value if isinstance(value, dict) else {"from": value, "to": value}
+        ends = keys.model_validate(given, context=info.context)
         return Ramp(*(number for _, number in ends))
 
     return PlainValidator(read)
@@ -61,19 +62,19 @@ class GeometricStep(Part):
     """Time steps that grow by a factor: `first`, `first growth`, `first growth^2`, ... [s]."""
 
     first: Positive = Field(description="a positive time step [s]")
-    growth: float = Field(ge=1, allow_inf_nan=False, strict=True, description="a factor [-] of one or more")
+    growth: Real = Field(ge=1, description="a factor [-] of one or more")
 
 
 Auto = Literal["auto"]
 AUTO: Auto = "auto"  # time steps that follow the error asked for
 
 
-def _time_step(value: Any) -> float | GeometricStep | Auto:
+def _time_step(value: Any, info: ValidationInfo) -> float | GeometricStep | Auto:
     if value == AUTO:
         return AUTO
     if isinstance(value, dict | GeometricStep):
-        return GeometricStep.model_validate(value)
-    return SECONDS.validate_python(value)
+        return GeometricStep.model_validate(value, context=info.context)
+    return SECONDS.validate_python(value, context=info.context)
 
 
 def _stepping(

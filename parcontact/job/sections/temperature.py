@@ -18,8 +18,8 @@ from .values import Positive, Real
 LOWEST, HIGHEST = -273.15, 5000.0  # deg C
 LARGEST_SHIFT = 60.0  # log10 of a_T, either way: relaxation times remain numbers that can be computed with
 Celsius = Annotated[
-    float,
-    Field(gt=LOWEST, le=HIGHEST, strict=True, allow_inf_nan=False, description="a temperature [deg C], up to 5000"),
+    Real,
+    Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000"),
 ]
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from .part import Part, existing_file
-from .values import Flag, Positive, Seed
+from .values import Flag, Number, Positive, Seed
 
 
 class RoughSpectrum(Part):
@@ -21,9 +21,7 @@ class RoughSpectrum(Part):
     label: ClassVar[str] = "shape rough with a spectrum"
     shape: Literal["rough"] = "rough"
     spectrum: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of a spectrum")]
-    hurst: float | None = Field(
-        default=None, gt=0, le=1, strict=True, description="a Hurst exponent above 0 and up to 1"
-    )
+    hurst: Number | None = Field(default=None, gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
     long_wavelength: Annotated[Positive | None, Field(description="a positive wavelength [m]")] = None
     short_wavelength: Annotated[Positive | None, Field(description="a positive wavelength [m]")] = None
     seed: Annotated[Seed, Field(description="a whole number of zero or more")] = 0

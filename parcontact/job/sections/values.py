@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from ..text.fault import Fault, quote, refuse
-from ..text.source import shorten
+from ..text.fault import Fault, quote, refuse, shorten
 
 FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
 MOST_SEED = 2**128 - 1
+LONGEST_NUMBER = 400  # characters of a number that is given as a text
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
 
 MOST_OF_A_RANGE = 100_000
 
 
-def _whole(value: Any) -> Any:
-    """1e3 is a whole number."""
+def _number(value: Any, info: ValidationInfo) -> Any:
+    """Return the number that a text stands for, where texts may be numbers."""
+    if isinstance(value, str) and len(value) <= LONGEST_NUMBER and getattr(info.context, "numbers_as_texts", False):
+        with suppress(ValueError):
+            return float(value)
+    return value
+
+
+def _whole(value: Any, info: ValidationInfo) -> Any:
+    """Return 1e3 as a whole number."""
+    value = _number(value, info)
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -82,9 +92,12 @@ def log_range(text: str) -> tuple[float, ...]:
     return (*(a * (b / a) ** (i / (n - 1)) for i in range(n - 1)), b)
 
 
-Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+NUMBER = BeforeValidator(_number)
+Number = Annotated[float, Field(strict=True), NUMBER]
+Real = Annotated[float, Field(strict=True, allow_inf_nan=False), NUMBER]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False), NUMBER]
+NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False), NUMBER]
+Fraction = Annotated[float, Field(strict=True, gt=0, lt=1), NUMBER]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(_countable)]
 Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(_countable)]
 Seed = Annotated[int, Field(strict=True, ge=0), BeforeValidator(_whole), AfterValidator(_seed)]

@@ -10,9 +10,12 @@ from typing import Any, NamedTuple, NoReturn
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from .source import Key
+from .places import Key
 
 MAX_WORD = 40  # characters of a word that may be a misspelt one
+BOUNDED = reprlib.Repr()  # a `repr` that never writes out all of something large
+BOUNDED.maxlist = BOUNDED.maxtuple = BOUNDED.maxset = 60
+BOUNDED.maxstring = BOUNDED.maxlong = BOUNDED.maxother = 500
 AT_VALUE, AT_KEY = "at value", "at key"  # the types of our errors within pydantic
 
 
@@ -40,23 +43,17 @@ def faults_of(error: ValidationError) -> Iterator[Fault]:
         yield Fault(line["msg"], line["loc"], line["type"] == AT_KEY)
 
 
+def shorten(text: str, most: int = 200) -> str:
+    """Return a text without its middle where it is too long to be read."""
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
+
+
 def quote(value: Any) -> str:
     """A value as it is shown after "got"."""
     if value is None or isinstance(value, dict):
         return "nothing" if value is None else "a mapping"
-    text = str(value).lower() if isinstance(value, bool) else _BOUNDED.repr(value)
+    text = str(value).lower() if isinstance(value, bool) else BOUNDED.repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _bounded() -> reprlib.Repr:
-    """A `repr` that never writes out all of something large."""
-    bounded = reprlib.Repr()
-    bounded.maxlist = bounded.maxtuple = bounded.maxdict = bounded.maxset = 60
-    bounded.maxstring = bounded.maxlong = bounded.maxother = 500
-    return bounded
-
-
-_BOUNDED = _bounded()
 
 
 def choices(words: Iterable[str]) -> str:

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from ..sections.values import log_range
-from .fault import quote
-from .source import Key, Mistake, Place, Source, shorten
+from .fault import quote, shorten
+from .places import Key, Place, Source
 
 SWEEP: Key = ("sweep",)
 MAX_CASES = 1000
@@ -54,15 +54,15 @@ class Sweep:
 def take(source: Source) -> Sweep | None:
     """Take the sweep out of a job; None if it has mistakes, which `source` then holds."""
     data = source.data if isinstance(source.data, dict) else {}
-    section, place = data.pop("sweep", None), source.place(SWEEP)
-    if section is None:
-        return Sweep([], place)
+    section, place = data.get("sweep"), source.locate(SWEEP).place
     mistakes = len(source.mistakes)
-    sweep = Sweep(list(_axes(section, source)), place)
+    sweep = Sweep([] if section is None else list(_axes(section, source)), place)
     count = math.prod(map(len, sweep.axes)) if sweep.axes else 0  # may be more than a length can be
     if count > MAX_CASES:
-        source.mistakes.append(Mistake(place, f"sweep has {quote(count)} cases, and {MAX_CASES} is the most"))
-    return sweep if len(source.mistakes) == mistakes and not source.within_broken(SWEEP) else None
+        source.note(place, f"sweep has {quote(count)} cases, and {MAX_CASES} is the most")
+    sound = len(source.mistakes) == mistakes and source.locate(SWEEP).readable
+    data.pop("sweep", None)
+    return sweep if sound else None
 
 
 def _axes(section: Any, source: Source) -> Iterator[Axis]:
@@ -72,38 +72,38 @@ def _axes(section: Any, source: Source) -> Iterator[Axis]:
         path: Key = (*SWEEP, index) if listed else SWEEP
         if not isinstance(mapping, dict) or not mapping:
             what = "sweep must be a list of mappings from keys to lists of values"
-            source.mistakes.append(Mistake(source.place(path), f"{what}, got {quote(mapping)}"))
+            source.note(source.locate(path).place, f"{what}, got {quote(mapping)}")
             continue
         columns = [_column(name, values, path, source, seen) for name, values in mapping.items()]
         if all(columns) and len({len(column) for column in columns}) > 1:
             counts = ", ".join(f"{len(column)} of {shorten(column[0].name)}" for column in columns)
-            sentence = f"keys of one mapping move together and need as many values each, got {counts}"
-            source.mistakes.append(Mistake(source.place(path), sentence))
+            what = "keys of one mapping move together and need as many values each"
+            source.note(source.locate(path).place, f"{what}, got {counts}")
             continue
         yield list(zip(*columns, strict=False))  # they are as long as each other, unless one has mistakes
 
 
 def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, Place]) -> list[Setting]:
     """All values of one key; an empty list, and a mistake in `source`, if they are none."""
-    place, key_place = source.place((*path, name)), source.key_place((*path, name))
+    at = source.locate((*path, name))
+    place, key_place = at.place, at.key_place
     settings: list[Setting] = []
     if any(name == fixed or name.startswith(f"{fixed}.") for fixed in FIXED):
-        source.mistakes.append(Mistake(key_place, f"{shorten(name)} cannot be swept"))
+        source.note(key_place, f"{shorten(name)} cannot be swept")
     elif other := next((one for one in seen if _overlap(one, name)), ""):
-        sentence = f"{shorten(name)} is swept a second time, first as {shorten(other)} at {seen[other]}"
-        source.mistakes.append(Mistake(key_place, sentence))
+        source.note(key_place, f"{shorten(name)} is swept a second time, first as {shorten(other)} at {seen[other]}")
     elif not all(name.split(".")):
-        source.mistakes.append(Mistake(key_place, f"must be a key of the job like grid.points, got {quote(name)}"))
+        source.note(key_place, f"must be a key of the job like grid.points, got {quote(name)}")
     elif isinstance(values, list) and values:
-        places = [source.place((*path, name, index)) for index in range(len(values))]
-        settings = [Setting(name, value, key_place, at) for value, at in zip(values, places, strict=True)]
+        places = [source.locate((*path, name, index)).place for index in range(len(values))]
+        settings = [Setting(name, value, key_place, one) for value, one in zip(values, places, strict=True)]
     else:
         try:
             numbers = [float(f"{value:.12g}") for value in log_range(str(values))]  # 1e5, not 99999.99999999999
             settings = [Setting(name, value, key_place, place) for value in numbers]
         except ValueError:
             sentence = f"{shorten(name)} needs a list of values or a range first:last:count, got {quote(values)}"
-            source.mistakes.append(Mistake(place, sentence))
+            source.note(place, sentence)
     seen[name] = key_place
     return settings
 
@@ -119,5 +119,4 @@ def refuse_overrides(sweep: Sweep, overrides: list[tuple[str, Place]], source: S
     for name, place in overrides:
         if found := next((swept for swept in names if _overlap(swept, name)), ""):
             advice = f"change the sweep instead, like --set 'sweep=[{{{shorten(found)}: [...]}}]'"
-            sentence = f"{shorten(found)} is swept; {advice}"
-            source.mistakes.append(Mistake(place, sentence))
+            source.note(place, f"{shorten(found)} is swept; {advice}")
