@@ -147,7 +147,7 @@ def _value(
     if not wrong and name not in filled:
         return field.get_default(call_default_factory=True)
     if not wrong:
-        annotation = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        annotation: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
         return TypeAdapter(annotation).validate_python(filled[name], context=context)
     item, *more = get_args(field.annotation) or (Any,)
     bad = {loc[1] if len(loc) > 1 else "" for loc in wrong}

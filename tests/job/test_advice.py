@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from job.texts import SMALL, job_of, replaced
+from .texts import SMALL, job_of, replaced
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1}"
 SLIDING = "[{pressure: 1, velocity: 1, distance: 1e-4, cells_per_step: 2}]"

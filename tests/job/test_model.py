@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 
 import pytest
-from job.texts import SMALL, job_of, replaced
 
 from parcontact.job import (
     Elastic,
@@ -18,6 +17,8 @@ from parcontact.job import (
     log_range,
 )
 from parcontact.job.checks.advice import cells_per_wave
+
+from .texts import SMALL, job_of, replaced
 
 CONTRACT = """
 title: Rubber pressed on a road, then sliding      # free text

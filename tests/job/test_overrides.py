@@ -4,10 +4,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from job import texts
-from job.texts import SMALL, with_material
 
 from parcontact.job import JobError, load
+
+from . import texts
+from .texts import SMALL, with_material
 
 COMPOUND = """\
 model: zener

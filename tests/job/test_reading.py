@@ -4,8 +4,9 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from job import texts
-from job.texts import SMALL, with_material
+
+from . import texts
+from .texts import SMALL, with_material
 
 job_of, mistakes_of = partial(texts.job_of, Path()), partial(texts.mistakes_of, Path())
 

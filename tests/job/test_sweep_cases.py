@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from job.texts import SMALL
 from parcontact.errors import InputError, JobError
 from parcontact.job import Case, choose, load, load_cases
+
+from .texts import SMALL
 
 TOGETHER = "  - {grid.points: [16, 32], grid.size: [2e-3, 4e-3]}\n"
 TIMES = "  - {history.0.pressure: [1e5, 2e5, 3e5]}\n"
