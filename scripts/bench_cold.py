@@ -16,12 +16,16 @@ from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
-from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
+from parcontact.solve.constraint import NonNegative
+from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import cold_start
+from parcontact.solve.problem import MeanPressure, Operators, Problem
+from parcontact.solve.workspace import Workspace
 
 LOAD = 0.05  # mean pressure over E*, for 11 % of contact at a slope of 1
 MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
 ERROR = 1e-7  # of pressures
+Solver = tuple[ContactSolver, Operators]  # of a contact
 EXACT = 1e-11  # a tolerance whose pressures others are compared with
 PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
 TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.25)]
@@ -73,27 +77,32 @@ class Cold:
         self.height, self.fft = low + high, fft
         self.reference: Map | None = None  # the solution to EXACT, when it has been asked for
 
-    def solver(self, tolerance: float, single: bool = False, slab: Slab | None = None) -> ContactSolver:
-        """With K in single precision, or for a coarser grid."""
+    def solver(self, tolerance: float, single: bool = False, slab: Slab | None = None) -> Solver:
+        """With K in single precision, or for a coarser grid; and the operators."""
         fft = self.fft if slab is None else FFT(slab, measured=False)
         other = FFT(fft.slab, dtype=np.float32, measured=fft.measured) if single else fft
         half = HalfSpace(self.size)
-        return ContactSolver(fft.slab, half.operator(fft), half.inverse(other), self.height, tolerance, 500)
+        solver = ContactSolver(Workspace(fft.slab, tolerance), self.height, tolerance, 500)
+        return solver, Operators(half.operator(fft), half.inverse(other))
 
-    def start(self, solver: ContactSolver) -> Map:
+    def problem(self, operators: Operators) -> Problem:
+        return Problem(*operators, self.heights, NonNegative(), MeanPressure(self.load * MODULUS))
+
+    def start(self, solver: Solver) -> Map:
         """From nested grids."""
-        start, load = np.zeros_like(self.heights), MeanPressure(self.load * MODULUS)
-        cold_start.prepare(solver, self.heights, load, start, lambda slab, tolerance: self.solver(tolerance, slab=slab))
+        start, (own, operators) = np.zeros_like(self.heights), solver
+        cold_start.prepare(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
         return start
 
-    def go_on(self, solver: ContactSolver, start: Map) -> Contact:
+    def go_on(self, solver: Solver, start: Map) -> Contact:
         """From a start that becomes the solution."""
-        return solver.solve(self.heights, MeanPressure(self.load * MODULUS), start)
+        own, operators = solver
+        return own.solve(self.problem(operators), start)
 
-    def solve(self, solver: ContactSolver) -> Map:
+    def solve(self, solver: Solver) -> Map:
         return np.asarray(self.go_on(solver, self.start(solver)).p)
 
-    def loosest(self, error: float, single: bool = False) -> tuple[ContactSolver, float]:
+    def loosest(self, error: float, single: bool = False) -> tuple[Solver, float]:
         """With the loosest tolerance by which the pressure is wrong by so much or less, and how wrong it is."""
         if self.reference is None:
             self.reference = self.solve(self.solver(EXACT))

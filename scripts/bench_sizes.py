@@ -8,12 +8,10 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from bench_cold import Cold, distance
+from bench_cold import Cold, Solver, distance
 from bench_lines import Line, Map, interleave
 from bench_scale import WARM, Slide
 from mpi4py import MPI
-
-from parcontact.solve.contact import ContactSolver
 
 SMALLEST = 256  # points along a side, where `sizes` begins
 TOLERANCE = 1e-6  # of its cold solves
@@ -70,21 +68,22 @@ def large(points: int, _: int, __: argparse.Namespace) -> Iterator[Line]:
     yield Line("large", "resident at most", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, "GB")
     exact = _exact(surface, solver, found.p)
     while (error := distance(found.p, exact)) > ERROR:
-        solver.tolerance /= 2.0
+        solver[0].tolerance /= 2.0
         before, began = tally["operator"], time.process_time()
         found = surface.go_on(solver, found.p)
         seconds, calls = seconds + time.process_time() - began, calls + tally["operator"] - before
-    yield Line("large", f"a cold solve to {solver.tolerance:.2g}", seconds, "s")
+    yield Line("large", f"a cold solve to {solver[0].tolerance:.2g}", seconds, "s")
     yield Line("large", "operator calls", calls, "")
     yield Line("large", "certificate", found.certificate.worst, "")
     yield Line("large", "contact area", float(np.count_nonzero(found.p)) / found.p.size, "")
     yield Line("large", "pressure error", error, "")
 
 
-def _exact(surface: Cold, solver: ContactSolver, p: Map) -> Map:
+def _exact(surface: Cold, solver: Solver, p: Map) -> Map:
     """Where a solver gets from a pressure with a thousandth of its tolerance, which it keeps."""
-    exact, tolerance = p.copy(), solver.tolerance
-    solver.tolerance /= FURTHER
+    own = solver[0]
+    exact, tolerance = p.copy(), own.tolerance
+    own.tolerance /= FURTHER
     surface.go_on(solver, exact)
-    solver.tolerance = tolerance
+    own.tolerance = tolerance
     return exact

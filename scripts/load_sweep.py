@@ -18,26 +18,30 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
-from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
+from parcontact.solve.constraint import NonNegative
+from parcontact.solve.contact import Contact, ContactSolver
+from parcontact.solve.problem import MeanPressure, Operators, Problem
+from parcontact.solve.workspace import Workspace
 
 Map = NDArray[np.float64]
 MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
 ALMOST = 0.9999  # of all points: there the sweep ends
 
 
-def solver(heights: Map, tolerance: float, max_iterations: int = 500) -> ContactSolver:
+def solver(heights: Map, tolerance: float, max_iterations: int = 500) -> tuple[ContactSolver, Operators]:
     """For a box of length 1."""
     ny, nx = heights.shape
     slab = Slab(MPI.COMM_SELF, nx, ny)
     fft = FFT(slab)
     half_space = HalfSpace((1.0, 1.0))
-    operator, inverse = half_space.operator(fft), half_space.inverse(fft)
-    return ContactSolver(slab, operator, inverse, float(np.ptp(heights)), tolerance, max_iterations)
+    operators = Operators(half_space.operator(fft), half_space.inverse(fft))
+    return ContactSolver(Workspace(slab, tolerance), float(np.ptp(heights)), tolerance, max_iterations), operators
 
 
-def cold(solving: ContactSolver, heights: Map, mean: float) -> Contact:
+def cold(solving: tuple[ContactSolver, Operators], heights: Map, mean: float) -> Contact:
     """A solve from nothing."""
-    return solving.solve(heights, MeanPressure(mean), np.zeros_like(heights))
+    solver, operators = solving
+    return solver.solve(Problem(*operators, heights, NonNegative(), MeanPressure(mean)), np.zeros_like(heights))
 
 
 def rough(points: int, cells: int) -> Map:

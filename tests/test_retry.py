@@ -33,8 +33,8 @@ def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     """Solves that fail up to twice: how often is a matter of the contact, and so is the same when repeated."""
     solve, refused = ContactSolver.solve, [0]
 
-    def refuse(solver: ContactSolver, h: Any, control: Any, start: Any, length: float = 1.0) -> Contact:
-        contact = solve(solver, h, control, start, length)
+    def refuse(solver: ContactSolver, problem: Any, start: Any, length: float = 1.0) -> Contact:
+        contact = solve(solver, problem, start, length)
         if solver.slab.nx < GRID["points"][0]:
             return contact
         if refused[0] < solver.slab.sum(float(np.count_nonzero(contact.p)))[0] % 3:
@@ -137,10 +137,10 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
     """FFTW guesses them: what it measures depends on how busy the machine is, and the last digits on that."""
     data = {"grid": {**GRID, "boundary": boundary}, "surface": ROUGH, "material": ELASTIC, "history": [PRESS]}
     built = begun(data | {"numerics": {"precision": precision}}).scene
-    coarse = solver_on(built.setup, built.slab.resized(32, 32), 1e-3)
+    coarse, operators = solver_on(built.setup, built.slab.resized(32, 32), 1e-3)
     assert coarse.slab.shape == (32, 32)
     assert built.setup.fft.measured
-    for operator in (coarse.operator, coarse.preconditioner):
+    for operator in operators:
         assert isinstance(operator, Convolution)
         assert not operator.fft.measured
 

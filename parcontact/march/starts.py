@@ -109,9 +109,10 @@ class Starts:
         older, share = before.pressure, growth * before.alpha / alpha
         if along_y and growth > 0.0:
             older = rows.roll(slab, before.pressure, along_y, start)
-        loops.travel(now.pressure, older, (1.0 + growth) * now.alpha / alpha, share, along_x, start)
+        bounds = self._scene.constraint(alpha).bounds
+        loops.travel(now.pressure, older, (1.0 + growth) * now.alpha / alpha, share, along_x, *bounds, start)
         if along_y:
-            start[...] = rows.roll(slab, start, along_y, self._scene.solver.lend()[0])
+            start[...] = rows.roll(slab, start, along_y, self._scene.solver.workspace.pressure)
 
     def cells(self, step: Step, since: tuple[float, float]) -> tuple[float, float]:
         """By how many cells the surface moves from a position [m] to the end of a step, along x and y."""

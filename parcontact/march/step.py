@@ -17,8 +17,9 @@ from ..physics.energy import Pressed
 from ..physics.entries import Entry
 from ..physics.measures import Measures
 from ..scene import Scene, solver_in_double, solver_on
-from ..solve.contact import Approach, Contact, ContactSolver, MeanPressure
+from ..solve.contact import Contact, ContactSolver
 from ..solve.fallback import cold_start, retry
+from ..solve.problem import Approach, MeanPressure, Operators, Problem
 from ..storage.checkpoint import Contents
 from ..storage.row import Row
 from . import failure, state
@@ -165,21 +166,23 @@ class March:
         return {name: Entry(np.array(numbers), 1.0, SYMBOLS[name]) for name, numbers in self.chosen.numbers().items()}
 
     def _kept(self) -> Array:
-        """A map for the displacement before a step, of the solver until its next solve."""
-        return self.scene.solver.lend()[0]
+        """A map for the displacement before a step, until the next solve."""
+        return self.scene.solver.workspace.pressure
 
     def _solve(self, step: Step, trial: Trial) -> tuple[Contact, str]:
         """The contact of a step, and what was unusual about it; collective. Raises StepError."""
-        control = self._control(step, trial)
+        scene = self.scene
+        control, constraint = self._control(step, trial), scene.constraint(trial.alpha)
+        problem = Problem(*scene.operators, trial.effective, constraint, control)
         start = self.starts.make(step, self.state, trial.alpha, self._next_pressure)
         self._elastic_displacement = None
         if self.state.alpha == 0.0:  # nothing has been solved before
-            cold_start.prepare(self.scene.solver, trial.effective, control, start, partial(solver_on, self.scene.setup))
-        contact, remark = self.scene.solver.solve(trial.effective, control, start), ""
+            cold_start.prepare(scene.solver, problem, start, partial(solver_on, scene.setup))
+        contact, remark = scene.solver.solve(problem, start), ""
         if contact.failure:
-            in_double = solver_in_double(self.scene.setup)
+            in_double = solver_in_double(scene.setup)
             if in_double is not None or not self._accepts(contact):
-                contact, remark = self._retry(step, trial.effective, control, contact, in_double)
+                contact, remark = self._retry(step, problem, contact, in_double)
         if step.passed:
             remark = "; ".join(filter(None, (remark, self._passed(step))))
         return contact, remark
@@ -214,21 +217,20 @@ class March:
     def _retry(
         self,
         step: Step,
-        effective: Array,
-        control: MeanPressure | Approach,
+        problem: Problem,
         failed: Contact,
-        in_double: Callable[[], ContactSolver] | None,
+        in_double: Callable[[], tuple[ContactSolver, Operators]] | None,
     ) -> tuple[Contact, str]:
         """Retry a solve that failed, one that would do as it is only in double precision; the contact, and what to say
         of it. Raises StepError when nothing helps."""
         scene, would_do, on = self.scene, self._accepts(failed), partial(solver_on, self.scene.setup)
         most = 1 if would_do else None
-        contact, tried = retry.again(scene.solver, effective, control, failed, on, in_double, most)
+        contact, tried = retry.again(scene.solver, problem, failed, on, in_double, most)
         if contact.failure:
             if would_do and self._accepts(contact):
                 return contact, ""
             moved = math.hypot(*self.starts.cells(step, self.state.position))
-            raise failure.of_solve(scene, step, failed, contact, tried, effective, moved)
+            raise failure.of_solve(scene, step, failed, contact, tried, problem.heights, moved)
         what = f"{failure.where(scene, step)}: the contact solve {failed.failure}"
         return contact, f"{what}; solved when retried with {', with '.join(tried)}"
 
@@ -258,7 +260,8 @@ class March:
         if isinstance(self.scene.material, ZenerBody):
             return self.scene.material.u
         if self._elastic_displacement is None:
-            self._elastic_displacement = self.scene.solver.displace(self.state.pressure)
+            image = self.scene.solver.workspace.displacement
+            self._elastic_displacement = self.scene.operators.operator.apply(self.state.pressure, image)
             self._elastic_displacement *= self.state.alpha / self.scene.material.modulus  # 1 after a step of ours
         return self._elastic_displacement
 

@@ -71,8 +71,8 @@ def commit(displacement, buffer, u, heights, offset):
 
 @loop
 def measure(p, u, h, above, cyclic):
-    """Over this rank's points: sum of p, points in contact, sum of `u - h`; how many cell sides separate a point with
-    pressure from one without, along x and y, each counted once; largest p.
+    """Over this rank's points: sum of p, points in contact, which carry a pressure, sum of `u - h`; how many cell sides
+    separate a point with pressure from one without, along x and y, each counted once; largest p.
 
     `above` is the row before the first; the first point of a row has the last one before it if `cyclic`. The largest
     pressure is kept for each column: that is as fast as a sum, which a single running maximum is not.
@@ -84,14 +84,14 @@ def measure(p, u, h, above, cyclic):
         row_load, row_count, row_gaps, across, along = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
             row_load += p[j, i]
-            row_count += 1.0 if p[j, i] > 0.0 else 0.0
+            row_count += 1.0 if p[j, i] != 0.0 else 0.0
             row_gaps += u[j, i] - h[j, i]
-            across += 1.0 if (p[j, i] > 0.0) != (before[i] > 0.0) else 0.0
+            across += 1.0 if (p[j, i] != 0.0) != (before[i] != 0.0) else 0.0
             largest[i] = max(largest[i], p[j, i])
         for i in range(1, p.shape[1]):
-            along += 1.0 if (p[j, i] > 0.0) != (p[j, i - 1] > 0.0) else 0.0
+            along += 1.0 if (p[j, i] != 0.0) != (p[j, i - 1] != 0.0) else 0.0
         if cyclic:
-            along += 1.0 if (p[j, 0] > 0.0) != (p[j, -1] > 0.0) else 0.0
+            along += 1.0 if (p[j, 0] != 0.0) != (p[j, -1] != 0.0) else 0.0
         load += row_load
         count += row_count
         gaps += row_gaps
@@ -115,10 +115,10 @@ def embedded(branches, decay, increment, gain, p, u, heights, offset, first, str
         end = 0
         while end < nx:
             start = end
-            while start < nx and not p[j, start] > 0.0:
+            while start < nx and p[j, start] == 0.0:
                 start += 1
             end = start
-            while end < nx and p[j, end] > 0.0:
+            while end < nx and p[j, end] != 0.0:
                 end += 1
             here, moved, flat, run = p[j, start:end], increment[j, start:end], u[j, start:end], e[start:end]
             for i in range(here.size):
@@ -150,7 +150,7 @@ def slope_under(p, heights):
     load, slope = 0.0, 0.0
     for j in range(p.shape[0]):
         for i in range(nx):
-            if p[j, i] > 0.0:
+            if p[j, i] != 0.0:
                 rise = heights[j, (i + 1) % nx] - heights[j, i - 1]
                 load += p[j, i]
                 slope += p[j, i] * rise * rise
@@ -182,8 +182,8 @@ def work(p, alpha, p_old, alpha_old, du):
 
 
 @loop
-def travel(p, p_old, factor, factor_old, shift, out):
-    """Extrapolate a pressure that moves with the surface: `out = max(S (factor p - factor_old S p_old), 0)`.
+def travel(p, p_old, factor, factor_old, shift, lower, upper, out):
+    """Extrapolate a pressure that moves with the surface: `out = S (factor p - factor_old S p_old)`, within bounds.
 
     S moves by `shift` cells along x (cyclic); `out` may be `p_old`. Whole cells keep the contact sharp: interpolated
     between cells it would spread, which costs a solver more than being off by half a cell.
@@ -195,7 +195,7 @@ def travel(p, p_old, factor, factor_old, shift, out):
         moved[start:] = p_old[j, : nx - start]
         moved[:start] = p_old[j, nx - start :]
         for i in range(nx):
-            moved[i] = max(factor * p[j, i] - factor_old * moved[i], 0.0)
+            moved[i] = min(max(factor * p[j, i] - factor_old * moved[i], lower), upper)
         out[j, start:] = moved[: nx - start]
         out[j, :start] = moved[nx - start :]
 

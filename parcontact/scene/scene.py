@@ -20,7 +20,6 @@ from ..job import Job, extension
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics.body import ElasticBody, ZenerBody
-from ..physics.convolution import Convolution
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
 from ..physics.entries import Remembers
 from ..physics.folding import FoldedBranches
@@ -31,8 +30,11 @@ from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
 from ..physics.units import Units
+from ..solve.constraint import Constraint, NonNegative
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
+from ..solve.problem import Operators
+from ..solve.workspace import Workspace
 from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
 
 
@@ -90,6 +92,7 @@ class Scene:
     folded: FoldedBranches
     material: ElasticBody | ZenerBody
     solver: ContactSolver
+    operators: Operators
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
     lasts: bool
@@ -117,6 +120,10 @@ class Scene:
     @property
     def units(self) -> Units:
         return self.setup.units
+
+    def constraint(self, alpha: float) -> Constraint:
+        """Which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
+        return NonNegative()
 
 
 def effects(job: Job) -> list[Decision]:
@@ -148,26 +155,26 @@ def build(job: Job, slab: Slab, until: float = 0.0, base: Setup | None = None) -
     motion = _motion(base)
     branches = slab.agree(fold_branches_of(job, until))
     material = _material(base, branches)
-    solver = _solver(base, job.numerics.tolerance)
-    energy = _energy(base, solver, material) if decisions.energies(job).on else None
+    solver, operators = _solver(base, job.numerics.tolerance)
+    energy = _energy(base, solver, operators, material) if decisions.energies(job).on else None
     kept = decisions.lasting(job).on, decisions.further_starts(job).on
-    scene = Scene(base, motion, branches, material, solver, base.ledger(), energy, *kept)
+    scene = Scene(base, motion, branches, material, solver, operators, base.ledger(), energy, *kept)
     scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
     values_of(scene.followers)  # refuses those that do not fit, before anything is written
     return scene
 
 
-def solver_on(base: Setup, slab: Slab, tolerance: float) -> ContactSolver:
-    """A solver for the body of a setup on another grid, for a start or a retry; collective.
+def solver_on(base: Setup, slab: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
+    """A solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
 
-    Its transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give other
-    last digits.
+    Their transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give
+    other last digits.
     """
     return _solver(replace(base, slab=slab, fft=FFT(slab, measured=False)), tolerance)
 
 
-def solver_in_double(base: Setup) -> Callable[[], ContactSolver] | None:
-    """What makes a solver whose operator is in double precision, for a retry; None where that of the scene is."""
+def solver_in_double(base: Setup) -> Callable[[], tuple[ContactSolver, Operators]] | None:
+    """What makes a solver with an operator in double precision, for a retry; None where that of the scene is."""
     if not decisions.single_operator(base.job).on:
         return None
     numerics = base.job.numerics.model_copy(update={"precision": "double"})
@@ -209,29 +216,33 @@ def _material(base: Setup, branches: FoldedBranches) -> ElasticBody | ZenerBody:
     return ZenerBody(base.slab, base.prony, integrator, branches.memoryless, branches.frozen)
 
 
-def _solver(base: Setup, tolerance: float) -> ContactSolver:
+def _solver(base: Setup, tolerance: float) -> tuple[ContactSolver, Operators]:
+    """The contact solver with its workspace, and the operators of the body."""
     height, limit = base.height / base.units.height, base.job.numerics.max_iterations
     operators = _operators(base)
     grids = grids_for(base.job.grid.dx, base.job.grid.dy)
     kept = np.float32 if decisions.single_operator(base.job).on else np.float64
-    return ContactSolver(base.slab, *operators, height, tolerance, limit, grids, kept)
+    return ContactSolver(Workspace(base.slab, tolerance, kept), height, tolerance, limit, grids), operators
 
 
-def _operators(base: Setup) -> tuple[Convolution, Convolution]:
+def _operators(base: Setup) -> Operators:
     """The operator of the half space, and its preconditioner."""
     body = base.half_space
     if not decisions.mixed_precision(base.job).on:
-        return body.operator(base.fft), body.inverse(base.fft)
+        return Operators(body.operator(base.fft), body.inverse(base.fft))
     single = FFT(base.slab, dtype=np.float32, measured=base.fft.measured, lender=base.fft)
     own = single if decisions.single_operator(base.job).on else base.fft
-    return body.operator(own), body.inverse(single)
+    return Operators(body.operator(own), body.inverse(single))
 
 
-def _energy(base: Setup, solver: ContactSolver, material: ElasticBody | ZenerBody) -> ElasticEnergy | ZenerEnergy:
+def _energy(
+    base: Setup, solver: ContactSolver, operators: Operators, material: ElasticBody | ZenerBody
+) -> ElasticEnergy | ZenerEnergy:
     slab, grid, units = base.slab, base.job.grid, base.units
     unit = units.pressure * units.height * grid.dx * grid.dy
     if isinstance(material, ElasticBody):
         return ElasticEnergy(slab, unit)
     if decisions.energy_memory(base.job).on:
         return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)
-    return ZenerEnergy(slab, material, AppliedInverse(solver.preconditioner, lambda: solver.lend()[0]), unit)
+    inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.pressure)
+    return ZenerEnergy(slab, material, inverse, unit)

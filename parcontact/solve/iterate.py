@@ -3,9 +3,12 @@
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..parallel.slab import Array, Slab
-from . import kernels
 from .certificate import Certificate
+from .constraint import Constraint
 
 LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
 LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements that are only rounding
@@ -13,13 +16,16 @@ LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements
 
 @dataclass(frozen=True)
 class Iterate:
-    """An iterate in numbers, for an approach d: the sums of p, of `p (A p)^2` and of p g, and `energy = <p, A p>/2`."""
+    """An iterate in numbers, for an approach d: the sums of p, of `p (A p)^2` and of p g, the sums of p and of p g
+    over points that are free to move, and `energy = <p, A p>/2`."""
 
     d: float
     load: float
     gaps: float
     energy: float
     squares: float
+    free_load: float
+    free_gaps: float
 
     @property
     def f(self) -> float:
@@ -27,9 +33,12 @@ class Iterate:
         return self.gaps - self.energy
 
     def settled(self) -> "Iterate":
-        """The same iterate, for the d at which `<p, g> = 0`, but for the rounding of d."""
-        d = self.d + self.gaps / self.load
-        return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load)
+        """The same iterate, for the d at which `<p, g> = 0` over free points (over all if none is free), but for the
+        rounding of d."""
+        load, gaps = (self.free_load, self.free_gaps) if self.free_load > 0.0 else (self.load, self.gaps)
+        d = self.d + gaps / load
+        rest = self.free_gaps - (d - self.d) * self.free_load
+        return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load, free_gaps=rest)
 
     def length(self, height: float) -> float:
         """What gaps are compared with (`Certificate`): at most the surface's height, at least LEAST_HEIGHT of it."""
@@ -42,22 +51,30 @@ class Iterate:
 
 
 def certify(
-    slab: Slab, p: Array, u: Array, h: Array, iterate: Iterate, mean: float | None, height: float, working: Array
+    slab: Slab,
+    constraint: Constraint,
+    p: Array,
+    u: Array,
+    h: Array,
+    iterate: Iterate,
+    mean: float | None,
+    height: float,
+    working: NDArray[np.bool_],
 ) -> tuple[float, float, Certificate]:
     """Mark the working set of a pressure and its image u; its size, its sum of gaps, and the certificate; collective.
 
     `mean` is the mean pressure asked for, None with a given approach; `height` is that of the surface.
     """
-    *sums, deepest = kernels.certify(p, u, h, iterate.d, working)
-    wrong, members, excess, deepest = slab.reduce(sums, [deepest])
+    *sums, deepest = constraint.mark(p, u, h, iterate.d, working)
+    wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
     length = iterate.length(height)
     complementarity = wrong / (iterate.load or 1.0) / length
     load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
-    share = members / slab.points
+    share = (members + held) / slab.points
     return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length, share)
 
 
-def weigh(slab: Slab, p: Array, u: Array, h: Array, d: float) -> Iterate:
+def weigh(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
     """A pressure and its image u in numbers, for an approach d; collective."""
-    load, work, gaps, squares = slab.sum(*kernels.weigh(p, u, h, d))
-    return Iterate(d, load, gaps, 0.5 * work, squares)
+    load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.weigh(p, u, h, d))
+    return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps)

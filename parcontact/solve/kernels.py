@@ -4,8 +4,6 @@ Sums are taken row by row and then over rows, in double precision whatever the m
 length of a row and the number of rows, not with their product, and a mean over 4096 x 4096 points is good to 1e-14.
 """
 
-import numpy as np
-
 from ..compiled import loop
 
 
@@ -26,32 +24,6 @@ def weigh(p, u, h, d):
         squares += row_squares
         gaps += row_gaps
     return load, work, gaps, squares
-
-
-@loop
-def certify(p, u, h, d, working):
-    """Mark the working set: pressure, or penetration. With the gap `g = u - h - d`: sum of p |g|, over the working set
-    the count and the sum of g, and max(-g).
-
-    The lowest gap is kept for each column: that is as fast as a sum, which a single running minimum is not.
-    """
-    wrong, count, gaps = 0.0, 0.0, 0.0
-    lowest = np.full(p.shape[1], np.inf)
-    for j in range(p.shape[0]):
-        row_wrong, row_count, row_gaps = 0.0, 0.0, 0.0
-        for i in range(p.shape[1]):
-            gap = u[j, i] - h[j, i] - d
-            inside = (p[j, i] > 0.0) | (gap < 0.0)
-            working[j, i] = inside
-            weight = 1.0 if inside else 0.0
-            row_wrong += p[j, i] * abs(gap)
-            row_count += weight
-            row_gaps += weight * gap
-            lowest[i] = min(lowest[i], gap)
-        wrong += row_wrong
-        count += row_count
-        gaps += row_gaps
-    return wrong, count, gaps, -lowest.min()
 
 
 @loop
@@ -118,20 +90,6 @@ def total(a):
             row += a[j, i]
         result += row
     return result
-
-
-@loop
-def clip(p):
-    """`p <- max(p, 0)`; returns the sum of p."""
-    load = 0.0
-    for j in range(p.shape[0]):
-        row = 0.0
-        for i in range(p.shape[1]):
-            kept = 0.0 if p[j, i] < 0.0 else p[j, i]
-            p[j, i] = kept
-            row += kept
-        load += row
-    return load
 
 
 @loop

@@ -1,4 +1,4 @@
-"""Negative pressures cut off at 0, and the load that this adds taken back near by.
+"""The load that cutting off pressures at their bounds adds, taken back near by.
 
 A step makes pressures at the edges of contact negative, and 0 in their place adds load there. If all pressures were
 scaled by one factor to take it back, every spot would be lifted or lowered by its share of waves as long as the box: by
@@ -8,18 +8,15 @@ by only. From a cold start on 4096 x 4096 points that makes 22 of 57 application
 """
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..compiled import loop
 from ..parallel.regrid import fetch
 from ..parallel.slab import Array, Slab
+from .constraint import CELL, Constraint
 
-CELL = 16  # points along each side of a cell; 8 and 32 need a few iterations more
-LEAST = 3e-4  # of the load: if less is cut off, that disturbs no long wave, and is better taken from all points alike
-MOST = 0.5  # of the load of a cell: more is not taken from it
+LEAST = 3e-4  # tuning, of the load: less disturbs no long wave, and is better taken from all points alike
+MOST = 0.5  # tuning, of the load of a cell: more is not taken from it
 
 
 class LocalLoad:
@@ -39,15 +36,13 @@ class LocalLoad:
         self._above = slab.rows.start % CELL
         self._sums = np.zeros(self._stack.shape)
 
-    def advance(self, p_old: Array, t: Array, step: float, p: Array) -> tuple[float, float]:
-        """`p = max(p_old - step t, 0)`, which may be in the place of the old one; returns the sum of p and how much of
-        it was added by cutting off at 0; collective."""
-        _advance(p_old, t, step, p, self._above, self._sums)
-        loads, cuts = np.split(self._sums, 2, axis=1)
-        load, cut = self._slab.sum(float(loads.sum()), float(cuts.sum()))
+    def advance(self, constraint: Constraint, p_old: Array, t: Array, step: float, p: Array) -> tuple[float, float]:
+        """`p = p_old - step t`, cut off at the bounds, which may be in the place of the old one; returns the sum of p
+        and how much was cut off; collective."""
+        load, cut = self._slab.sum(*constraint.advance(p_old, t, step, p, self._above, self._sums))
         return load, cut
 
-    def restore(self, p: Array, load: float, total: float, near_by: bool) -> None:
+    def restore(self, constraint: Constraint, p: Array, load: float, total: float, near_by: bool) -> None:
         """Make `total` the sum of p, which is `load` since it was advanced: what was added is first taken back
         `near_by`, from the pressure of the same cell, but at most MOST of it; collective."""
         loads = np.split(self._sums, 2, axis=1)[0]
@@ -55,7 +50,7 @@ class LocalLoad:
         if near_by:
             shares = _shares(self._complete(self._sums))
             load -= self._slab.sum(float(np.sum(shares * loads)))[0]
-        _scale(p, self._above, total / load * (1.0 - shares))
+        constraint.restore(self._slab, p, load, total, 1.0 - shares, self._above)
 
     def _complete(self, own: Array) -> Array:
         """The sums over whole cells, of those that this rank has points of."""
@@ -70,44 +65,6 @@ def _rows_of_cells(part: slice) -> slice:
 
 
 def _shares(sums: Array) -> Array:
-    """What share of its load each cell gives back, from the loads and the cuts."""
+    """Which share of its load each cell gives back, from the loads and the cuts."""
     loads, cuts = np.split(sums, 2, axis=1)
-    return np.minimum(np.divide(cuts, loads, out=np.zeros_like(loads), where=loads > 0.0), MOST)
-
-
-@loop
-def _advance(p_old: Array, t: Array, step: float, p: Array, above: int, sums: Array) -> None:
-    """`p = max(p_old - step t, 0)`; the sums over cells of p, and beside them of what was added.
-
-    Rows of a cell are added up first, which is as fast as no sums at all.
-    """
-    columns = sums.shape[1] // 2
-    load, cut = np.zeros(p.shape[1]), np.zeros(p.shape[1])
-    sums[:] = 0.0
-    for j in range(p.shape[0]):
-        for i in range(p.shape[1]):
-            value = p_old[j, i] - step * t[j, i]
-            kept = 0.0 if value < 0.0 else value
-            p[j, i] = kept
-            load[i] += kept
-            cut[i] += kept - value
-        if (j + above + 1) % CELL == 0 or j + 1 == p.shape[0]:
-            row = sums[(j + above) // CELL]
-            for i in range(p.shape[1]):
-                row[i // CELL] += load[i]
-                row[columns + i // CELL] += cut[i]
-            load[:] = 0.0
-            cut[:] = 0.0
-
-
-@loop
-def _scale(p: NDArray[Any], above: int, factors: Array) -> None:
-    """Scale each pressure by the factor of its cell."""
-    line = np.empty(p.shape[1])
-    for j in range(p.shape[0]):
-        if j == 0 or (j + above) % CELL == 0:
-            row = factors[(j + above) // CELL]
-            for i in range(line.size):
-                line[i] = row[i // CELL]
-        for i in range(p.shape[1]):
-            p[j, i] *= line[i]
+    return np.clip(np.divide(cuts, loads, out=np.zeros_like(loads), where=loads > 0.0), -MOST, MOST)

@@ -33,17 +33,19 @@ def _from_steady_sliding(job: Job, slab: Slab, until: float) -> March:
     """A march in the steady state of its job's `initial` section; collective.
 
     Maps of the scene are made when those of the steady solver are gone, and the pressures of the march last: until then
-    the pressure waits in a map of the contact solver.
+    the pressure waits in a map of the workspace.
     """
     if decisions.energies(job).on:
         raise InputError("output.energy: energies count from a body at rest, so they need initial: {state: virgin}")
     base = set_up(job, slab)
     point, contact = _solve(base)
     scene = build(job, slab, until, base)
-    pressure, spare, _ = scene.solver.lend()
+    workspace = scene.solver.workspace
     if isinstance(scene.material, ZenerBody):
-        scene.material.begin_with(contact.u, branch_maps(base, contact, job.initial.velocity, spare))
-    pressure[...] = contact.p
+        scene.material.begin_with(
+            contact.u, branch_maps(base, contact, job.initial.velocity, workspace.other_displacement)
+        )
+    workspace.pressure[...] = contact.p
     iterations, approach = contact.steps, contact.d
     del contact
     march = March(scene)
@@ -56,7 +58,7 @@ def _from_steady_sliding(job: Job, slab: Slab, until: float) -> March:
         operator_calls=round(point.operator_calls),
         seconds=point.seconds,
     )
-    march.begin_with(State(row, pressure, None, 1.0, 1.0, approach))
+    march.begin_with(State(row, workspace.pressure, None, 1.0, 1.0, approach))
     return march
 
 

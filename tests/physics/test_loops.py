@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parcontact.physics import loops
 
 NY, NX = 5, 7
+BOUNDS = 0.0, np.inf
 OFFSETS = [0, 1, 3, NX - 1, NX, 2 * NX + 2, -1, -NX - 3]
 MAPS = [(NY, NX), (1, 1), (0, NX)]
 
@@ -86,12 +87,12 @@ def test_travel(shift: int) -> None:
     p, slope = np.maximum(maps(2), 0.0)
     earlier, now, next_ = (roll(np.maximum(p + n * slope, 0.0), n * shift) for n in range(3))
     kept, out = now.copy(), np.empty_like(now)
-    loops.travel(now, earlier, 2.0, 1.0, shift, out)
+    loops.travel(now, earlier, 2.0, 1.0, shift, *BOUNDS, out)
     assert_allclose(out, next_, rtol=1e-14, atol=1e-14)
     assert_array_equal(now, kept)
-    loops.travel(now, earlier, 2.0, 1.0, shift, earlier)
+    loops.travel(now, earlier, 2.0, 1.0, shift, *BOUNDS, earlier)
     assert_array_equal(earlier, out)
-    loops.travel(out, now, 1.0, 1e3, shift, out)
+    loops.travel(out, now, 1.0, 1e3, shift, *BOUNDS, out)
     assert out.min() == 0.0
 
 
@@ -100,7 +101,7 @@ def test_maps_of_either_precision(dtype: type[np.floating]) -> None:
     p, p_old = (np.maximum(field, 0.0).astype(dtype) for field in maps(2))
     expected = roll(np.maximum(2.0 * p - roll(p_old, 2), 0.0), 2)
     out = np.empty_like(p)
-    loops.travel(p, p_old, 2.0, 1.0, 2, out)
+    loops.travel(p, p_old, 2.0, 1.0, 2, *BOUNDS, out)
     assert_allclose(out, expected, rtol=1e-6, atol=1e-6)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from solve.bodies import solver, white
 
-from parcontact.solve.contact import MeanPressure
+from parcontact.solve.problem import MeanPressure
 
 
 @pytest.mark.parametrize(("aspect", "load"), [(2e3, 0.1), (1e-3, 50.0)])

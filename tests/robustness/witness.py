@@ -187,5 +187,5 @@ def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> fl
 def energy_of(march: March, pressure: Array) -> float:
     """`<p, A p>` of a map of pressures [Pa]; collective."""
     scene = march.scene
-    moved = scene.solver.operator.apply(np.ascontiguousarray(pressure), np.empty(scene.slab.shape))
+    moved = scene.operators.operator.apply(np.ascontiguousarray(pressure), np.empty(scene.slab.shape))
     return scene.slab.sum(float((pressure * moved).sum()))[0] * scene.units.length

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
 from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
 from mpi4py import MPI
@@ -16,7 +17,10 @@ from parcontact.physics.embedded import Embedded
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import WholeCells
 from parcontact.physics.slopes import friction_by_energy
-from parcontact.solve.contact import ContactSolver, MeanPressure
+from parcontact.solve.constraint import NonNegative
+from parcontact.solve.contact import ContactSolver
+from parcontact.solve.problem import MeanPressure, Operators, Problem
+from parcontact.solve.workspace import Workspace
 
 
 def bare(planned: Job) -> Counter[str]:
@@ -24,13 +28,13 @@ def bare(planned: Job) -> Counter[str]:
     slab = Slab(MPI.COMM_SELF, NX, NY)
     base = scene.set_up(planned, slab)
     heights = base.surface.heights((0.0, 0.0), slab.empty())
-    solver = bare_solver(base)
+    solver, operators = bare_solver(base)
     last, p = slab.zeros(), slab.zeros()
     ledger = Ledger(slab, base.surface, base.units)
     for stage in planned.history:
         load = MeanPressure(stage.load.end / (base.prony.modulus_inf * base.units.pressure))
         p[...] = last
-        contact = solver.solve(heights, load, p)
+        contact = solver.solve(Problem(*operators, heights, NonNegative(), load), p)
         last, p = p, last
         ledger.measures(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, (0.0, 0.0))
     return slab.tally.copy()
@@ -43,7 +47,7 @@ def lasting(planned: Job) -> Counter[str]:
     path = WholeCells(base.surface)
     memory = base.prony.moduli.size > 0
     body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
-    solver = bare_solver(base)
+    solver, operators = bare_solver(base)
     ledger = Ledger(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
     moduli, cells, dt = [0.0, 0.0], 0, -1.0
@@ -52,9 +56,10 @@ def lasting(planned: Job) -> Counter[str]:
         trial = body.begin(step.dt, heights)
         alpha = trial.alpha
         now, before = (1.0 + step.growth) * moduli[1] / alpha, step.growth * moduli[0] / alpha
-        loops.travel(last, earlier, now, before, heights.offset - cells, p)
+        loops.travel(last, earlier, now, before, heights.offset - cells, 0.0, np.inf, p)
         moduli, cells = [moduli[1], alpha], heights.offset
-        contact = solver.solve(trial.effective, MeanPressure(step.load / (alpha * base.units.pressure)), p)
+        load_of_step = MeanPressure(step.load / (alpha * base.units.pressure))
+        contact = solver.solve(Problem(*operators, trial.effective, NonNegative(), load_of_step), p)
         found = ledger.measures(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
         body.commit(trial, contact.u)
         if isinstance(body, ZenerBody) and step.dt != dt:
@@ -67,9 +72,9 @@ def lasting(planned: Job) -> Counter[str]:
     return slab.tally.copy()
 
 
-def bare_solver(base: scene.Setup) -> ContactSolver:
-    operator, inverse = base.half_space.operator(base.fft), base.half_space.inverse(base.fft)
-    return ContactSolver(base.slab, operator, inverse, base.height / base.units.height, 1e-15, ITERATIONS)
+def bare_solver(base: scene.Setup) -> tuple[ContactSolver, Operators]:
+    operators = Operators(base.half_space.operator(base.fft), base.half_space.inverse(base.fft))
+    return ContactSolver(Workspace(base.slab, 1e-15), base.height / base.units.height, 1e-15, ITERATIONS), operators
 
 
 def test_elastic_static() -> None:

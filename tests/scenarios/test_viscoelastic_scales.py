@@ -155,7 +155,7 @@ def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
 
 def applied(march: March, field: np.ndarray) -> np.ndarray:
     out = np.empty_like(field)
-    return march.scene.solver.operator.apply(np.ascontiguousarray(field), out)
+    return march.scene.operators.operator.apply(np.ascontiguousarray(field), out)
 
 
 def inverse(march: March, index: int) -> np.ndarray:
@@ -168,7 +168,7 @@ def inverse(march: March, index: int) -> np.ndarray:
         memory = energy.inverse.body
         return [memory.u, *memory.branches][index]
     field = [body.u, *body.branches][index]
-    return scene.solver.preconditioner.apply(field, np.empty_like(field))
+    return scene.operators.preconditioner.apply(field, np.empty_like(field))
 
 
 def test_energy_costs_nothing_unless_asked_for() -> None:

@@ -33,7 +33,8 @@ from parcontact import scene
 from parcontact.history.timeline import Timeline
 from parcontact.march import step
 from parcontact.solve import contact as contact_solver
-from parcontact.solve.contact import Approach
+from parcontact.solve.constraint import NonNegative
+from parcontact.solve.problem import Approach, Problem
 
 
 @pytest.fixture
@@ -41,7 +42,7 @@ def iterations_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """How often the load is restored near by, which takes a message, and a step is made exact, which takes an operator
     call, depends on the pressures."""
     monkeypatch.setattr(contact_solver, "LEAST", math.inf)
-    monkeypatch.setattr(contact_solver, "UNLIKE", math.inf)
+    monkeypatch.setattr(contact_solver, "MAX_STEP_RATIO", math.inf)
 
 
 def test_every_row_has_a_test() -> None:
@@ -235,7 +236,8 @@ def test_displacement_control() -> None:
     solver, slab = march.scene.solver, march.scene.slab
     spent = slab.tally["allreduce"]
     heights = march.scene.motion.at((0.0, 0.0)).base
-    solver.solve(heights, Approach(-5e-7 / march.scene.units.height), slab.zeros())
+    control = Approach(-5e-7 / march.scene.units.height)
+    solver.solve(Problem(*march.scene.operators, heights, NonNegative(), control), slab.zeros())
     of_solve = slab.tally["allreduce"] - spent
     of_measures = 2
     before = begun(planned).scene.slab.tally["allreduce"]

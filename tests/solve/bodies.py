@@ -1,6 +1,6 @@
 """Small contact problems in the units of a solver: a box of length 1, a body of shear modulus 1."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -8,11 +8,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
-from parcontact.parallel.slab import Slab
+from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
 from parcontact.solve.certificate import Certificate
-from parcontact.solve.contact import Contact, ContactSolver, MeanPressure
+from parcontact.solve.constraint import Constraint, NonNegative
+from parcontact.solve.contact import Contact, ContactSolver
+from parcontact.solve.problem import Approach, MeanPressure, Operator, Operators, Problem
+from parcontact.solve.workspace import Workspace
 
 Map = NDArray[np.float64]
 TIGHT = 1e-11  # a certificate to this makes pressures agree to 1e-9 of the highest
@@ -29,7 +32,7 @@ def solver(
     tolerance: float = 1e-6,
     max_iterations: int = 500,
     poisson: float = 0.5,
-) -> ContactSolver:
+) -> "Bench":
     """A solver for maps of the shape of `heights`, on one rank."""
     ny, nx = heights.shape
     slab = Slab(MPI.COMM_SELF, nx, ny)
@@ -37,7 +40,31 @@ def solver(
     half_space = HalfSpace(size, poisson, "love" if kernel == "love" else "spectral", boundary == "free")
     height = float(np.ptp(heights)) or size[0] / nx
     operator, inverse = half_space.operator(fft), half_space.inverse(fft)
-    return ContactSolver(slab, operator, inverse, height, tolerance, max_iterations)
+    return Bench(ContactSolver(Workspace(slab, tolerance), height, tolerance, max_iterations), operator, inverse)
+
+
+@dataclass
+class Bench:
+    """A solver and the operators of a body, and what its pressures must obey."""
+
+    solver: ContactSolver
+    operator: Operator
+    preconditioner: Operator
+    constraint: Constraint = field(default_factory=NonNegative)
+
+    @property
+    def slab(self) -> Slab:
+        return self.solver.slab
+
+    @property
+    def operators(self) -> Operators:
+        return Operators(self.operator, self.preconditioner)
+
+    def problem(self, h: Array, control: MeanPressure | Approach) -> Problem:
+        return Problem(self.operator, self.preconditioner, h, self.constraint, control)
+
+    def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
+        return self.solver.solve(self.problem(h, control), start, length)
 
 
 def rough(points: int, seed: int = 1) -> Map:

@@ -10,10 +10,16 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
+from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import active_set
+from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.solve.workspace import Workspace
 
-from .bodies import TIGHT, keep, rough, solver, white
+from .bodies import TIGHT, Bench, keep, rough, solver, white
+
+
+def found_by_sets(body: Bench, h: Any, control: MeanPressure | Approach, start: float = 0.0) -> Contact:
+    return active_set.solve(body.solver, body.problem(h, control), np.full_like(h, start))
 
 
 @pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])
@@ -27,7 +33,7 @@ def test_agrees_with_the_projected_method(boundary: str, kernel: str, mean: floa
     if np.count_nonzero(expected.p) < h.size or boundary == "free":
         controls.append(Approach(expected.d))
     for control in controls:
-        found = active_set.solve(solver(h, **options), h, control, np.zeros_like(h))
+        found = found_by_sets(solver(h, **options), h, control)
         assert found.converged
         assert found.certificate.worst <= TIGHT
         assert_allclose(found.p, expected.p, rtol=0, atol=1e-9 * expected.p.max())
@@ -46,7 +52,7 @@ def test_cells_much_longer_than_wide(seed: int, stretch: float, control: str) ->
     body = solver(h, (1.0, stretch), tolerance=1e-8)
     pressure = body.preconditioner.apply(h - h.mean(), np.empty_like(h))
     half: MeanPressure | Approach = MeanPressure(-0.5 * pressure.min()) if control == "load" else Approach(-h.max() / 2)
-    found = active_set.solve(body, h, half, np.zeros_like(h))
+    found = found_by_sets(body, h, half)
     assert found.converged
     assert found.certificate.worst <= 1e-8
     assert found.p.min() >= 0.0
@@ -59,7 +65,7 @@ def test_from_full_contact_to_none() -> None:
     nowhere, so that nothing says how far to go."""
     h = rough(64)
     body = solver(h)
-    found = active_set.solve(body, h, Approach(-1.01 * h.max()), np.ones_like(h))
+    found = found_by_sets(body, h, Approach(-1.01 * h.max()), 1.0)
     assert found.converged
     assert np.all(found.p == 0.0)
     assert found.iterations == 0  # what would not penetrate the undeformed body is no set to begin with
@@ -71,7 +77,7 @@ def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
     h, load = rough(64), MeanPressure(0.5)
     body = solver(h)
     x = np.full_like(h, 0.5)
-    search = active_set._Search(body, h, load, x)
+    search = active_set._Search(body.solver, body.problem(h, load), x)
     search.working = h > 0.5 * h.max()
     u = np.empty_like(h)
     assert 5 < search.solve_on_set(u, 1e-9) < 50
@@ -83,7 +89,7 @@ def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
 def test_it_says_when_it_has_found_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(active_set, "SETS", 1)
     h = rough(64)
-    found = active_set.solve(solver(h), h, MeanPressure(0.1), np.zeros_like(h))
+    found = found_by_sets(solver(h), h, MeanPressure(0.1))
     assert found.failure == "found no contact among 1 sets of points"
     assert found.certificate.worst > 1e-6
 
@@ -98,8 +104,9 @@ def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approa
         fft, size = FFT(slab), (1.0, 12.5)
         h = slab.empty()
         h[...] = white((3, 24), 5)[slab.rows]
-        body = ContactSolver(slab, HalfSpace(size).operator(fft), HalfSpace(size).inverse(fft), 1.0, 1e-11, 500)
-        return slab, active_set.solve(body, h, control, slab.zeros())
+        solving = ContactSolver(Workspace(slab, 1e-11), 1.0, 1e-11, 500)
+        body = Bench(solving, HalfSpace(size).operator(fft), HalfSpace(size).inverse(fft))
+        return slab, found_by_sets(body, h, control)
 
     slab, together = solved(comm)
     _, alone = solved(MPI.COMM_SELF)

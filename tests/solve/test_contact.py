@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from parcontact.solve import certificate
-from parcontact.solve.contact import Approach, MeanPressure
+from parcontact.solve.problem import Approach, MeanPressure
 
 from . import polonsky_keer
 from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, keep, rough, solve, solver, white

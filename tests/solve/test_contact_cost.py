@@ -8,8 +8,9 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.contact import MeanPressure
+from parcontact.solve.constraint import Constraint
 from parcontact.solve.local_load import LocalLoad
+from parcontact.solve.problem import MeanPressure
 
 from .bodies import Map, keep, rough, solve, solver
 
@@ -34,9 +35,9 @@ def test_cost_of_an_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
     solving = solver(h)
     before, restore = solving.slab.tally.copy(), LocalLoad.restore
 
-    def note(local: LocalLoad, p: Map, load: float, total: float, near_by: bool) -> None:
+    def note(local: LocalLoad, constraint: Constraint, p: Map, load: float, total: float, near_by: bool) -> None:
         taken.extend([load] * near_by)
-        restore(local, p, load, total, near_by)
+        restore(local, constraint, p, load, total, near_by)
 
     monkeypatch.setattr(LocalLoad, "restore", note)
     found = solving.solve(h, MeanPressure(0.4), np.zeros_like(h))

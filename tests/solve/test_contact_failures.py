@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
 from parcontact.solve import contact
-from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
+from parcontact.solve.contact import ContactSolver
+from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.solve.workspace import Workspace
 
-from .bodies import rough, solver, white
+from .bodies import Bench, rough, solver, white
 
 # -- the safeguard -----------------------------------------------------------------------------------------------------
 
@@ -45,7 +47,8 @@ def test_without_halving_steps_it_may_cycle(
     h = np.array([heights])
 
     def attempt() -> contact.Contact:
-        body = ContactSolver(Slab(MPI.COMM_SELF, 5, 1), Dense(matrix), Dense(np.eye(5).tolist()), 10.0, 1e-8, 500)
+        solving = ContactSolver(Workspace(Slab(MPI.COMM_SELF, 5, 1), 1e-8), 10.0, 1e-8, 500)
+        body = Bench(solving, Dense(matrix), Dense(np.eye(5).tolist()))
         return body.solve(h, control, np.zeros_like(h))
 
     guarded = attempt()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from parcontact.solve.contact import MeanPressure
+from parcontact.solve.problem import MeanPressure
 
 from .bodies import BODIES, TIGHT, keep, rough, solve, solver, white
 
@@ -36,7 +36,7 @@ def test_scaling_by_powers_of_two_is_exact(factor: float) -> None:
     h = rough(48)
     body = solver(h)
     found = keep(body.solve(h, MeanPressure(0.4), np.zeros_like(h)))
-    body.height *= factor
+    body.solver.height *= factor
     scaled = keep(body.solve(factor * h, MeanPressure(factor * 0.4), np.zeros_like(h)))
     assert np.array_equal(scaled.p, factor * found.p)
     assert scaled.d == factor * found.d

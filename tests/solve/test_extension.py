@@ -67,7 +67,7 @@ def test_extends_by_means_over_cells_of_all_sizes(ny: int, nx: int, filled: floa
     r = np.where(c, random.normal(size=(ny, nx)), 0.0)
     z = slab.empty()
     z[...] = r[slab.rows]
-    ExtendedPreconditioner(slab, inverse).apply(c[slab.rows].copy(), z)
+    ExtendedPreconditioner(slab).apply(inverse, c[slab.rows].copy(), z)
     if c.size > 1:
         expected = extended(r, c.astype(float), np.ones(c.shape))
         np.testing.assert_allclose(inverse.given, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
@@ -80,14 +80,14 @@ def test_brings_back_by_the_transpose(ny: int, nx: int, seed: int) -> None:
     """`<r, E' K E s> = <E r, K E s>` for any residuals r and s on the set, to single precision."""
     random = np.random.default_rng([ny, nx, seed])
     slab, inverse = Slab(MPI.COMM_WORLD, nx, ny), Doubling()
-    extended = ExtendedPreconditioner(slab, inverse)
+    extended = ExtendedPreconditioner(slab)
     c = (random.random((ny, nx)) < 0.2)[slab.rows].copy()
     r, s = (np.where(c, random.normal(size=(ny, nx))[slab.rows], 0.0) for _ in range(2))
     z = r.copy()
-    extended.apply(c, z)
+    extended.apply(inverse, c, z)
     r_extended = inverse.given
     z[...] = s
-    extended.apply(c, z)
+    extended.apply(inverse, c, z)
     left, right, size = slab.sum(
         float(np.sum(r * np.where(c, z, 0.0))),
         float(np.sum(r_extended * 2.0 * inverse.given)),
@@ -102,5 +102,5 @@ def test_holds_what_it_says(shape: tuple[int, int]) -> None:
     """To the byte, on every rank."""
     comm = MPI.COMM_WORLD
     slab = Slab(comm, shape[1], shape[0])
-    _held = ExtendedPreconditioner(slab, Doubling())
+    _held = ExtendedPreconditioner(slab)
     assert slab.tally["map bytes"] == ExtendedPreconditioner.footprint(shape[1], shape[0], comm.size, comm.rank)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from parcontact.solve import kernels
+from parcontact.solve import constraint, kernels
 
 pytestmark = pytest.mark.parametrize("dtype", [np.float64, np.float32])
 SHAPES = pytest.mark.parametrize("shape", [(7, 33), (1, 1), (3, 64), (0, 16)])
@@ -51,7 +51,7 @@ def test_weigh(shape: tuple[int, int], dtype: type[np.floating]) -> None:
 def test_certify(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
     working = np.ones(shape, dtype=np.bool_)
-    wrong, count, gaps, deepest = kernels.certify(maps.p, maps.u, maps.h, 0.25, working)
+    wrong, count, gaps, deepest = constraint.mark(maps.p, maps.u, maps.h, 0.25, working)
     p, gap = maps.wide("p"), maps.wide("u") - maps.wide("h") - 0.25
     assert np.array_equal(working, (p > 0) | (gap < 0))
     assert maps.close(wrong, p * np.abs(gap))
@@ -100,7 +100,7 @@ def test_dot_and_total(shape: tuple[int, int], dtype: type[np.floating]) -> None
 def test_clip(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
     before, expected = maps.wide("z").copy(), np.maximum(maps.z, 0.0)
-    load = kernels.clip(maps.z)
+    load = constraint.clip(maps.z)
     assert np.array_equal(maps.z, expected)
     assert maps.close(load, np.maximum(before, 0.0))
 
@@ -118,7 +118,7 @@ def test_sums_are_double_whatever_the_maps_are(dtype: type[np.floating]) -> None
     p = np.full((1000, 1000), 0.1, dtype=dtype)
     zero = np.zeros_like(p)
     exact = 1e6 * float(p[0, 0])
-    for found in (kernels.total(p), kernels.weigh(p, zero, zero, 0.0)[0], kernels.clip(p)):
+    for found in (kernels.total(p), kernels.weigh(p, zero, zero, 0.0)[0], constraint.clip(p)):
         assert abs(found / exact - 1.0) < 1e-14
 
 
@@ -127,10 +127,10 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
     for name in ("p", "u", "h"):
         maps = Maps((5, 32), dtype)
         getattr(maps, name)[2, 3] = np.nan
-        assert np.isnan(kernels.certify(maps.p, maps.u, maps.h, 0.0, maps.working)[0])
+        assert np.isnan(constraint.mark(maps.p, maps.u, maps.h, 0.0, maps.working)[0])
         assert np.isnan(kernels.weigh(maps.p, maps.u, maps.h, 0.0)[2])
     maps = Maps((5, 32), dtype)
     maps.t[2, 3] = np.nan
-    assert np.isnan(kernels.clip(maps.t))
+    assert np.isnan(constraint.clip(maps.t))
     assert np.isnan(maps.t[2, 3])
     assert np.isnan(kernels.dot(maps.t, maps.t))

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
-from parcontact.solve.local_load import CELL, MOST, LocalLoad
+from parcontact.solve.constraint import CELL, NonNegative
+from parcontact.solve.local_load import MOST, LocalLoad
 
 Map = NDArray[np.float64]
 ROUNDING, TOTAL = 1e-13, 3.0
@@ -23,9 +24,9 @@ def cut_off(values: Map, near_by: bool = True) -> tuple[slice, Map, float, float
     slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
     p, t = values[slab.rows] + 2.0, np.full(values[slab.rows].shape, 4.0)
     local = LocalLoad(slab)
-    load, cut = local.advance(p, t, 0.5, p)
+    load, cut = local.advance(NonNegative(), p, t, 0.5, p)
     if load > 0.0:
-        local.restore(p, load, TOTAL, near_by)
+        local.restore(NonNegative(), p, load, TOTAL, near_by)
     return slab.rows, p, load, cut
 
 

@@ -6,6 +6,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
+from parcontact.solve.constraint import NonNegative
 from parcontact.solve.nonsymmetric.projected import Projected
 
 Map = NDArray[np.float64]
@@ -40,7 +41,7 @@ def test_goes_where_the_residual_is_smallest() -> None:
     basis, _ = np.linalg.qr(random.normal(size=(n, n)))
     skew = random.normal(size=(n, n))
     A = basis @ np.diag(np.geomspace(0.2, 5.0, n)) @ basis.T + 0.2 * (skew - skew.T)
-    steps = Projected(slab, Dense(A), Scaled(1.0))
+    steps = Projected(slab, Dense(A), Scaled(1.0), NonNegative())
     x = np.full((ny, nx), 100.0)
     h = (A @ (x.ravel() + random.normal(size=n))).reshape(ny, nx)
     u, working = slab.empty(), np.ones((ny, nx), dtype=np.bool_)
@@ -65,7 +66,7 @@ def test_goes_where_the_residual_is_smallest() -> None:
 
 def test_pressures_are_cut_off_and_stay_on_the_set() -> None:
     slab = Slab(MPI.COMM_SELF, 4, 3)
-    steps = Projected(slab, Scaled(1.0), Scaled(1.0))
+    steps = Projected(slab, Scaled(1.0), Scaled(1.0), NonNegative())
     working = np.ones((3, 4), dtype=np.bool_)
     working[0, 0] = False
     x = np.full((3, 4), 0.1)

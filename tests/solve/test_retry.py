@@ -11,33 +11,35 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.contact import Approach, ContactSolver, MeanPressure
+from parcontact.solve.contact import ContactSolver
 from parcontact.solve.fallback import retry
 from parcontact.solve.fallback.cold_start import start_on_coarse_grids
+from parcontact.solve.problem import Approach, MeanPressure, Operators
+from parcontact.solve.workspace import Workspace
 
-from .bodies import Map, rough, solver
+from .bodies import Bench, Map, rough, solver
 
 LOAD = MeanPressure(0.4)
 
 
-def factory(height: float, **options: Any) -> Callable[[Slab, float], ContactSolver]:
-    """Solvers of one body on any grid."""
+def factory(height: float, **options: Any) -> Callable[[Slab, float], tuple[ContactSolver, Operators]]:
+    """Solvers of one body on any grid, and its operators."""
 
-    def on(slab: Slab, tolerance: float) -> ContactSolver:
+    def on(slab: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
         fft = FFT(slab, measured=False)
         half_space = HalfSpace((1.0, 1.0))
-        operator, inverse = half_space.operator(fft), half_space.inverse(fft)
-        return ContactSolver(slab, operator, inverse, height, tolerance, 500, **options)
+        operators = Operators(half_space.operator(fft), half_space.inverse(fft))
+        return ContactSolver(Workspace(slab, tolerance), height, tolerance, 500, **options), operators
 
     return on
 
 
-def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options: Any) -> tuple[ContactSolver, Any, Any]:
+def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options: Any) -> tuple[Bench, Any, Any]:
     """A solver after a solve that failed and its retry: the solver, the first contact, what came of the second."""
     body = solver(h, **options)
     first = body.solve(h, control, np.zeros_like(h))
     assert first.failure
-    return body, first, retry.again(body, h, control, first, factory(np.ptp(h)))
+    return body, first, retry.again(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
 
 
 def test_shorter_steps_go_on_from_where_it_stood() -> None:
@@ -60,7 +62,7 @@ def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float
     start[3, 4] = bad
     with np.errstate(invalid="ignore"):
         first = body.solve(h, control, start)
-        contact, tried = retry.again(body, h, control, first, factory(np.ptp(h)))
+        contact, tried = retry.again(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
     expected = good.solve(h, control, np.zeros_like(h))
     assert "not finite" in first.failure
     assert tried == ["a cold start on 3 nested grids"]
@@ -74,7 +76,7 @@ def test_a_nested_start_saves_iterations() -> None:
     cold = solver(h).solve(h, LOAD, np.zeros_like(h)).iterations
     body = solver(h)
     start = np.zeros_like(h)
-    assert start_on_coarse_grids(body, h, LOAD, start, factory(np.ptp(h))) == 4
+    assert start_on_coarse_grids(body.solver, body.problem(h, LOAD), start, factory(np.ptp(h))) == 4
     assert 0 < body.slab.tally["operator"] <= 10  # all coarse grids cost no more than so many calls on the finest one
     assert body.solve(h, LOAD, start).iterations <= 0.8 * cold
 
@@ -93,7 +95,9 @@ def test_heights_that_are_not_finite_cannot_be_helped() -> None:
     body = solver(h)
     h[0, 0] = np.nan
     with np.errstate(invalid="ignore"):
-        contact, tried = retry.again(body, h, LOAD, body.solve(h, LOAD, np.zeros_like(h)), factory(1.0))
+        contact, tried = retry.again(
+            body.solver, body.problem(h, LOAD), body.solve(h, LOAD, np.zeros_like(h)), factory(1.0)
+        )
     assert "not finite" in contact.failure
     assert len(tried) == 1
 
@@ -106,7 +110,7 @@ def test_grids_that_cannot_be_halved(shape: tuple[int, int], control: MeanPressu
     body = solver(h, tolerance=1e-9)
     with np.errstate(invalid="ignore"):
         first = body.solve(h, control, np.full_like(h, np.inf))
-        contact, tried = retry.again(body, h, control, first, factory(np.ptp(h)))
+        contact, tried = retry.again(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
     assert contact.converged
     grids = {37: 1, 1: 2, 6: 3}[shape[0]]
     assert tried == ["a cold start" if grids == 1 else f"a cold start on {grids} nested grids"]
@@ -118,10 +122,11 @@ def test_all_ranks_agree(comm: MPI.Intracomm) -> None:
     whole = rough(64)
     slab = Slab(comm, 64, 64)
     h = whole[slab.rows].copy()
-    body = factory(np.ptp(whole))(slab, 1e-9)
+    solving, operators = factory(np.ptp(whole))(slab, 1e-9)
+    body = Bench(solving, *operators)
     with np.errstate(invalid="ignore"):
         first = body.solve(h, LOAD, np.full_like(h, np.inf))
-        contact, _ = retry.again(body, h, LOAD, first, factory(np.ptp(whole)))
+        contact, _ = retry.again(body.solver, body.problem(h, LOAD), first, factory(np.ptp(whole)))
     alone = solver(whole, tolerance=1e-9).solve(whole, LOAD, np.zeros_like(whole))
     assert contact.converged
     assert_allclose(contact.p, alone.p[slab.rows], atol=1e-7 * alone.p.max())
@@ -134,7 +139,9 @@ def test_an_operator_in_double_precision() -> None:
     body, enough = solver(h), solver(h).solve(h, approach, np.zeros_like(h)).iterations
     first = body.solve(h, approach, np.full_like(h, np.nan))
     double, before = solver(h, max_iterations=enough - 1), body.slab.tally["operator"]
-    contact, tried = retry.again(body, h, approach, first, factory(np.ptp(h)), lambda: double)
+    contact, tried = retry.again(
+        body.solver, body.problem(h, approach), first, factory(np.ptp(h)), lambda: (double.solver, double.operators)
+    )
     assert not np.isfinite(first.certificate.worst)
     assert contact.converged
     assert tried == ["an operator in double precision", "shorter steps"]

@@ -14,7 +14,7 @@ from conftest import WORLD
 
 from parcontact import __main__
 from parcontact.job import load_cases
-from parcontact.solve import kernels
+from parcontact.solve import constraint
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.measures import read
 from parcontact.summary import sweep_table
@@ -170,7 +170,7 @@ def test_curve_beside_a_run(main: Main, tmp_path: Path) -> None:
 
 def test_point_without_load(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no point is left that carries load, this point of the curve fails, and the others are solved."""
-    clip, speed = kernels.clip, [0.0]
+    clip, speed = constraint.clip, [0.0]
     solve = SteadySliding.solve
 
     def noted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
@@ -183,7 +183,7 @@ def test_point_without_load(main: Main, tmp_path: Path, monkeypatch: pytest.Monk
         return clip(x)
 
     monkeypatch.setattr(SteadySliding, "solve", noted)
-    monkeypatch.setattr(kernels, "clip", cut)
+    monkeypatch.setattr(constraint, "clip", cut)
     code, said = main(*CURVE)
     assert code == FAILED
     assert said.count("steady sliding at 0.1 m/s under") == 2

@@ -17,28 +17,29 @@ from numpy.typing import NDArray
 
 from ...parallel.slab import Array
 from .. import kernels
-from ..contact import Approach, Contact, ContactSolver, MeanPressure
+from ..contact import Contact, ContactSolver
+from ..problem import Problem
 
 SETS = 40  # guesses after which to give up
 BUDGET = 4  # times max_iterations, for all sets together: nothing is left to be tried after this
 SHARE = 0.1  # of the tolerance: the largest gap on a set to which its linear problem is solved
 
 
-def solve(solver: ContactSolver, h: Array, control: MeanPressure | Approach, start: Array) -> Contact:
-    """As `ContactSolver.solve`, of whose problem it is, for a load that is not 0; collective.
+def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
+    """Solve as `ContactSolver.solve`, for a load that is not 0; collective.
 
     Iterations are those of the linear problems.
     """
-    search = _Search(solver, h, control, start)
-    contact, iterations = solver.judge(h, control, start, ""), 0
+    search = _Search(solver, problem, start)
+    contact, iterations = solver.judge(problem, start, ""), 0
     search.begin(contact)
     for count in range(1, SETS + 1):
         iterations += search.solve_on_set(contact.u, SHARE * solver.tolerance * contact.certificate.length)
         chosen = search.next_set(contact.u)
-        np.maximum(start, 0.0, out=start)
+        problem.constraint.clip(start)
         limit = BUDGET * solver.max_iterations
         spent = f" in {BUDGET} times max_iterations = {limit}" if iterations >= limit else ""
-        contact = solver.judge(h, control, start, f"found no contact among {count} sets of points{spent}")
+        contact = solver.judge(problem, start, f"found no contact among {count} sets of points{spent}")
         if contact.converged or spent or not np.isfinite(contact.certificate.worst):
             break
         search.working = chosen
@@ -46,38 +47,38 @@ def solve(solver: ContactSolver, h: Array, control: MeanPressure | Approach, sta
 
 
 class _Search:
-    """On the set `working`: the pressure x, and in maps lent by the solver a direction t, the residual r and w."""
+    """The pressure x on the set `working`; the direction, the residual and images are in maps of the workspace."""
 
-    def __init__(self, solver: ContactSolver, h: Array, control: MeanPressure | Approach, x: Array) -> None:
-        self.solver, self.h, self.slab, self.x = solver, h, solver.slab, x
-        self.load = control.value * self.slab.points if isinstance(control, MeanPressure) else None
-        self.d = 0.0 if self.load is not None else control.value
+    def __init__(self, solver: ContactSolver, problem: Problem, x: Array) -> None:
+        self.solver, self.problem, self.h, self.slab, self.x = solver, problem, problem.heights, solver.slab, x
+        self.load = None if problem.mean is None else problem.mean * self.slab.points
+        self.d = 0.0 if self.load is not None else problem.control.value
         self.working = np.zeros(x.shape, np.bool_)
         self.members = 0.0
 
     def begin(self, contact: Contact) -> None:
         """The first set: contact and what penetrates. All points with a given approach, a problem that may have no
         solution, become those that would penetrate the undeformed body."""
-        kernels.certify(self.x, contact.u, self.h, contact.d, self.working)
+        self.problem.constraint.mark(self.x, contact.u, self.h, contact.d, self.working)
         if self.load is None and self._count() == self.slab.points:
             self.working[...] = self.h + self.d > 0.0
 
     def solve_on_set(self, u: Array, goal: float) -> int:
         """Conjugate gradients on the set, from the last x, to no gap larger than `goal`, with `u = A x` in the end;
         returns their number."""
-        solver, slab, x, working = self.solver, self.slab, self.x, self.working
-        w, r, t = solver.lend()
+        problem, maps, slab, x, working = self.problem, self.solver.workspace, self.slab, self.x, self.working
+        w, r, t = maps.pressure, maps.other_displacement, maps.direction
         product = 0.0
         self._restrict(u)
         t.fill(0.0)
         iterations = 0
-        while self._residual(u, r) > goal and iterations < solver.max_iterations:
-            z = solver.preconditioner.apply(r, w)
+        while self._residual(u, r) > goal and iterations < self.solver.max_iterations:
+            z = problem.preconditioner.apply(r, w)
             sum_z, sum_t, _, r_z, _, _ = slab.sum(*kernels.products(working, u, self.h, self.d, u, z, t))
             beta, product = r_z / product if product > 0.0 else 0.0, r_z
             mean = (sum_z + beta * sum_t) / self.members if self.load is not None else 0.0
             kernels.turn(working, z, beta, mean, t)
-            change = solver.operator.apply(t, w)
+            change = problem.operator.apply(t, w)
             slope, curvature = slab.sum(kernels.dot(r, t), kernels.dot(t, change))
             if not (slope > 0.0 and curvature > 0.0):
                 break
@@ -89,7 +90,7 @@ class _Search:
 
     def next_set(self, u: Array) -> NDArray[np.bool_]:
         """Points of the set that are pressed, others that are penetrated."""
-        return np.where(self.working, self.x > 0.0, u - self.h - self.d < 0.0)
+        return self.problem.constraint.next_set(self.x, u - self.h - self.d, self.working)
 
     # -- parts ---------------------------------------------------------------------------------------------------------
 
@@ -97,13 +98,14 @@ class _Search:
         return self.slab.sum(float(np.count_nonzero(self.working)))[0]
 
     def _restrict(self, u: Array) -> None:
-        """x = 0 outside the set, and the load, if it is given, made up for on it; `u = A x`."""
+        """x at a bound outside the set, and the load, if it is given, made up for on it; `u = A x`."""
         x, working = self.x, self.working
-        x *= working
+        lower, upper = self.problem.constraint.bounds
+        x[...] = np.where(working, x, np.where(x < upper, lower, upper))
         self.members, total = self.slab.sum(float(np.count_nonzero(working)), kernels.total(x))
         if self.load is not None:
             x += (self.load - total) / self.members * working
-        self.solver.operator.apply(x, u)
+        self.problem.operator.apply(x, u)
 
     def _residual(self, u: Array, r: Array) -> float:
         """Put the gap on the set into r, for the d at which its mean is 0 unless that is given; its largest size."""

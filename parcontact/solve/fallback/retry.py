@@ -11,31 +11,30 @@ from itertools import islice
 
 import numpy as np
 
-from ...parallel.slab import Array
 from ..contact import Contact, ContactSolver
+from ..problem import Operators, Problem
 from . import active_set
-from .cold_start import Control, SolverOn, start_on_coarse_grids
+from .cold_start import SolverOn, start_on_coarse_grids
 
 SHORT = 0.5  # length of a safeguarded step over the exact one
 
 
 def again(
     solver: ContactSolver,
-    h: Array,
-    control: Control,
+    problem: Problem,
     failed: Contact,
     solver_on: SolverOn,
-    in_double: Callable[[], ContactSolver] | None = None,
+    in_double: Callable[[], tuple[ContactSolver, Operators]] | None = None,
     most: int | None = None,
 ) -> tuple[Contact, list[str]]:
     """Try a failed solve again until it succeeds or nothing is left to try; the last contact, and what was tried.
 
-    `solver_on(slab, tolerance)` makes a solver of the same body on another grid, `in_double()` one whose operator is in
-    double precision, where that of `solver` is not; there are at most so many attempts. Every attempt is counted as
-    `retry`; iterations are those of all attempts. Collective.
+    `solver_on(slab, tolerance)` makes a solver of the same body on another grid, and its operators; `in_double()` those
+    in double precision, where those of the problem are not; there are at most so many attempts. Every attempt is
+    counted as `retry`; iterations are those of all attempts. Collective.
     """
     contact, tried, iterations = failed, list[str](), failed.iterations
-    for name, contact in islice(_attempts(solver, h, control, failed, solver_on, in_double), most):
+    for name, contact in islice(_attempts(solver, problem, failed, solver_on, in_double), most):
         solver.slab.tally["retry"] += 1
         tried.append(name)
         iterations += contact.iterations
@@ -46,24 +45,24 @@ def again(
 
 def _attempts(
     solver: ContactSolver,
-    h: Array,
-    control: Control,
+    problem: Problem,
     failed: Contact,
     solver_on: SolverOn,
-    in_double: Callable[[], ContactSolver] | None,
+    in_double: Callable[[], tuple[ContactSolver, Operators]] | None,
 ) -> Iterator[tuple[str, Contact]]:
     """One attempt after the other, each made when it is asked for, all in the map of the failed one."""
     p, contact = failed.p, failed
     if in_double is not None:
         if not np.isfinite(failed.certificate.worst):
             p.fill(0.0)
-        solver = in_double()
-        contact = solver.solve(h, control, p)
+        solver, (operator, preconditioner) = in_double()
+        problem = replace(problem, operator=operator, preconditioner=preconditioner)
+        contact = solver.solve(problem, p)
         yield "an operator in double precision", contact
     if np.isfinite(contact.certificate.worst):
-        yield "shorter steps", solver.solve(h, control, p, SHORT)
-    grids = start_on_coarse_grids(solver, h, control, p, solver_on)
-    contact = solver.solve(h, control, p)
+        yield "shorter steps", solver.solve(problem, p, SHORT)
+    grids = start_on_coarse_grids(solver, problem, p, solver_on)
+    contact = solver.solve(problem, p)
     yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact
     if np.isfinite(contact.certificate.worst):
-        yield "sets of points", active_set.solve(solver, h, control, p)
+        yield "sets of points", active_set.solve(solver, problem, p)

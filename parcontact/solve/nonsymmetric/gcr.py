@@ -18,8 +18,8 @@ from ..problem import Operator
 
 
 class Directions:
-    """Up to `count` directions t and their images A t: in the maps of `lent`, pairs of them, then in maps of their own,
-    of the type `kept`.
+    """Up to `count` directions t and their images A t: first in `pairs` of maps that are there, then in maps of its
+    own, of the type `kept`.
 
     These, and that of the residual, are made when they are needed for the first time.
     """
@@ -31,10 +31,10 @@ class Directions:
         preconditioner: Operator,
         count: int,
         kept: type,
-        lent: Sequence[tuple[Array, Array]] = (),
+        pairs: Sequence[tuple[Array, Array]] = (),
     ) -> None:
         self.slab, self.operator, self.preconditioner, self.count = slab, operator, preconditioner, count
-        self.kept, self._pairs = kept, list(lent)
+        self.kept, self._pairs = kept, list(pairs)
         self._r: Array | None = None
 
     def _residual(self) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...compiled import loop
 from ...parallel.slab import Array, Slab
+from ..constraint import Constraint
 from ..local_load import LEAST, LocalLoad
 from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
@@ -33,15 +34,18 @@ def extension_on(nx: int, ny: int, narrow: bool = False) -> tuple[int, float]:
 class Projected:
     """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`."""
 
-    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, narrow: bool = False) -> None:
-        self.slab, self.operator = slab, operator
+    def __init__(
+        self, slab: Slab, operator: Operator, preconditioner: Operator, constraint: Constraint, narrow: bool = False
+    ) -> None:
+        self.slab, self.operator, self.preconditioner, self.constraint = slab, operator, preconditioner, constraint
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
         grids, floor = extension_on(slab.nx, slab.ny, narrow)
-        self.extended = ExtendedPreconditioner(slab, preconditioner, floor, grids)
+        self.extended = ExtendedPreconditioner(slab, floor, grids)
         self.local_load = LocalLoad(slab)
 
-    def lend(self) -> list[tuple[Array, Array]]:
-        """The pairs of a direction and its image, for work before the next `begin`."""
+    @property
+    def pairs(self) -> list[tuple[Array, Array]]:
+        """The maps of directions and their images, of no use to it before the next `begin`."""
         return list(zip(self.t, self.w, strict=True))
 
     def begin(self, near_by: bool = True) -> None:
@@ -55,7 +59,7 @@ class Projected:
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
         residual(working, u, h, level, t)
-        self.extended.apply(working, t)
+        self.extended.apply(self.preconditioner, working, t)
         _, mean = self.slab.sum(*sum_on(working, t))
         centre(working, mean / members, t)
         self.operator.apply(t, self.w[0])
@@ -63,8 +67,8 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
-        now, cut = self.local_load.advance(x, x, 0.0, x)
-        self.local_load.restore(x, now, load, self.near_by and cut > LEAST * now)
+        now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
+        self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > LEAST * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 

@@ -25,6 +25,7 @@ from ...compiled import loop
 from ...parallel.slab import Array, Slab, dealt_to
 from .. import kernels
 from ..certificate import Certificate
+from ..constraint import NonNegative
 from ..iterate import certify, weigh
 from ..precision import precision_of_directions
 from ..preconditioner.extension import ExtendedPreconditioner
@@ -88,9 +89,10 @@ class SteadySolver:
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
-        self._projected = Projected(slab, operator, preconditioner, narrow)
+        self.constraint = NonNegative()
+        self._projected = Projected(slab, operator, preconditioner, self.constraint, narrow)
         kept = precision_of_directions(tolerance, LOOSE)
-        self._linear = Directions(slab, operator, preconditioner, directions, kept, self._projected.lend())
+        self._linear = Directions(slab, operator, preconditioner, directions, kept, self._projected.pairs)
         self._u = slab.zeros()
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
@@ -187,7 +189,7 @@ class SteadySolver:
 
     def _stiffness(self) -> float:
         """Pressure on one point over the displacement it causes there; collective."""
-        impulse, answer = self._projected.lend()[0]
+        impulse, answer = self._projected.pairs[0]
         impulse.fill(0.0)
         owner = self.slab.rows.start == 0 < self.slab.rows.stop
         if owner:
@@ -207,7 +209,7 @@ class SteadySolver:
     def _next_set(self, x: Array, h: Array, kappa: float) -> float:
         """Mark the next set; returns how far from a solution x seems to be."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
-        *sums, deepest = _choose(x, self._u, h, gaps / count, kappa, self._working)
+        *sums, deepest = self.constraint.choose(x, self._u, h, gaps / count, kappa, self._working)
         positive, negative, wrong, members, deepest = self.slab.reduce(sums, [deepest])
         if members == 0.0 or positive <= 0.0:
             return np.inf
@@ -220,14 +222,15 @@ class SteadySolver:
 
     def _admit(self, x: Array, mean: float) -> None:
         """Make x admissible: not negative, under the load; and u its image."""
-        load = self.slab.sum(kernels.clip(x))[0]
-        kernels.scale(x, mean * self.slab.points / load)
+        load = self.slab.sum(self.constraint.clip(x))[0]
+        self.constraint.give_load(self.slab, x, load, mean * self.slab.points)
         self.operator.apply(x, self._u)
 
     def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, whose set is marked."""
-        iterate = weigh(self.slab, p, self._u, h, 0.0).settled()
-        *_, certificate = certify(self.slab, p, self._u, h, iterate, mean, self.height, self._working)
+        iterate = weigh(self.slab, self.constraint, p, self._u, h, 0.0).settled()
+        found = certify(self.slab, self.constraint, p, self._u, h, iterate, mean, self.height, self._working)
+        certificate = found[-1]
         self._length = certificate.length
         return iterate.d, certificate
 
@@ -260,26 +263,3 @@ def _add_near(u, h, d, working):
     for j in range(u.shape[0]):
         for i in range(u.shape[1]):
             working[j, i] |= u[j, i] - h[j, i] <= d
-
-
-@loop
-def _choose(x, u, h, d, kappa, working):
-    """Mark points with `x > kappa g`; sums of x > 0, of -x < 0, of |x g|, of marked points; and max(-g)."""
-    positive, negative, wrong, count, deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
-    for j in range(x.shape[0]):
-        row_positive, row_negative, row_wrong, row_count, row_deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
-        for i in range(x.shape[1]):
-            gap = u[j, i] - h[j, i] - d
-            inside = x[j, i] > kappa * gap
-            working[j, i] = inside
-            row_positive += max(x[j, i], 0.0)
-            row_negative += max(-x[j, i], 0.0)
-            row_wrong += abs(x[j, i] * gap)
-            row_count += 1.0 if inside else 0.0
-            row_deepest = max(row_deepest, -gap)
-        positive += row_positive
-        negative += row_negative
-        wrong += row_wrong
-        count += row_count
-        deepest = max(deepest, row_deepest)
-    return positive, negative, wrong, count, deepest

@@ -40,9 +40,9 @@ class ExtendedPreconditioner:
     `known` is `w/(w + f)` of each cell, for points the set itself.
     """
 
-    def __init__(self, slab: Slab, preconditioner: Operator, floor: float = FLOOR, most: int | None = None) -> None:
+    def __init__(self, slab: Slab, floor: float = FLOOR, most: int | None = None) -> None:
         """With another floor, and `most` grids of larger cells."""
-        self.preconditioner, self._steps = preconditioner, pyramid.steps_of(slab)[:most]
+        self._steps = pyramid.steps_of(slab)[:most]
         grids = [step.coarse for step in self._steps]
         self._floors = [
             (np.float32(floor) * _lengths(slab.ny, level)[grid.rows], _lengths(slab.nx, level))
@@ -55,7 +55,7 @@ class ExtendedPreconditioner:
         """Bytes that it holds on a rank."""
         return 2 * 4 * pyramid.count_cells(nx, ny, ranks, rank, most)
 
-    def apply(self, working: NDArray[Any], r: Array) -> None:
+    def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
         Collective."""
         known: Maps = [working, *self._known]
@@ -66,7 +66,7 @@ class ExtendedPreconditioner:
         self._add_up(maps)
         self._weigh()
         self._interpolate(known, maps)
-        self.preconditioner.apply(r, r)
+        preconditioner.apply(r, r)
         self._interpolate_back(known, maps)
         self._weigh()
         self._add_up_back(maps)
