@@ -45,6 +45,7 @@ PARTS = {  # files of the program, and the tests that answer for them
     "parallel/fft.py": ("tests/parallel/test_fft.py",),
     "parallel/slab.py": ("tests/parallel/test_slab.py",),
     "solve/contact.py": (*CONTACT, "tests/robustness/test_descent.py"),
+    "solve/constraint.py": ("tests/solve/test_constraint.py", *CONTACT),
     "solve/kernels.py": ("tests/solve/test_kernels.py", *CONTACT),
     "solve/nonsymmetric/steady.py": ("tests/steady_sliding/test_sliding.py",),
     "solve/nonsymmetric/projected.py": ("tests/solve/test_projected.py", "tests/steady_sliding/test_sliding.py"),
