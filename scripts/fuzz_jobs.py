@@ -83,7 +83,7 @@ def drive(path: Path) -> tuple[str, jobs.Job | None]:
         sanity.refuse_impossible(job, timeline)
         if job.grid.nx * job.grid.ny > POINTS:
             return "large", None
-        scene.effects(job)
+        assert scene.choices(job).effects
         built = scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points))
         sanity.of_surface(built.setup)
     except InputError:

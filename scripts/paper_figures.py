@@ -118,7 +118,7 @@ def fig07(out: Path) -> Figure:
     job = load(JOBS / "fig08_velocity_step.yaml")
     part = job.surface[0]
     omega = np.logspace(-3, 9, 400)
-    modulus = complex_modulus(omega, *relaxation_of(job))
+    modulus = complex_modulus(omega, *relaxation_of(job.material))
     figure, (top, bottom) = panels(2, 1.7)
     lines = (("G′", modulus.real), ("G″", modulus.imag), ("|G*|", np.abs(modulus)))
     for number, (label, values) in enumerate(lines):

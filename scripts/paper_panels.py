@@ -45,7 +45,7 @@ def explain(axes: Axes, directory: Path, **look: Any) -> None:
 
 def moduli(job: Job) -> tuple[float, float]:
     """Of the first instant and in the end [Pa]."""
-    series = relaxation_of(job)
+    series = relaxation_of(job.material)
     return series.modulus_inf + float(series.moduli.sum()), series.modulus_inf
 
 

@@ -67,7 +67,7 @@ def trial(random, points):
 
 def certificate(sliding, law, speed, pressure):
     """Worst of load error, gap under pressure, penetration and negative pressure, by numpy's transform."""
-    base, n = sliding.base, sliding.base.slab.nx
+    base, n = sliding.setup, sliding.setup.slab.nx
     p = sliding.contact.p * base.units.pressure
     q = 2 * np.pi / 1.0e-3 * np.fft.fftfreq(n, 1 / n)
     modulus = complex_modulus(-q * speed, *law)
@@ -101,7 +101,7 @@ def main() -> int:
         sets += point.sets > 0
         calls.append(point.operator_calls)
         areas.append(point.measures.contact_area)
-        found, asked = certificate(sliding, law, speed, pressure), sliding.base.job.numerics.tolerance
+        found, asked = certificate(sliding, law, speed, pressure), sliding.setup.job.numerics.tolerance
         if found > asked * (1 + 1e-6):
             wrong += 1
             print(f"{number}: WRONG, certificate {found:.3g} instead of {asked:g}", flush=True)

@@ -24,13 +24,13 @@ def sliding(path: Path, text: str, comm: MPI.Intracomm, *overrides: str) -> Stea
 
 def certificate(states: SteadySliding, speed: float, pressure: float) -> float:
     """Worst of load error, pressure-weighted gap and penetration over the surface's height, on one rank."""
-    base, contact = states.base, states.contact
+    base, contact = states.setup, states.contact
     assert contact is not None
     p = contact.p * base.units.pressure
     nx, ny = base.job.grid.points
     qx = 2 * np.pi / base.job.grid.lx * np.fft.fftfreq(nx, 1 / nx)
     qy = 2 * np.pi / base.job.grid.ly * np.fft.fftfreq(ny, 1 / ny)
-    law = relaxation_of(base.job)
+    law = relaxation_of(base.job.material)
     modulus = complex_modulus(-qx * speed, *law)
     modulus[nx // 2] = modulus[nx // 2].real
     q = np.hypot(qx[None, :], qy[:, None])

@@ -151,10 +151,10 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
 @ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
     from .. import job as jobs
-    from ..effects.folded_branches import excited_band
     from ..plotting import compounds
     from ..rubber import compound
     from ..rubber.shift import given
+    from ..scene.measured_range import excited_band
 
     target = options.out or options.table.with_suffix(".yaml")
     compounds.refuse_foreign(target)
@@ -200,7 +200,7 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    print("\n".join(surfaces.describe(job, heights, base.told, base.shortest, picture)))
+    print("\n".join(surfaces.describe(job, heights, base.preparation_notes, base.shortest, picture)))
     for text in doubts:
         print(f"warning: {text}")
     for line in measured_maps.start(job, given, options.start) if alone else ():

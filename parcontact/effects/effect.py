@@ -1,8 +1,8 @@
 """What an effect is: a decision from the job alone, and what is made, held, remembered and written where it is on.
 
 An effect that follows the steps is one class, found by the section that it adds to a job (`job.extension`): no other
-file knows it. One that takes the place of a part (another body, operator or path) has its decision in `decisions`, and
-`scene.py` makes it where it makes that part.
+file knows it. One that takes the place of a part (another body, operator or path) has its decision in
+`scene/choices.py`, and `scene/scene.py` makes it where it makes that part.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,6 @@ from numpy.typing import DTypeLike
 
 from ..errors import InputError
 from ..history.timeline import Step
-from ..job import Job, extension
 from ..job.sections.part import Part
 from ..parallel.slab import Array
 from ..physics.entries import Remembers
@@ -58,12 +57,12 @@ class Effect(Remembers, Protocol):
     columns: ClassVar[tuple[str, ...]]  # what it adds to measures.csv
 
     @staticmethod
-    def decide(job: Job) -> Decision:
+    def decide(job: Any) -> Decision:
         """Whether the job asks for it, and its name in checkpoints; the same on every rank."""
         ...
 
     @staticmethod
-    def maps(job: Job) -> Sequence[DTypeLike]:
+    def maps(job: Any) -> Sequence[DTypeLike]:
         """The types of the maps that it holds and that a checkpoint has; what it holds besides is not planned."""
         ...
 
@@ -79,12 +78,6 @@ class Effect(Remembers, Protocol):
         Local to this rank.
         """
         ...
-
-
-def effects_that_follow(job: Job) -> dict[str, type[Effect]]:
-    """The effects that the sections of a job ask for, by their names in checkpoints."""
-    found = extension.effects_of(type(job).model_fields).values()
-    return {effect.decide(job).name: effect for effect in found if effect.decide(job).on}
 
 
 def columns_of(effects: Mapping[str, Effect]) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 from numpy.typing import DTypeLike
 from pydantic import Field
 
-from ..job import Job
 from ..job.sections.part import Part, Rule
 from ..job.sections.values import Positive
 from ..job.text.fault import Fault
@@ -18,7 +17,6 @@ from ..physics.interface import InterfaceFriction
 from ..physics.measures import Measures
 from ..physics.units import Units
 from .effect import Decision, Instant
-from .relaxation import time_factor_of
 
 LEAST_POISSON = 0.49  # below it shear moves the surface, and the solve would have to be coupled
 
@@ -49,12 +47,11 @@ class Interface(Part):
     rules = (Rule(("velocity", "width"), _whole_bell),)
 
 
-def interface_of(job: Job) -> InterfaceFriction | None:
-    """The law of a job; None if it has no `interface`."""
-    section: Interface | None = getattr(job, "interface", None)
+def interface_of(section: Interface | None, time_factor: float) -> InterfaceFriction | None:
+    """Return the law of a section, for a body whose relaxation times are so many times those at the reference."""
     if section is None:
         return None
-    return InterfaceFriction(section.shear_stress, section.velocity, section.width or 1.0, time_factor_of(job))
+    return InterfaceFriction(section.shear_stress, section.velocity, section.width or 1.0, time_factor)
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
@@ -74,13 +71,13 @@ class InterfaceColumns:
     rules: ClassVar[tuple[Rule, ...]] = (Rule(("interface", "material"), _incompressible),)
 
     @staticmethod
-    def decide(job: Job) -> Decision:
-        law = interface_of(job)
+    def decide(job: Any) -> Decision:
+        law: Interface | None = job.section("interface")
         why = "there is no interface section" if law is None else f"a shear stress of {law.shear_stress:g} Pa at most"
         return Decision("interface", law is not None, why)
 
     @staticmethod
-    def maps(job: Job) -> Sequence[DTypeLike]:
+    def maps(job: Any) -> Sequence[DTypeLike]:
         return ()
 
     def __init__(self, scene: Any) -> None:

@@ -1,16 +1,15 @@
-"""The relaxation function of a job's material, and whether there is any."""
+"""The relaxation function of a material as its section of a job has it."""
 
 import numpy as np
 
 from .. import job as jobs
-from ..job import Job
 from ..physics.prony import Prony, normal_form, zener_to_prony
-from .effect import Decision
+
+Material = jobs.Elastic | jobs.Zener | jobs.Dma
 
 
-def relaxation_of(job: Job) -> Prony:
-    """The relaxation function of a job's material [Pa, s]; one modulus and no terms if it is elastic."""
-    material = job.material
+def relaxation_of(material: Material) -> Prony:
+    """Return the relaxation function of a material [Pa, s]; one modulus and no terms if it is elastic."""
     if isinstance(material, jobs.Elastic):
         return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
     if isinstance(material, jobs.Dma):
@@ -24,14 +23,7 @@ def relaxation_of(job: Job) -> Prony:
     return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], all_times)
 
 
-def time_factor_of(job: Job) -> float:
-    """By what factor relaxation times at the temperature of a job are longer than at the reference, a_T [-]."""
-    body = job.material.fitted if isinstance(job.material, jobs.Dma) else job.material
+def time_factor_of(material: Material) -> float:
+    """Return by what factor relaxation times at a material's temperature are longer than at the reference, a_T [-]."""
+    body = material.fitted if isinstance(material, jobs.Dma) else material
     return body.time_factor if isinstance(body, jobs.Zener) else 1.0
-
-
-def decide(job: Job) -> Decision:
-    """One map per branch that relaxes, and the last displacement."""
-    count = relaxation_of(job).moduli.size
-    what = "a branch relaxes" if count == 1 else f"{count} branches relax"
-    return Decision("viscoelasticity", count > 0, what if count else "the body has one modulus and no memory")

@@ -59,7 +59,7 @@ class Starts:
         last, earlier = state.pasts[:2]
         now, before, growth = last, earlier, step.growth if earlier.alpha > 0.0 else 0.0
         past = self._whole_cells_ago(step, state) if growth > 0.0 else None
-        self._has_choice = past is not None and self._scene.keeps_further
+        self._has_choice = past is not None and self._scene.choices.further_starts.on
         self._is_moved = past is not None and self._moves
         if past is not None and self._is_moved:
             now, growth = past, 0.0
@@ -83,13 +83,13 @@ class Starts:
 
     def entries(self) -> dict[str, Entry]:
         """What was learnt, for a checkpoint; nothing where there is no choice."""
-        if not self._scene.keeps_further:
+        if not self._scene.choices.further_starts.on:
             return {}
         return {NAME: Entry(np.array([self._moved, self._extrapolated, self._since]))}
 
     def restore(self, numbers: Mapping[str, Any]) -> None:
         """Go on from the arrays of a checkpoint; with one that has none all is to be learnt again."""
-        if NAME in numbers and self._scene.keeps_further:
+        if NAME in numbers and self._scene.choices.further_starts.on:
             self._moved, self._extrapolated, self._since = numbers[NAME].tolist()
 
     def _whole_cells_ago(self, step: Step, state: State) -> Past | None:

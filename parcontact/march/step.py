@@ -41,8 +41,8 @@ class March:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         slab = scene.slab
-        earlier = slab.zeros() if scene.lasts else None
-        further = tuple(Past(slab.zeros()) for _ in range(FURTHER * scene.keeps_further))
+        earlier = slab.zeros() if scene.choices.extrapolated_starts.on else None
+        further = tuple(Past(slab.zeros()) for _ in range(FURTHER * scene.choices.further_starts.on))
         setup, highest = scene.setup, scene.setup.heights.highest  # at no load the surface just touches the body
         touching = Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
         row, d = self._complete(Row(measures=touching)), -highest / scene.units.height

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from ..effects import decisions
 from ..history.timeline import Timeline
 from ..job import Job
+from ..scene import choices
 from . import memory
 from .sample import Sample
 
@@ -57,7 +57,7 @@ class Costs:
     def marching(self) -> float:
         """Return the seconds of all steps, or steady states; with those on half the mesh, which comes first."""
         part = HALF_MESH_CHOSEN if Timeline.of(self.job).chooses else HALF_MESH
-        beside = part if self.job.history and decisions.mesh_check(self.job).on else 0.0
+        beside = part if self.job.history and choices(self.job).mesh_check.on else 0.0
         return self.sample.steps * self.step * (1.0 + beside)
 
     @property
@@ -90,7 +90,7 @@ class Costs:
     @property
     def instants(self) -> int:
         """Return how often fields are saved."""
-        saved = self.job.history and decisions.fields(self.job).on
+        saved = self.job.history and choices(self.job).fields.on
         return -(-self.sample.steps // self.job.output.every) if saved else 0
 
     @property

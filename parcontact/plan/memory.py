@@ -11,10 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ..effects import decisions, relaxation
-from ..effects.effect import effects_that_follow
-from ..effects.folded_branches import fold_branches_of
-from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..job.checks.size import machines
 from ..march.state import State
@@ -27,6 +23,7 @@ from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
 from ..physics.lowest import shape_of
+from ..scene import choices
 from ..scene.rigid_surface import highest_waves
 from ..solve.contact import ContactSolver
 from ..solve.nonsymmetric.steady import SteadySolver
@@ -78,7 +75,7 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     In a free box the table of the wake, made before that, may take more for a moment; so may, up to a quarter more than
     with sets, what is tried when these have failed.
     """
-    if not decisions.steady_start(job).on:
+    if not choices(job).steady_start.on:
         return 0
     waves = _surface_spectrum(job, ranks, rank)
     return sum(_while_steady(job, ranks, ranks - 1 if rank is None else rank, waves, sets))
@@ -114,24 +111,24 @@ def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
 
 
 def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
-    part = dealt_to(job.grid.ny, ranks, rank)
+    chosen, part = choices(job), dealt_to(job.grid.ny, ranks, rank)
     cells = (part.stop - part.start) * job.grid.nx
     spectrum, *_ = footprint(job.grid.points, job.grid.points, np.float64, ranks, rank)
     symbol = Convolution.footprint(spectrum, job.grid.ny)
-    kept: type[np.floating] = np.float32 if decisions.single_operator(job).on else np.float64
+    kept: type[np.floating] = chosen.operator_type
     yield _transform("transforms", job, job.grid.points, np.float64, ranks, rank)
-    if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(job.grid.points):
+    if lengths := HalfSpace(job.grid.size, free=chosen.isolated.on).own_lengths(job.grid.points):
         yield _transform("padded transforms and operator", job, lengths, kept, ranks, rank, with_symbol=True)
     else:
         yield Holding("operator", symbol * np.dtype(kept).itemsize // 8)
-    if decisions.mixed_precision(job).on:
+    if chosen.mixed_precision.on:
         what, points = "single transforms and preconditioner", job.grid.points
         yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True, lent=True)
     else:
         yield Holding("preconditioner", symbol)
     grids = grids_for(job.grid.dx, job.grid.dy)
     yield Holding("solver", ContactSolver.footprint(*job.grid.points, job.numerics.tolerance, ranks, rank, grids, kept))
-    if decisions.spectrum(job).on:
+    if chosen.spectrum.on:
         yield Holding("surface spectrum", waves)
     for maps in _maps(job):
         if maps.count.held:
@@ -147,7 +144,7 @@ def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> It
     yield 2 * _map(points, ranks, rank)  # the heights and the start
     yield finest + waves
     yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
-    if lengths := HalfSpace(job.grid.size, free=decisions.isolated(job).on).own_lengths(points):
+    if lengths := HalfSpace(job.grid.size, free=choices(job).isolated.on).own_lengths(points):
         padded, *_ = footprint(points, lengths, np.float64, ranks, rank)
         yield _transform("", job, lengths, np.float64, ranks, rank).bytes
         yield Convolution.footprint(padded, lengths[1], even, is_complex=True)
@@ -160,7 +157,7 @@ def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> It
 
 def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
     """Bytes of the waves of the surface on a rank, or on that which has the most."""
-    if not decisions.spectrum(job).on:
+    if not choices(job).spectrum.on:
         return 0
     points, waves = job.grid.points, highest_waves(job)
     count = points[0] // 2 + 1
@@ -193,14 +190,16 @@ def _transform(
 
 def _maps(job: Job) -> Iterator[Maps]:
     """Of everything that holds whole maps, or has them in checkpoints."""
+    chosen = choices(job)
     yield Maps("heights", MapCount(1), np.float64)
-    yield Maps("pressures", State.count_maps(decisions.lasting(job).on, decisions.further_starts(job).on), np.float64)
-    if relaxation.decide(job).on:
-        yield Maps("branches", ZenerBody.count_maps(len(fold_branches_of(job).kept)), np.float64)
+    pressures = State.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on)
+    yield Maps("pressures", pressures, np.float64)
+    if chosen.viscoelasticity.on:
+        yield Maps("branches", ZenerBody.count_maps(len(chosen.folded.kept)), np.float64)
     else:
-        yield Maps("moved heights", ElasticBody.count_maps(decisions.along_x(job)), np.float64)
-    if decisions.energy_memory(job).on:
-        yield Maps("energy memory", ElasticPressure.count_maps(relaxation_of(job).moduli.size), np.float64)
-    for name, effect in effects_that_follow(job).items():
+        yield Maps("moved heights", ElasticBody.count_maps(chosen.slides_along_x), np.float64)
+    if chosen.energy_memory.on:
+        yield Maps("energy memory", ElasticPressure.count_maps(chosen.prony.moduli.size), np.float64)
+    for name, effect in chosen.followers.items():
         for dtype in effect.maps(job):
             yield Maps(name, MapCount(held=1, saved=1), dtype)

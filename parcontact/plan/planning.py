@@ -13,6 +13,7 @@ from ..history.timeline import Timeline
 from ..job import Case, Job
 from ..parallel.groups import Groups
 from ..parallel.slab import Slab
+from ..scene import choices
 from ..steady_sliding.curve import request
 from ..storage import wisdom
 from . import price, report
@@ -75,9 +76,9 @@ class Planner:
         if tried is None:
             return None
         own = slab.resized(*tried.grid.points)
-        wisdom.recall(tried, own, None)
+        wisdom.recall(choices(tried).transforms, own, None)
         seen = sample(tried, own, self.seconds, self.started)
-        wisdom.keep(tried, own)
+        wisdom.keep(choices(tried).transforms, own)
         return costs_of(job, seen, slab.agree(measure_write_rate(job.output.directory) if slab.root else 0.0))
 
     def _tell(self, job: Job, slab: Slab) -> Iterator[str]:

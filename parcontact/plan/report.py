@@ -4,9 +4,8 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 
-from .. import scene
-from ..effects import decisions
 from ..job import Job
+from ..scene import choices
 from . import memory
 from .costs import Costs
 
@@ -19,7 +18,7 @@ MARK = "*"  # of figures that were taken while other programs were at work
 
 def effects(job: Job) -> Iterator[str]:
     """Every effect, on or off, and why."""
-    found = scene.effects(job)
+    found = choices(job).effects
     width = max(len(effect.name) for effect in found)
     yield "effects"
     for effect in sorted(found, key=lambda effect: not effect.on):
@@ -29,7 +28,7 @@ def effects(job: Job) -> Iterator[str]:
 def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     """Bytes that a rank holds, for what."""
     columns = [memory.holdings(job, count) for count in ranks]
-    before = STEADY_STARTS if decisions.steady_start(job).on else ()
+    before = STEADY_STARTS if choices(job).steady_start.on else ()
     width = max(len(what) for what in (*(holding.what for holding in columns[0]), *(what for what, _ in before)))
     totals = [sum(holding.bytes for holding in column) for column in columns]
     unit, size = unit_of(max(totals))
@@ -51,8 +50,8 @@ def steps(costs: Costs) -> Iterator[str]:
         yield f"parcontact steady: {sample.steps} steady states, {len(job.steady.velocities)} velocities"
     else:
         names = (f"{stage.name} {seen.steps}" for stage, seen in zip(job.history, sample.stages, strict=True))
-        most = "at most " if decisions.short_rest(job).on and sample.tried < sample.steps else ""
-        if decisions.chosen_steps(job).on and sample.tried < sample.steps:
+        most = "at most " if choices(job).short_rest.on and sample.tried < sample.steps else ""
+        if choices(job).chosen_steps.on and sample.tried < sample.steps:
             most = "about "
         yield f"{most}{sample.steps} steps: {', '.join(names)}"
     calls, transforms, sums = (sample.total(name) / sample.steps for name in ("operator", "fft", "allreduce"))

@@ -5,9 +5,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..effects import decisions
 from ..job import Job
 from ..job.sections.listing import plain
+from ..scene import choices
 from . import memory
 
 PER_POINT = 1.2e-8  # tuning: seconds of an operator call per point, enough to choose a grid by
@@ -26,7 +26,7 @@ def choose_grid(job: Job, ranks: int, seconds: float) -> Job | None:
 def make_tiny(job: Job) -> Job | None:
     """The job with a single wave, or a sphere, on the fewest points: all that runs is the same, and costs nothing."""
     data: dict[str, Any] = plain(job)
-    free, long = decisions.isolated(job).on, max(job.grid.size)
+    free, long = choices(job).isolated.on, max(job.grid.size)
     data["grid"]["points"] = [min(n, FEW) for n in job.grid.points]
     wave = {"shape": "wave", "amplitude": FLAT * long, "waves": [1, 0] if job.grid.nx > 1 else [0, 1]}
     data["surface"] = [{"shape": "sphere", "radius": long} if free else wave]
@@ -38,8 +38,8 @@ def make_tiny(job: Job) -> Job | None:
 
 
 def _feasible(job: Job, ranks: int, seconds: float) -> bool:
-    per_point = PER_POINT * (PADDED if decisions.isolated(job).on else 1.0)
-    calls = CALLS + (STEADY_START if decisions.steady_start(job).on else 0)
+    per_point = PER_POINT * (PADDED if choices(job).isolated.on else 1.0)
+    calls = CALLS + (STEADY_START if choices(job).steady_start.on else 0)
     quick = calls * per_point * job.grid.nx * job.grid.ny / ranks <= seconds
     return quick and memory.total(job, ranks) * ranks <= memory.FREE_SHARE * memory.free_bytes()
 

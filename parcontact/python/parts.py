@@ -35,7 +35,7 @@ def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
 def material(material: Mapping[str, Any]) -> Material:
     """The material that a job's section means. Raises JobError for mistakes."""
     job = of_parts(material=material)
-    spring, moduli, times = relaxation_of(job)
+    spring, moduli, times = relaxation_of(job.material)
     return Material(spring, tuple(moduli.tolist()), tuple(times.tolist()), job.material.poisson)
 
 

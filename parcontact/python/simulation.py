@@ -24,6 +24,7 @@ from ..parallel.slab import Array, Slab
 from ..physics.entries import Entry
 from ..run import restart, runner
 from ..run.errors_so_far import ErrorsSoFar
+from ..scene import choices
 from ..steady_sliding import start
 from ..storage import checkpoint, heights, measures, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
@@ -199,7 +200,7 @@ class Simulation:
         if self._march_made is None:
             self._meet("begins")
             saved = self._saved
-            wisdom.recall(self.job, self._slab, saved.numbers.get("plans/all") if saved else None)
+            wisdom.recall(choices(self.job).transforms, self._slab, saved.numbers.get("plans/all") if saved else None)
             self._march_made = start.first(self.job, self._slab, saved=saved)
             warn_of(self.job, self._march_made.scene.setup)
         return self._march_made

@@ -7,12 +7,11 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..effects.folded_branches import excited_band
 from ..effects.relaxation import relaxation_of
 from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
 from ..plotting import style, units
-from ..scene.measured_range import excited_bands
+from ..scene.measured_range import excited_band, excited_bands
 from .parts import Section, Table, of_panel
 
 DECADES = 1.5  # that a picture shows beyond the relaxation times
@@ -22,7 +21,7 @@ CAPTION = "moduli and loss tangent over frequency, at the temperature of the job
 
 def section(job: Job) -> Section:
     """Of the material of a job at its temperature."""
-    series = relaxation_of(job)
+    series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [
         ("shear modulus in the long run", units.text(series.modulus_inf, "Pa", 4)),
@@ -81,7 +80,7 @@ def _range(ends: tuple[float, float], unit: str) -> str:
 
 def _moduli(axes: Axes, job: Job) -> None:
     """Storage and loss modulus over frequency, and the loss tangent."""
-    series = relaxation_of(job)
+    series = relaxation_of(job.material)
     ends = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
     frequency = np.logspace(ends.min() - DECADES, ends.max() + DECADES, POINTS)
     omega = 2 * math.pi * frequency

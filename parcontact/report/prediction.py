@@ -104,7 +104,7 @@ def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> I
         modulus = complex_modulus(omega, body.modulus_inf, body.moduli, body.relaxation_times)
         friction = persson.friction_coefficient(pressure, rings, vx, vy, modulus, gamma)
         area = persson.contact_area(pressure, rings, modulus)
-        yield SteadyInstant(speed, pressure, temperature, time_factor_of(at), float(friction), float(area))
+        yield SteadyInstant(speed, pressure, temperature, time_factor_of(at.material), float(friction), float(area))
 
 
 def write_steady(job: Job, wanted: Request) -> Path:
@@ -220,7 +220,7 @@ def _longest_slide(timeline: Timeline) -> float:
 
 def _material(job: Job) -> Prony:
     """The incompressible body that is as stiff as the job's half space, to which nu is a factor."""
-    series, factor = relaxation_of(job), 0.5 / (1.0 - job.material.poisson)
+    series, factor = relaxation_of(job.material), 0.5 / (1.0 - job.material.poisson)
     return Prony(factor * series.modulus_inf, factor * series.moduli, series.relaxation_times)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..effects import decisions
 from ..effects.effect import columns_of
 from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
@@ -13,7 +12,7 @@ from ..job import Job, Rough, RoughSpectrum, identity
 from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..scene import Scene, sanity
+from ..scene import Scene, choices, sanity
 from ..scene.measured_range import describe_beyond
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, row, wisdom
@@ -84,12 +83,12 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
             if slab.root and not options.quiet:
                 print(f"{directory.path}: {reason}", flush=True)
             return Ended(DONE, None, origin.contents if origin else None)
-        wisdom.recall(job, slab, origin.wisdom if origin else None)
+        wisdom.recall(choices(job).transforms, slab, origin.wisdom if origin else None)
         marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
         timeline = marching.timeline(options.until or 0.0)
         found = (*job.warnings, *describe_beyond(job), *sanity.of_surface(marching.scene.setup))
         doubts = () if options.beside else found
-        wisdom.keep(job, slab)
+        wisdom.keep(choices(job).transforms, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = restart.claim(plain, origin)
         recorder = _begin(marching.scene, directory, claim, provenance, origin, timeline, options.quiet)
@@ -126,7 +125,7 @@ def _half_mesh(
 
     Where that cannot be done the run goes on without it.
     """
-    if not decisions.mesh_check(job).on:
+    if not choices(job).mesh_check.on:
         return DONE, None
     half = half_mesh.job_on_half_mesh(job)
     grid, where = half.grid, half.output.directory
@@ -191,12 +190,12 @@ def _begin(
         directory.go_back(origin.contents.step)
     elif origin is None:
         directory.clear()
-    split = decisions.branch_dissipation(job).on
+    split = built.choices.branch_dissipation.on
     recording = Recording(
         total=len(timeline),
         branches=len(built.energy.balance.dissipated) if split and built.energy else 0,
         added=added,
-        maps=job.output.fields if decisions.fields(job).on else (),
+        maps=job.output.fields,
         size=job.grid.size,
         every=job.output.every,
         open_ended=timeline.chooses,

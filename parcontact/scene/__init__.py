@@ -1,5 +1,17 @@
 """From a job to what is calculated with: the choices that follow from it, the rigid surface, the body, the solver."""
 
-from .scene import Scene, Setup, build, effects, facts, set_up, solver_in_double, solver_on
+from .choices import Choices, choices
+from .scene import Scene, Setup, build, build_on, facts, set_up, solver_in_double, solver_on
 
-__all__ = ["Scene", "Setup", "build", "effects", "facts", "set_up", "solver_in_double", "solver_on"]
+__all__ = [
+    "Choices",
+    "Scene",
+    "Setup",
+    "build",
+    "build_on",
+    "choices",
+    "facts",
+    "set_up",
+    "solver_in_double",
+    "solver_on",
+]

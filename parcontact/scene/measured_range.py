@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from ..effects.folded_branches import excited_band
+from ..effects.folded_branches import bands, phases
 from ..effects.relaxation import time_factor_of
+from ..history.timeline import Timeline
 from ..job import Dma, Job, Zener
 
 NEAR = 0.5  # decades beyond the measured band that pass: a surface has little of its last waves
@@ -28,6 +29,18 @@ class ExcitedBand:
         return self.band[0] * self.factor, self.band[1] * self.factor
 
 
+def excited_band(job: Job) -> tuple[float, float] | None:
+    """Frequencies [Hz] with which the waves of a job's surface pass a point of the body, over all stages and steady
+    velocities; None for a surface that stands."""
+    speeds = [math.hypot(*phase.velocity) for phase in phases(Timeline.of(job))] + [math.hypot(*job.initial.velocity)]
+    speeds = [speed for speed in (*speeds, *(job.steady.velocities if job.steady else ())) if speed > 0.0]
+    waves = [(band.low, band.high) for band in bands(job.grid, job.surface)]
+    if not speeds or not waves:
+        return None
+    low, high = min(low for low, _ in waves), max(high for _, high in waves)
+    return min(speeds) * low / (2 * math.pi), max(speeds) * high / (2 * math.pi)
+
+
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
     """What a job excites at each temperature of a friction curve, or else at that of the material; nothing where the
     surface stands."""
@@ -38,7 +51,7 @@ def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedB
         return [ExcitedBand(None, 1.0, band)]
     reference = body.shift.made.reference
     degrees = temperatures or (reference if body.temperature is None else body.temperature,)
-    return [ExcitedBand(value, time_factor_of(job.at_temperature(value)), band) for value in degrees]
+    return [ExcitedBand(value, time_factor_of(job.at_temperature(value).material), band) for value in degrees]
 
 
 def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[str]:

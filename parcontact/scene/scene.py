@@ -1,22 +1,19 @@
 """From a job to what steps are made of: bodies, solver, energies, ledger and followers are made here and nowhere else.
 
-What is made follows from the job alone, as `effects/decisions.py` decides; what a job does not call for is never made.
+What is made follows from the job alone, as `choices.py` decides; what a job does not call for is never made.
 Steady sliding takes the setup from here and brings a solver of its own.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
-from ..effects import decisions, relaxation
-from ..effects.effect import Decision, Effect, effects_that_follow, values_of
-from ..effects.folded_branches import describe_folded_branches, fold_branches_of
-from ..effects.interface import interface_of
-from ..effects.relaxation import relaxation_of
+from ..effects.effect import Effect, values_of
+from ..effects.folded_branches import describe_folded_branches
 from ..history.chosen import describe_steps
-from ..job import Job, extension
+from ..job import Grid, Job
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics.body import ElasticBody, ZenerBody
@@ -35,20 +32,21 @@ from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
 from ..solve.workspace import Workspace
+from .choices import Choices, choices
 from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
 
 
 @dataclass
 class Setup:
-    """What every calculation on a job shares: who owns which rows, the surface, the units, the body's relaxation.
+    """What every calculation on a job shares: its choices, who owns which rows, the surface, the units, the body.
 
     `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
     of a cell if it is flat); `shortest` [m] is the shortest wave of what is measured of it, None where nothing is;
-    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `told` says, on root,
-    what was done to measured maps.
+    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `preparation_notes`
+    say, on root, what was done to measured maps.
     """
 
-    job: Job
+    choices: Choices
     slab: Slab
     fft: FFT
     surface: Surface
@@ -56,23 +54,33 @@ class Setup:
     shortest: float | None
     heights: Heights
     units: Units
-    prony: Prony
-    told: list[str]
+    preparation_notes: list[str]
+
+    @property
+    def job(self) -> Job:
+        return self.choices.job
+
+    @property
+    def grid(self) -> Grid:
+        return self.choices.grid
 
     @property
     def height(self) -> float:
-        return self.heights.span or min(self.job.grid.dx, self.job.grid.dy)
+        return self.heights.span or min(self.grid.dx, self.grid.dy)
 
     @property
     def size(self) -> tuple[float, float]:
-        return self.job.grid.lx / self.units.length, self.job.grid.ly / self.units.length
+        return self.grid.lx / self.units.length, self.grid.ly / self.units.length
+
+    @cached_property
+    def prony(self) -> Prony:
+        series, unit = self.choices.prony, self.units.modulus
+        return Prony(series.modulus_inf / unit, series.moduli / unit, series.relaxation_times)
 
     @property
     def half_space(self) -> HalfSpace:
         """The body's, of shear modulus 1, in the run's units."""
-        return HalfSpace(
-            self.size, self.job.material.poisson, self.job.numerics.kernel, self.job.grid.boundary == "free"
-        )
+        return HalfSpace(self.size, self.job.material.poisson, self.choices.numerics.kernel, self.choices.isolated.on)
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
         """A velocity [m/s] in the run's units of length per second."""
@@ -80,7 +88,7 @@ class Setup:
 
     def ledger(self) -> Ledger:
         """A new one, with the shear of the interface if the job has one."""
-        return Ledger(self.slab, self.surface, self.units, interface_of(self.job))
+        return Ledger(self.slab, self.surface, self.units, self.choices.interface)
 
 
 @dataclass
@@ -95,8 +103,6 @@ class Scene:
     operators: Operators
     ledger: Ledger
     energy: ElasticEnergy | ZenerEnergy | None
-    lasts: bool
-    keeps_further: bool = False
     followers: dict[str, Effect] = field(default_factory=dict)
 
     @property
@@ -108,6 +114,10 @@ class Scene:
             if isinstance(self.energy, ZenerEnergy) and isinstance(self.energy.inverse, ElasticPressure):
                 parts["memory"] = self.energy.inverse
         return parts | self.followers
+
+    @property
+    def choices(self) -> Choices:
+        return self.setup.choices
 
     @property
     def job(self) -> Job:
@@ -126,67 +136,58 @@ class Scene:
         return NonNegative()
 
 
-def effects(job: Job) -> list[Decision]:
-    """Every effect that there is, on or off, and why; from the job alone."""
-    further = [effect.decide for effect in extension.find_effects().values()]
-    return [decide(job) for decide in (*decisions.TABLE, *further)]
-
-
-def set_up(job: Job, slab: Slab) -> Setup:
-    """The surface of a job and what it is measured in; collective. Raises InputError for files that do not fit."""
-    fft = FFT(slab)
-    surface, told = make_surface(job, fft)
+def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
+    """The surface of a job, to be marched to the end of its history or, if later, to `until` [s], and what it is
+    measured in; collective. Raises InputError for files that do not fit."""
+    chosen, fft = choices(job, until), FFT(slab)
+    surface, notes = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     shortest = shortest_measured(job, surface)
-    prony = relaxation_of(job)
     heights = heights_of(surface)
-    units = Units.near(heights.span, job.grid.lx, prony.modulus_inf + float(prony.moduli.sum()))
+    units = Units.near(heights.span, job.grid.lx, chosen.prony.modulus_inf + float(chosen.prony.moduli.sum()))
     surface.rescale(units.height)
-    scaled = Prony(prony.modulus_inf / units.modulus, prony.moduli / units.modulus, prony.relaxation_times)
-    return Setup(job, slab, fft, surface, roughness, shortest, heights, units, scaled, told)
+    return Setup(chosen, slab, fft, surface, roughness, shortest, heights, units, notes)
 
 
-def build(job: Job, slab: Slab, until: float = 0.0, base: Setup | None = None) -> Scene:
-    """Make a job's scene on the ranks of `slab`, to be marched to the end of its history or, if later, to `until` [s].
+def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
+    """Make a job's scene on the ranks of `slab`, as `set_up` and `build_on` do."""
+    return build_on(set_up(job, slab, until))
 
-    Its setup is `base`, if it has one. Collective. Raises InputError for surface files that do not fit.
-    """
-    base = set_up(job, slab) if base is None else base
-    motion = _motion(base)
-    branches = slab.agree(fold_branches_of(job, until))
-    material = _material(base, branches)
-    solver, operators = _solver(base, job.numerics.tolerance)
-    energy = _energy(base, solver, operators, material) if decisions.energies(job).on else None
-    kept = decisions.lasting(job).on, decisions.further_starts(job).on
-    scene = Scene(base, motion, branches, material, solver, operators, base.ledger(), energy, *kept)
-    scene.followers = {name: effect(scene) for name, effect in effects_that_follow(job).items()}
+
+def build_on(setup: Setup) -> Scene:
+    """Make the scene of a setup; collective."""
+    chosen, folded = setup.choices, setup.slab.agree(setup.choices.folded)
+    material = _material(setup, folded)
+    solver, operators = _solver(setup, chosen.numerics.tolerance, chosen.operator_type)
+    energy = _energy(setup, solver, operators, material) if chosen.energies.on else None
+    scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.ledger(), energy)
+    scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}
     values_of(scene.followers)  # refuses those that do not fit, before anything is written
     return scene
 
 
-def solver_on(base: Setup, slab: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
+def solver_on(setup: Setup, slab: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
     """A solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
 
     Their transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give
     other last digits.
     """
-    return _solver(replace(base, slab=slab, fft=FFT(slab, measured=False)), tolerance)
+    return _solver(replace(setup, slab=slab, fft=FFT(slab, measured=False)), tolerance, setup.choices.operator_type)
 
 
-def solver_in_double(base: Setup) -> Callable[[], tuple[ContactSolver, Operators]] | None:
+def solver_in_double(setup: Setup) -> Callable[[], tuple[ContactSolver, Operators]] | None:
     """What makes a solver with an operator in double precision, for a retry; None where that of the scene is."""
-    if not decisions.single_operator(base.job).on:
+    if not setup.choices.single_operator.on:
         return None
-    numerics = base.job.numerics.model_copy(update={"precision": "double"})
-    double = replace(base, job=base.job.model_copy(update={"numerics": numerics}))
-    return partial(solver_on, double, base.slab, numerics.tolerance)
+    double = replace(setup, fft=FFT(setup.slab, measured=False))
+    return partial(_solver, double, setup.choices.numerics.tolerance, np.float64)
 
 
-def facts(built: Scene) -> list[str]:
+def facts(scene: Scene) -> list[str]:
     """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
-    found = built.setup.roughness
-    told = [*built.setup.told, *describe_folded_branches(built.folded, relaxation_of(built.job))]
-    if steps := describe_steps(built.job):
+    setup, found = scene.setup, scene.setup.roughness
+    told = [*setup.preparation_notes, *describe_folded_branches(scene.folded, scene.choices.prony)]
+    if steps := describe_steps(setup.job):
         told.append(f"time steps that are chosen: {steps}")
     if found is None:
         return told
@@ -200,49 +201,46 @@ def facts(built: Scene) -> list[str]:
 # -- parts ------------------------------------------------------------------------------------------------------------
 
 
-def _motion(base: Setup) -> Motion:
+def _motion(setup: Setup) -> Motion:
     """How the surface moves."""
-    if not decisions.part_cells(base.job).on:
-        return WholeCells(base.surface)
-    if decisions.along_x(base.job):
-        return PartCells(base.surface)
-    return AnyFraction(base.surface)
+    if not setup.choices.part_cells.on:
+        return WholeCells(setup.surface)
+    return PartCells(setup.surface) if setup.choices.slides_along_x else AnyFraction(setup.surface)
 
 
-def _material(base: Setup, branches: FoldedBranches) -> ElasticBody | ZenerBody:
-    if not relaxation.decide(base.job).on:
-        return ElasticBody(base.slab, base.prony.modulus_inf)
-    integrator = base.job.numerics.integrator
-    return ZenerBody(base.slab, base.prony, integrator, branches.memoryless, branches.frozen)
+def _material(setup: Setup, folded: FoldedBranches) -> ElasticBody | ZenerBody:
+    if not setup.choices.viscoelasticity.on:
+        return ElasticBody(setup.slab, setup.prony.modulus_inf)
+    integrator = setup.choices.numerics.integrator
+    return ZenerBody(setup.slab, setup.prony, integrator, folded.memoryless, folded.frozen)
 
 
-def _solver(base: Setup, tolerance: float) -> tuple[ContactSolver, Operators]:
+def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) -> tuple[ContactSolver, Operators]:
     """The contact solver with its workspace, and the operators of the body."""
-    height, limit = base.height / base.units.height, base.job.numerics.max_iterations
-    operators = _operators(base)
-    grids = grids_for(base.job.grid.dx, base.job.grid.dy)
-    kept = np.float32 if decisions.single_operator(base.job).on else np.float64
-    return ContactSolver(Workspace(base.slab, tolerance, kept), height, tolerance, limit, grids), operators
+    height, limit = setup.height / setup.units.height, setup.choices.numerics.max_iterations
+    operators = _operators(setup, operator_type)
+    grids = grids_for(setup.grid.dx, setup.grid.dy)
+    workspace = Workspace(setup.slab, tolerance, operator_type)
+    return ContactSolver(workspace, height, tolerance, limit, grids), operators
 
 
-def _operators(base: Setup) -> Operators:
+def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
     """The operator of the half space, and its preconditioner."""
-    body = base.half_space
-    if not decisions.mixed_precision(base.job).on:
-        return Operators(body.operator(base.fft), body.inverse(base.fft))
-    single = FFT(base.slab, dtype=np.float32, measured=base.fft.measured, lender=base.fft)
-    own = single if decisions.single_operator(base.job).on else base.fft
-    return Operators(body.operator(own), body.inverse(single))
+    body = setup.half_space
+    if not setup.choices.mixed_precision.on:
+        return Operators(body.operator(setup.fft), body.inverse(setup.fft))
+    single = FFT(setup.slab, dtype=np.float32, measured=setup.fft.measured, lender=setup.fft)
+    return Operators(body.operator(single if operator_type == np.float32 else setup.fft), body.inverse(single))
 
 
 def _energy(
-    base: Setup, solver: ContactSolver, operators: Operators, material: ElasticBody | ZenerBody
+    setup: Setup, solver: ContactSolver, operators: Operators, material: ElasticBody | ZenerBody
 ) -> ElasticEnergy | ZenerEnergy:
-    slab, grid, units = base.slab, base.job.grid, base.units
+    slab, grid, units = setup.slab, setup.grid, setup.units
     unit = units.pressure * units.height * grid.dx * grid.dy
     if isinstance(material, ElasticBody):
         return ElasticEnergy(slab, unit)
-    if decisions.energy_memory(base.job).on:
+    if setup.choices.energy_memory.on:
         return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.pressure)
     return ZenerEnergy(slab, material, inverse, unit)

@@ -107,9 +107,9 @@ def run(
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
-        base = scene.set_up(job, slab)
-        doubts = [*job.warnings, *describe_beyond(job, wanted.temperatures), *sanity.of_surface(base)]
-        sliding = SteadySliding(base)
+        setup = scene.set_up(job, slab)
+        doubts = [*job.warnings, *describe_beyond(job, wanted.temperatures), *sanity.of_surface(setup)]
+        sliding = SteadySliding(setup)
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:
             directory.clear()
@@ -177,8 +177,8 @@ class _Curve:
         others_file: StopFile | None,
     ) -> None:
         self.sliding, self.wanted, self.table, self.maps = sliding, wanted, table, maps
-        self.directory, self.signals, self.slab = directory, signals, sliding.base.slab
-        job = sliding.base.job
+        self.directory, self.signals, self.slab = directory, signals, sliding.setup.slab
+        job = sliding.setup.job
         self.shows, self.others_file = shows, others_file
         self.watch, self.failures = sanity.ContactWatch(job, Timeline.of(job)), 0
 
@@ -239,15 +239,15 @@ class _Curve:
 
     def _fields(self) -> Iterator[tuple[str, Array]]:
         """The maps of the last point that the job asks for, in SI units."""
-        contact, base = self.sliding.contact, self.sliding.base
+        contact, setup = self.sliding.contact, self.sliding.setup
         assert contact is not None
-        heights, unit = self.sliding.levels[0].heights, base.units.height
-        for name in base.job.output.fields:
+        heights, unit = self.sliding.levels[0].heights, setup.units.height
+        for name in setup.job.output.fields:
             if name == "pressure":
-                yield name, contact.p * base.units.pressure
+                yield name, contact.p * setup.units.pressure
             elif name == "displacement":
                 yield name, contact.u * unit
             elif name == "height":
-                yield name, heights * unit + base.surface.datum
+                yield name, heights * unit + setup.surface.datum
             else:
                 yield name, (contact.u - heights - contact.d) * unit

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import RunError
 from ..march.errors import known_of
 from ..parallel.fft import FFT
@@ -20,7 +19,7 @@ from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.seen import Seen
-from ..scene import Setup
+from ..scene import Setup, choices
 from ..solve import kernels, nested
 from ..solve.certificate import Certificate
 from ..solve.nonsymmetric import proximal
@@ -81,28 +80,23 @@ class SteadySliding:
     Started from coarser grids, or from the last state where that is very near. `footprint` says what it holds.
     """
 
-    def __init__(self, base: Setup) -> None:
-        self.base = base
-        self.ledger = base.ledger()
-        heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-        finest, *coarser = nested.levels_of(base.slab, heights)
-        self.levels = [Level(base.slab, base.fft, finest.heights)]
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.ledger = setup.ledger()
+        heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
+        finest, *coarser = nested.levels_of(setup.slab, heights)
+        self.levels = [Level(setup.slab, setup.fft, finest.heights)]
         self.levels += [Level(level.slab, FFT(level.slab), level.heights) for level in coarser]
-        self._known = known_of(base, 0.0, True, None)
+        self._known = known_of(setup, 0.0, True, None)
         self.contact: SteadyContact | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
-        self.temperature, self._slow = math.nan, time_factor_of(base.job)
+        self.temperature = math.nan
 
     def heat(self, temperature: float) -> None:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
-        if temperature == self.temperature:
-            return
-        job = self.base.job.at_temperature(temperature)
-        series = relaxation_of(job)
-        scaled = Prony(self.base.prony.modulus_inf, self.base.prony.moduli, series.relaxation_times)
-        self.base = replace(self.base, job=job, prony=scaled)
-        self.ledger = self.base.ledger()
-        self.temperature, self._slow = temperature, time_factor_of(job)
+        if temperature != self.temperature:
+            self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
+            self.ledger, self.temperature = self.setup.ledger(), temperature
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
@@ -110,9 +104,9 @@ class SteadySliding:
         Raises RunError, with the certificate reached, when none of the starts leads to one.
         """
         began = time.perf_counter()
-        mean = pressure / self.base.units.pressure
+        mean = pressure / self.setup.units.pressure
         speed, calls = math.hypot(*velocity), 0.0
-        reduced = self._slow * speed
+        reduced = self.setup.choices.time_factor * speed
         for start, solver in self._starts(reduced, pressure):
             contact, more, by_energy = self._descend(velocity, mean, start, solver)
             calls += more
@@ -128,10 +122,10 @@ class SteadySliding:
         measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
         if not measures.finite:
             raise RunError(f"steady sliding at {speed:g} m/s under {pressure:g} Pa: its results would not be finite")
-        lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.base.job.grid.boundary == "periodic" else ()
+        lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.setup.grid.boundary == "periodic" else ()
         friction, errors = self._judge(contact, by_energy, velocity, measures)
         seconds = time.perf_counter() - began
-        place = velocity, pressure, self.temperature, self._slow
+        place = velocity, pressure, self.temperature, self.setup.choices.time_factor
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost)
 
     def _judge(
@@ -139,29 +133,29 @@ class SteadySliding:
     ) -> tuple[float, ErrorBudget]:
         """Return friction from that by energy, with what an interface adds, and how wrong it and the area are;
         collective."""
-        base, speed = self.base, math.hypot(*velocity)
-        load, rise = base.slab.sum(*slope_under(contact.p, self.levels[0].heights))
+        setup, speed = self.setup, math.hypot(*velocity)
+        load, rise = setup.slab.sum(*slope_under(contact.p, self.levels[0].heights))
         slopes = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / (speed * measures.normal_force)
         friction = by_energy + measures.friction_interface
         seen = Seen(
             contact.certificate.complementarity,
             difference=0.0,
             order=2.0,
-            slope=math.sqrt(rise / load) / (2.0 * base.job.grid.dx) * base.units.height,
+            slope=math.sqrt(rise / load) / (2.0 * setup.grid.dx) * setup.units.height,
             friction=friction,
             area=measures.contact_area,
             corrected=measures.contact_area_corrected,
             penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
             views_apart=abs(slopes - friction),
         )
-        return friction, estimate_steady(self._known, seen, base.slab.points)
+        return friction, estimate_steady(self._known, seen, setup.slab.points)
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
 
         Of the last state; only for periodic scenes, where waves are independent. Collective.
         """
-        longest = max(self.base.job.grid.size)
+        longest = max(self.setup.grid.size)
         power = self._powers(velocity)
         total = power.sum()
         return longest / 2.0 ** np.arange(power.shape[1]), power.sum(axis=0) / (total if total > 0.0 else 1.0)
@@ -172,26 +166,26 @@ class SteadySliding:
         A wave u^ loses `|u^|^2/A |w| G_k''(|w|)`, with A its displacement over its pressure for a modulus of 1.
         """
         assert self.contact is not None
-        base, fft, prony, grid = self.base, self.base.fft, self.base.prony, self.base.job.grid
-        spectrum, speed = fft.forward(self.contact.u), self.base.in_units(velocity)
+        setup, fft, prony, grid = self.setup, self.setup.fft, self.setup.prony, self.setup.grid
+        spectrum, speed = fft.forward(self.contact.u), self.setup.in_units(velocity)
         cells = max(max(grid.size) / grid.dx, max(grid.size) / grid.dy)  # along the longer side, of the smaller length
         powers = np.zeros((prony.moduli.size, 2 + int(np.log2(cells * (1 + 1e-9)))))
         for rows in deal(fft.my, PARTS):
-            omega = np.abs(base.half_space.frequencies(fft, speed, rows))
-            compliance = base.half_space.symbol(fft, rows)
+            omega = np.abs(setup.half_space.frequencies(fft, speed, rows))
+            compliance = setup.half_space.symbol(fft, rows)
             waves = fft.multiplicity * np.abs(spectrum[rows]) ** 2
             waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
             octave = self._octaves(rows)
             for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
                 loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
                 branch += np.bincount(octave.ravel(), loss.ravel(), branch.size)
-        unit = base.units.pressure * base.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
-        return np.array(base.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
+        unit = setup.units.pressure * setup.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
+        return np.array(setup.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
 
     def _octaves(self, rows: slice) -> NDArray[np.int64]:
         """How many times the wavelength of each wave, on these rows of a spectrum, can be doubled within the box."""
-        size = self.base.job.grid.size
-        q = np.hypot(*wavenumbers(self.base.fft, size, rows))
+        size = self.setup.grid.size
+        q = np.hypot(*wavenumbers(self.setup.fft, size, rows))
         return np.floor(np.log2(np.maximum(q * max(size) / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(np.int64)
 
     # -- starts and levels --------------------------------------------------------------------------------------------
@@ -211,7 +205,7 @@ class SteadySliding:
             yield from ((self.contact.p, self._solver), (None, self._solver))
         else:
             yield from ((None, self._solver), (self.contact.p, self._solver))
-        if 1 not in self.base.job.grid.points:
+        if 1 not in self.setup.grid.points:
             yield None, partial(self._solver, narrow=True)
         yield None, self._proximal
 
@@ -223,33 +217,33 @@ class SteadySliding:
     ) -> tuple[SteadyContact, float, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took, and
         friction by energy, without an interface."""
-        tally, calls = self.base.slab.tally, 0.0
+        tally, calls = self.setup.slab.tally, 0.0
 
         def solve(level: Level, p: Array) -> tuple[SteadyContact, Convolution]:
             nonlocal calls
             before = tally["operator"]
             chosen, operator = solver(level, velocity)
             contact = chosen.solve(level.heights, mean, p)
-            calls += (tally["operator"] - before) * level.slab.points / self.base.slab.points
+            calls += (tally["operator"] - before) * level.slab.points / self.setup.slab.points
             return contact, operator
 
-        p = self.base.slab.empty()
+        p = self.setup.slab.empty()
         if start is None:
             nested.descend(self.levels, lambda level, below: solve(level, below)[0].p, p)
         else:
             p[...] = start
         contact, operator = solve(self.levels[0], p)
-        speed, unit, load = math.hypot(*velocity), self.base.units.height / self.base.units.length, kernels.total(p)
-        lost = operator.loss(p, self.base.size, (velocity[0] / speed, velocity[1] / speed))
-        return contact, calls, lost / (self.base.slab.sum(load)[0] or math.nan) * unit
+        speed, unit, load = math.hypot(*velocity), self.setup.units.height / self.setup.units.length, kernels.total(p)
+        lost = operator.loss(p, self.setup.size, (velocity[0] / speed, velocity[1] / speed))
+        return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
     def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> tuple[SteadySolver, Convolution]:
-        operator, inverse = self.operators(level, velocity, self.base.prony)
+        operator, inverse = self.operators(level, velocity, self.setup.prony)
         return self._solver_for(level, operator, inverse, narrow), operator
 
     def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
-        operator, inverse = self.operators(level, velocity, self.base.prony)
-        kind = self.base.fft.complex
+        operator, inverse = self.operators(level, velocity, self.setup.prony)
+        kind = self.setup.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
         solver = self._solver_for(level, nearer, nearer_inverse, narrow=True)
         pull = operator.mapped(proximal.pull, np.float64)
@@ -258,13 +252,13 @@ class SteadySliding:
     def _solver_for(
         self, level: Level, operator: Convolution, preconditioner: Convolution, narrow: bool
     ) -> SteadySolver:
-        base, numerics = self.base, self.base.job.numerics
+        setup, numerics = self.setup, self.setup.choices.numerics
         tolerance = tolerance_of(numerics.tolerance)
         return SteadySolver(
             level.slab,
             operator,
             preconditioner,
-            base.height / base.units.height,
+            setup.height / setup.units.height,
             tolerance if level is self.levels[0] else max(tolerance, COARSE_TOLERANCE),
             20 * numerics.max_iterations,
             narrow=narrow,
@@ -272,7 +266,7 @@ class SteadySliding:
 
     def operators(self, level: Level, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
         """Pressure -> displacement at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
-        half_space, speed = self.base.half_space, self.base.in_units(velocity)
+        half_space, speed = self.setup.half_space, self.setup.in_units(velocity)
         return (
             half_space.sliding_operator(level.fft, speed, prony),
             half_space.sliding_inverse(level.fft, speed, prony),
@@ -284,15 +278,15 @@ def tolerance_of(asked: float) -> float:
     return max(SHARE * asked, min(LOOSE, asked))
 
 
-def branch_maps(base: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
+def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
     """The map h_k of each branch in a steady state at a velocity [m/s], each time in `out`; collective."""
-    fft, half_space, speed = base.fft, base.half_space, base.in_units(velocity)
+    fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
     if half_space.free:
-        for k in range(base.prony.moduli.size):
-            yield half_space.branch_operator(fft, speed, base.prony, k).apply(contact.p, out)
+        for k in range(setup.prony.moduli.size):
+            yield half_space.branch_operator(fft, speed, setup.prony, k).apply(contact.p, out)
         return
     u = fft.forward(contact.u).copy()
-    for modulus, tau in zip(base.prony.moduli, base.prony.relaxation_times, strict=True):
+    for modulus, tau in zip(setup.prony.moduli, setup.prony.relaxation_times, strict=True):
         own = Prony(0.0, np.array([modulus]), np.array([tau]))
         for rows in deal(fft.my, PARTS):
             np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import progress
-from ..effects.interface import InterfaceColumns, interface_of
+from ..effects.interface import InterfaceColumns
 from ..job.checks.sample import describe_sample
 from ..storage import curve_points, files, measures
 from ..storage.console import Console, always
@@ -30,10 +30,10 @@ class CurveTable:
     """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
 
     def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, heated: bool, quiet: bool) -> None:
-        self._console, self._job = Console(directory / LOG, quiet, 0), sliding.base.job
+        self._console, self._job = Console(directory / LOG, quiet, 0), sliding.setup.job
         self.path, self.heated, self.quiet, self.failed = directory / "steady.csv", heated, quiet, 0
-        branches = sliding.base.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
-        self.interface = InterfaceColumns.columns if interface_of(self._job) else ()
+        branches = sliding.setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
+        self.interface = InterfaceColumns.columns if sliding.setup.choices.interface else ()
         added = (*(HEATED if heated else ()), *self.interface)
         self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
         self.known = self._read()

@@ -9,15 +9,15 @@ import json
 import os
 import platform
 import zlib
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import private
-from ..effects import decisions
-from ..job import Job
 from ..parallel import fft
 from ..parallel.fft import export_wisdom, import_wisdom
 from ..parallel.fftw import pyfftw
@@ -34,19 +34,20 @@ def gather(slab: Slab) -> NDArray[np.uint8]:
     return np.frombuffer(zlib.compress(text.encode()), dtype=np.uint8)
 
 
-def recall(job: Job, slab: Slab, saved: NDArray[np.uint8] | None) -> None:
-    """Use the wisdom of a checkpoint, if it is of as many ranks, else that of the first such run here; collective."""
+def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | None) -> None:
+    """Use the wisdom of a checkpoint, if it is of as many ranks, else that of the first run here with such
+    `transforms` (`scene.Choices`); collective."""
     data = None if saved is None else saved.tobytes()
     if not _adopt(data, slab):
-        _adopt(slab.agree(_read(_place(job, slab)) if slab.root else None), slab)
+        _adopt(slab.agree(_read(_place(transforms, slab)) if slab.root else None), slab)
 
 
-def keep(job: Job, slab: Slab) -> None:
+def keep(transforms: Sequence[Any], slab: Slab) -> None:
     """Keep the wisdom of this run for later ones, unless there is some; collective."""
     data = gather(slab).tobytes()
     if slab.root:
         with suppress(OSError):  # a convenience: a run without a place for it does as well
-            if place := _place(job, slab):
+            if place := _place(transforms, slab):
                 part = place.with_name(f"{place.name}.{os.getpid()}")
                 part.write_bytes(data)
                 try:
@@ -75,7 +76,7 @@ def _read(place: Path | None) -> bytes | None:
         return None
 
 
-def _place(job: Job, slab: Slab) -> Path | None:
+def _place(transforms: Sequence[Any], slab: Slab) -> Path | None:
     """A file for all runs on this kind of machine whose transforms are the same; None if there is no safe place."""
     directory = private.directory("plans")
     if directory is None:
@@ -83,9 +84,7 @@ def _place(job: Job, slab: Slab) -> Path | None:
     cpu = ""
     with suppress(OSError):
         cpu = next((line for line in CPUINFO.read_text().splitlines() if line.startswith("model name")), "")
-    steady = [job.initial.state, job.steady is not None]
-    numerics, single = job.numerics, [decisions.mixed_precision(job).on, decisions.single_operator(job).on]
     facts = [platform.machine(), cpu, pyfftw.fftw_version, zlib.crc32(Path(fft.__file__).read_bytes())]
-    facts += [slab.comm.size, job.grid.points, job.grid.boundary, numerics.kernel, numerics.precision, single, steady]
+    facts += [slab.comm.size, *transforms]
     name = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
     return directory / name

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 
 from parcontact import job, scene
-from parcontact.effects.folded_branches import bands, fold_branches_of, phases
+from parcontact.effects.folded_branches import bands, phases
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
@@ -48,6 +48,11 @@ def sliding(*history: Json, **changes: Any) -> Job:
     return Job.model_validate(data(*history, **changes))
 
 
+def bands_of(*shapes: Json) -> list[Band]:
+    planned = sliding(surface=list(shapes))
+    return list(bands(planned.grid, planned.surface))
+
+
 # -- from a job to its time scales -------------------------------------------------------------------------------------
 
 
@@ -56,7 +61,7 @@ def test_phases_of_a_job() -> None:
     press = {"pressure": {"from": 0.0, "to": 1e5}, "duration": 7e-3, "time_step": {"first": 1e-3, "growth": 2.0}}
     raised = {**SLIDE, "pressure": 3e5, "velocity": [0.0, 0.1], "distance": 1e-4, "time_step": 4e-4}
     del raised["cells_per_step"]
-    found = list(phases(sliding(press, SLIDE, {"pressure": 3e5}, raised), until=0.0111))
+    found = list(phases(Timeline.of(sliding(press, SLIDE, {"pressure": 3e5}, raised), until=0.0111)))
     expected = [
         Phase(7e-3, 1e-3, 4e-3, (0.0, 0.0), jump=False),
         Phase(2.5e-3, 2.5e-3 / 12, 2.5e-3 / 12, (0.2, 0.0), jump=False),
@@ -73,13 +78,13 @@ def test_bands_of_surfaces() -> None:
     finest = np.pi / (0.4e-3 / NY)
     rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2e-4, "short_wavelength": 1e-4, "rms_slope": 0.1}
     sphere, ridge = {"shape": "sphere", "radius": 1e-2}, {"shape": "cylinder", "radius": 1e-2, "axis": "x"}
-    found = list(bands(sliding(surface=[rough, sphere, ridge, {"shape": "flat"}])))
+    found = bands_of(rough, sphere, ridge, {"shape": "flat"})
     assert found == [
         Band(2 * np.pi / 2e-4, 2 * np.pi / 1e-4, np.pi / (0.4e-3 / NY)),
         Band(2 * np.pi / 1e-3, finest, finest),
         Band(2 * np.pi / 1e-3, finest, finest, (0.0, 1.0)),
     ]
-    wave = next(iter(bands(sliding(surface={"shape": "wave", "amplitude": 1e-6, "waves": [3, -1]}))))
+    wave = bands_of({"shape": "wave", "amplitude": 1e-6, "waves": [3, -1]})[0]
     assert wave.low == wave.high == np.hypot(3 * 2 * np.pi / 1e-3, 2 * np.pi / 0.4e-3)
 
 
@@ -254,6 +259,6 @@ def test_steps_too_short_for_a_branch_without_memory_are_refused(place: Place) -
 def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
     Place(MPI.COMM_SELF, tmp_path).run(data(numerics={"branch_error": 1e-2}), until=2e-4)
     log = (tmp_path / "out" / "run.log").read_text()
-    bound = fold_branches_of(sliding(numerics={"branch_error": 1e-2})).bound
+    bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
     assert "branches: 1 of 4 have a map, memoryless 1e-06 s; frozen 3, 10000 s; " in log
     assert f"wrong by at most {bound:.2g} of itself (numerics.branch_error 0.01)" in log

@@ -19,7 +19,6 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact import __main__, job, scene
-from parcontact.effects.effect import effects_that_follow
 from parcontact.job import Job, JobError, extension, model
 from parcontact.manual import texts
 from parcontact.parallel.slab import Slab
@@ -122,7 +121,7 @@ def test_plan_counts_its_bytes(installed: Path, comm: MPI.Intracomm) -> None:
     assert held["wear"] == 8 * slab.shape[0] * NX
     assert sum(held.values()) == slab.tally["map bytes"]
     assert memory.saved(planned) - memory.saved(Job.model_validate(DATA)) == 8 * NX * NY + 4 * NY
-    assert [decision.why for decision in scene.effects(planned) if decision.name == "wear"] == [
+    assert [decision.why for decision in scene.choices(planned).effects if decision.name == "wear"] == [
         "the job has a section wear"
     ]
 
@@ -140,7 +139,9 @@ def test_absent_it_costs_nothing(installed: Path, comm: MPI.Intracomm) -> None:
     }
     expected = {"map bytes": 8 * NX * on.scene.slab.shape[0], "allreduce": len(rows) - 1}
     assert extra == {name: count for name, count in expected.items() if count}
-    assert not next(decision.on for decision in scene.effects(Job.model_validate(DATA)) if decision.name == "wear")
+    assert not next(
+        decision.on for decision in scene.choices(Job.model_validate(DATA)).effects if decision.name == "wear"
+    )
 
 
 def test_a_job_reaches_other_ranks(installed: Path, comm: MPI.Intracomm) -> None:
@@ -151,7 +152,7 @@ def test_a_job_reaches_other_ranks(installed: Path, comm: MPI.Intracomm) -> None
     assert own.section("wear").coefficient == COEFFICIENT
     again = Job.model_validate(yaml.safe_load(own.resolved()))
     assert again == own
-    assert list(effects_that_follow(again)) == ["wear"]
+    assert list(scene.choices(again).followers) == ["wear"]
     assert begun(DATA).scene.job.section("wear") is None
 
 

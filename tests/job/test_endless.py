@@ -29,7 +29,7 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, count: int, way: str) -> No
     assert timeline[timeline.count].time == float(count)
     assert timeline[timeline.count // 2].time == pytest.approx(count / 2, rel=2e-7)
     assert timeline[timeline.count].dt == pytest.approx(1.0, rel=2e-9)
-    assert scene.effects(job)
+    assert scene.choices(job).effects
     assert time.process_time() - began < 1.0
 
 

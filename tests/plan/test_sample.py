@@ -7,11 +7,11 @@ from marching import begun, marched
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.effects import decisions
 from parcontact.history.timeline import Timeline
 from parcontact.parallel.slab import Slab
 from parcontact.plan.sample import Sample, StageCost, chosen, sample
 from parcontact.plan.trial import make_tiny
+from parcontact.scene import choices
 from parcontact.steady_sliding.sliding import SteadySliding
 
 from .planned import CELLS, JOBS, SLIDE, TWO, Json, job
@@ -91,7 +91,7 @@ def test_a_tiny_scene_has_all_that_runs(name: str) -> None:
     small = make_tiny(planned)
     assert small is not None
     assert max(small.grid.points) == 16
-    assert decisions.isolated(small).on == decisions.isolated(planned).on
+    assert choices(small).isolated.on == choices(planned).isolated.on
     assert (small.material, small.history) == (planned.material, planned.history)
 
 

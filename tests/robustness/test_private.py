@@ -16,6 +16,7 @@ from mpi4py import MPI
 from parcontact import private
 from parcontact.job import load
 from parcontact.parallel.slab import Slab
+from parcontact.scene import choices
 from parcontact.storage import wisdom
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
@@ -208,16 +209,16 @@ def test_code_that_somebody_prepared_is_not_loaded(common: Path) -> None:
 def test_plans_that_somebody_prepared_are_not_read(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(JOB)
     job, slab = load(tmp_path / "job.yaml"), Slab(MPI.COMM_SELF, 16, 4)
-    wisdom.keep(job, slab)
+    wisdom.keep(choices(job).transforms, slab)
     (kept,) = (cache / "parcontact" / "plans").iterdir()
-    assert wisdom._place(job, slab) == kept
+    assert wisdom._place(choices(job).transforms, slab) == kept
     assert wisdom._read(kept) == kept.read_bytes()
     os.chown(kept, NOBODY, NOBODY)
     assert wisdom._read(kept) is None
     os.chown(kept.parent, NOBODY, NOBODY)
-    assert wisdom._place(job, slab) is None
+    assert wisdom._place(choices(job).transforms, slab) is None
     assert wisdom._read(None) is None
-    wisdom.keep(job, slab)
+    wisdom.keep(choices(job).transforms, slab)
     assert [path.name for path in kept.parent.iterdir()] == [kept.name]
 
 
@@ -226,7 +227,7 @@ def test_plans_are_those_of_a_precision(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(JOB)
     slab, mixed = Slab(MPI.COMM_SELF, 16, 4), "numerics.precision=mixed"
     jobs = [load(tmp_path / "job.yaml", [mixed, f"numerics.tolerance={size}"]) for size in ("1e-3", "1e-4")]
-    assert len({wisdom._place(job, slab) for job in jobs} - {None}) == 2
+    assert len({wisdom._place(choices(job).transforms, slab) for job in jobs} - {None}) == 2
 
 
 def test_mpirun_without_a_home() -> None:

@@ -152,9 +152,9 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
     assert all(line.startswith("#") for line in text.splitlines()[:5])
     assert yaml.safe_load(text)["shift"]["law"] == "wlf"
     for temperature in ("", ", temperature: 50"):
-        included = relaxation_of(load(tmp_path, f"{{include: rubber{temperature}}}"))
+        included = relaxation_of(load(tmp_path, f"{{include: rubber{temperature}}}").material)
         dma = f"{{model: dma, path: rubber.csv, reference: 20, error: 0.05{temperature}}}"
-        fitted = relaxation_of(load(tmp_path, dma))
+        fitted = relaxation_of(load(tmp_path, dma).material)
         assert included.modulus_inf == pytest.approx(fitted.modulus_inf, rel=1e-6)
         assert_allclose(included.moduli, fitted.moduli, rtol=1e-6)
         assert_allclose(included.relaxation_times, fitted.relaxation_times, rtol=1e-6)

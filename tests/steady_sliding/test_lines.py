@@ -51,7 +51,7 @@ def test_points_left_out_are_taken_in_again(shared_path: Path, comm: MPI.Intraco
     states, pressure = cylinder_on(shared_path, comm, 100.0, 60.0)
     velocity = (2.7 * LINE / CREEP_TIME, 0.0)
     states.solve(velocity, pressure)
-    level, mean = states.levels[0], pressure / states.base.units.pressure
+    level, mean = states.levels[0], pressure / states.setup.units.pressure
     solver, _ = states._solver(level, velocity, False)
     assert states.contact is not None
     solution = states.contact.p.copy()

@@ -61,7 +61,7 @@ def test_what_cannot_be_solved_is_given_up(
 ) -> None:
     """When so many contacts have not halved the certificate, and when all have taken so many steps."""
     states = sliding(shared_path, ROUGH, comm)
-    level, mean = states.levels[0], 1e6 / states.base.units.pressure
+    level, mean = states.levels[0], 1e6 / states.setup.units.pressure
     solver, _ = states._proximal(level, (0.3 * PEAK, 0.0))
     monkeypatch.setattr(proximal, constant, 0)
     contact = solver.solve(level.heights, mean, level.slab.zeros())

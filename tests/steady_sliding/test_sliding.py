@@ -209,8 +209,8 @@ def test_random_scenes_are_right_or_say_so(shared_path: Path, comm: MPI.Intracom
         except RunError:
             continue
         solved += 1
-        assert certificate(states, speed, pressure) <= states.base.job.numerics.tolerance * (1 + 1e-6)
-        assert point.certificate.worst <= states.base.job.numerics.tolerance
+        assert certificate(states, speed, pressure) <= states.setup.job.numerics.tolerance * (1 + 1e-6)
+        assert point.certificate.worst <= states.setup.job.numerics.tolerance
     assert solved >= 20
 
 
@@ -221,7 +221,7 @@ def test_branches_add_up_to_the_body(shared_path: Path, comm: MPI.Intracomm, bou
     states = sliding(shared_path, text, comm)
     velocity, pressure = ((0.02, 0.03), 1.0e5) if boundary == "periodic" else ((0.04, 0.01), FORCE / (7 * CONTACT) ** 2)
     states.solve(velocity, pressure)
-    base, contact = states.base, states.contact
+    base, contact = states.setup, states.contact
     assert contact is not None
     body = base.prony.modulus_inf * contact.u
     for branch in branch_maps(base, contact, velocity, base.slab.empty()):
