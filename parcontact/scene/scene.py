@@ -157,9 +157,9 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
 def build_on(setup: Setup) -> Scene:
     """Make the scene of a setup; collective."""
     chosen, folded = setup.choices, setup.slab.agree(setup.choices.folded)
-    material = _material(setup, folded)
     solver, operators = _solver(setup, chosen.numerics.tolerance, chosen.operator_type)
-    energy = _energy(setup, solver, operators, material) if chosen.energies.on else None
+    inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.pressure)
+    material, energy = _body_and_energy(setup, folded, inverse)
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.ledger(), energy)
     scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}
     values_of(scene.followers)  # refuses those that do not fit, before anything is written
@@ -208,13 +208,6 @@ def _motion(setup: Setup) -> Motion:
     return PartCells(setup.surface) if setup.choices.slides_along_x else AnyFraction(setup.surface)
 
 
-def _material(setup: Setup, folded: FoldedBranches) -> ElasticBody | ZenerBody:
-    if not setup.choices.viscoelasticity.on:
-        return ElasticBody(setup.slab, setup.prony.modulus_inf)
-    integrator = setup.choices.numerics.integrator
-    return ZenerBody(setup.slab, setup.prony, integrator, folded.memoryless, folded.frozen)
-
-
 def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) -> tuple[ContactSolver, Operators]:
     """The contact solver with its workspace, and the operators of the body."""
     height, limit = setup.height / setup.units.height, setup.choices.numerics.max_iterations
@@ -233,14 +226,17 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
     return Operators(body.operator(single if operator_type == np.float32 else setup.fft), body.inverse(single))
 
 
-def _energy(
-    setup: Setup, solver: ContactSolver, operators: Operators, material: ElasticBody | ZenerBody
-) -> ElasticEnergy | ZenerEnergy:
-    slab, grid, units = setup.slab, setup.grid, setup.units
-    unit = units.pressure * units.height * grid.dx * grid.dy
-    if isinstance(material, ElasticBody):
-        return ElasticEnergy(slab, unit)
-    if setup.choices.energy_memory.on:
-        return ZenerEnergy(slab, material, ElasticPressure(slab, material.prony, material.integrator), unit)
-    inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.pressure)
-    return ZenerEnergy(slab, material, inverse, unit)
+def _body_and_energy(
+    setup: Setup, folded: FoldedBranches, inverse: AppliedInverse
+) -> tuple[ElasticBody | ZenerBody, ElasticEnergy | ZenerEnergy | None]:
+    """The body, and its energies if the job asks for them, with the `inverse` of the operator if that is at hand."""
+    chosen, slab, integrator = setup.choices, setup.slab, setup.choices.numerics.integrator
+    unit = setup.units.pressure * setup.units.height * setup.grid.dx * setup.grid.dy
+    if not chosen.viscoelasticity.on:
+        body = ElasticBody(slab, setup.prony.modulus_inf)
+        return body, ElasticEnergy(slab, unit) if chosen.energies.on else None
+    rubber = ZenerBody(slab, setup.prony, integrator, folded.memoryless, folded.frozen)
+    if not chosen.energies.on:
+        return rubber, None
+    memory = ElasticPressure(slab, setup.prony, integrator) if chosen.energy_memory.on else None
+    return rubber, ZenerEnergy(slab, rubber, memory or inverse, unit)
