@@ -187,7 +187,7 @@ def surface(options: argparse.Namespace) -> int:
     from ..parallel.slab import Slab
     from ..plotting import surfaces
     from ..scene import sanity
-    from ..summary import measured_maps
+    from . import measured_maps
 
     given = Path(options.job)
     picture, options.out = Path(options.out or f"{given.stem}-surface.png"), None

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..history.timeline import Timeline
+from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import measures
-from ..storage.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from . import units
 
 Panel = Callable[[Axes], None]

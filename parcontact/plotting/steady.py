@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..storage.resolved import STEADY_RESOLVED, shown_job
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 from .run import box, table

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..storage.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..summary import sweep_table
 from ..summary.sweep_table import SEED
 from . import style, units

@@ -5,8 +5,8 @@ from pathlib import Path
 from .. import job as jobs
 from ..errors import InputError
 from ..job import Job
+from ..job.resolved import shown_job
 from ..job.sections import listing
-from ..storage.resolved import shown_job
 from .parts import Section, Table
 
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # told by other sections

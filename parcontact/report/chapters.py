@@ -5,10 +5,10 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..job import Job
+from ..job.resolved import RESOLVED, STEADY_RESOLVED
 from ..plotting import plots
 from ..plotting.charts import Series
 from ..storage import measures
-from ..storage.resolved import RESOLVED, STEADY_RESOLVED
 from . import asked, budget, log, material, origin, results, road
 from .parts import Chapter, Section, of_chart, of_file
 

@@ -118,10 +118,7 @@ def write_steady(job: Job, wanted: Request) -> Path:
 
 
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
-    """The rows as theory.csv in the output directory of the job, with theory.yaml beside it; returns the table's path.
-
-    The settings hold the checksum of their table, and so are never those of another one.
-    """
+    """Write the rows as theory.csv, and theory.yaml beside it, for the job; returns the table's path."""
     path = job.output.directory / theory_settings.TABLE
     with _told_where(path):
         _write(path, COLUMNS, rows, theory_settings.is_own_table)

@@ -36,7 +36,8 @@ def of_run(directory: Path) -> Section:
             rows.append((name.replace("_", " "), number(known[-1]), number(min(known)), number(max(known)), unit))
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     pictures = [of_chart(chart) for chart in histories.charts(run)]
-    told = [*slide.describe(run.job, columns), theory_settings.describe(directory)]
+    job = run.job
+    told = [*slide.describe(job.history, job.initial, job.grid.dx, columns), theory_settings.describe(directory)]
     return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(run))
 
 

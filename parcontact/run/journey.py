@@ -193,7 +193,7 @@ class Journey:
         if self.slab.root and self._slides:
             with suppress(OSError, InputError):
                 rows = measures.read(self.directory.path / "measures.csv")
-                for text in slide.describe(self.job, rows):
+                for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
                     self.console.say(text)
 
     def _farewell(self) -> int:

@@ -10,10 +10,10 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
+from ..job.resolved import RESOLVED, shown_job
 from ..storage import checkpoint, curve_points, hdf5, marker, measures
 from ..storage.console import warnings_of
 from ..storage.marker import Claim
-from ..storage.resolved import RESOLVED, shown_job
 from . import slide, sweep_table, theory_settings
 
 MEAN_OF = ("friction", "contact_area")
@@ -66,7 +66,7 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
     if (directory / RESOLVED).exists():
         job = shown_job(directory / RESOLVED)
-        yield from (f"  {text}" for text in slide.describe(job, columns))
+        yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
 
 
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

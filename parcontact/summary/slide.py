@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..job import Initial, Job, Ramp, Stage
+from ..job import Initial, Ramp, Stage
 from ..physics.budget import per_cent
 
 DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
@@ -90,12 +90,14 @@ def _within(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell
     return f" +- {both:.2g}" + (f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * both else "")
 
 
-def describe(job: Job, columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
-    """Sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing has slid.
+def describe(
+    history: Sequence[Stage], initial: Initial, cell: float, columns: Mapping[str, Sequence[float]]
+) -> Iterator[str]:
+    """Yield sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing slid.
 
-    As long as the last slide has not begun, they are about the one before it, and say so.
+    `cell` is the spacing of the grid along x [m]. As long as the last slide has not begun, the sentences are about the
+    one before it, and say so.
     """
-    history, cell = job.history, job.grid.dx
     last, begun = _slide(history), _begun(history, columns["time"])
     waits = begun <= last.start
     so_far = history[:begun] if waits else history
@@ -111,7 +113,9 @@ def describe(job: Job, columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
     yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}{within}, {after}"
     length = f"{distance[-1] - distance[0]:.4g} m"
     yield f"mu_dyn, the mean friction over the last three quarters of its {length}, is {found.mu_dyn:.6g}"
-    yield f"the mean contact area over the same is {found.contact_area:.6g}{_corrected(so_far, columns)}"
+    edges = measure(so_far, {**columns, "contact_area": columns[CORRECTED]}) if CORRECTED in columns else None
+    corrected = f", corrected by its edges {edges.contact_area:.6g}" if edges else ""
+    yield f"the mean contact area over the same is {found.contact_area:.6g}{corrected}"
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
@@ -119,16 +123,8 @@ def describe(job: Job, columns: Mapping[str, Sequence[float]]) -> Iterator[str]:
         yield f"largest errors of the steps of the slide: {told}"
     if known.get(ERRORS[0], 0.0) >= 1.0:
         yield "friction of some of its steps cannot be told from no friction"
-    if _goes_on(job.initial, [history[index] for index in _slide(so_far)], rows):
+    if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
-
-
-def _corrected(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> str:
-    """The mean contact area as corrected by its edges, whose error is told."""
-    if CORRECTED not in columns:
-        return ""
-    found = measure(history, {**columns, "contact_area": columns[CORRECTED]})
-    return f", corrected by its edges {found.contact_area:.6g}" if found else ""
 
 
 def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:

@@ -19,7 +19,7 @@ from . import slide
 TABLE = "sweep.csv"
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
 COLUMNS = ("state", *RESULTS, "residual", *slide.ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
-NUMBERS = frozenset(COLUMNS) - {"state"}
+NUMBERS = {"case", *COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SEED = "seed"  # the last word of keys over whose values means are taken
@@ -40,26 +40,19 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
 
 
 def read(path: Path) -> list[dict[str, Any]]:
-    """The rows of a table, numbers as such, an empty field as nan. Raises InputError for what is no such table."""
+    """Read the rows of a table, numbers as such, an empty field as nan; raises InputError for what is no such table."""
     try:
         text = path.read_text(encoding="utf-8")
-        names, *rows = list(csv.reader(StringIO(text, newline=""))) or [[]]
+        names, *lines = list(csv.reader(StringIO(text, newline=""))) or [[]]
+        if names[:1] != ["case"] or "state" not in names or not text.endswith("\n"):
+            raise ValueError("it must name its columns, from case to state on, and end with a whole line")
+        rows = [dict(zip(names, line, strict=True)) for line in lines]
+        return [
+            {name: float(cell or "nan") if name in NUMBERS else _number(cell) for name, cell in row.items()}
+            for row in rows
+        ]
     except (OSError, ValueError, csv.Error) as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
-    if names[:1] != ["case"] or "state" not in names:
-        raise InputError(f"{path} is damaged: its first line must name the columns of a sweep, from case to state on")
-    for number, cells in enumerate(rows, 2):
-        if len(cells) != len(names) or not (cells[0].isdecimal() and len(cells[0]) < 10):
-            raise InputError(
-                f"{path}, line {number}: the number of a case and {len(names) - 1} values more were expected, got "
-                f"{','.join(cells)[:60]!r}"
-            )
-        for name, cell in zip(names, cells, strict=True):
-            if name in NUMBERS and not isinstance(_number(cell), float):
-                raise InputError(f"{path}, line {number}: {name} is {cell[:20]!r}, not a number; {MEND}")
-    if not text.endswith("\n"):
-        raise InputError(f"{path} ends within line {len(rows) + 1}; {MEND}")
-    return [dict(zip(names, map(_number, cells), strict=True)) for cells in rows]
+        raise InputError(f"{path} cannot be read: {error}; {MEND}") from error
 
 
 def fail(case: Case, reason: str) -> None:

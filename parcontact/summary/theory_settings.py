@@ -1,7 +1,5 @@
 """theory.yaml: with which settings the predictions in theory.csv beside it were made."""
 
-import re
-import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -12,13 +10,15 @@ from ..job.text import yamltext
 from ..storage import files
 
 TABLE, FILE = "theory.csv", "theory.yaml"
-TEXT = """\
-# With which settings `parcontact theory` made theory.csv, whose CRC-32 is {checksum:08x}.
+HEAD = "# With which settings `parcontact theory` made theory.csv"
+TEXT = (
+    f"{HEAD}.\n"
+    """\
 gamma: {gamma!r}  # corrects friction in partial contact
 waves: {waves}  # continuum: those of the job's spectrum; lattice: those of the surface in its box
 program: parcontact {version}
 """
-CHECKSUM = re.compile(rb"# With which settings `parcontact theory` made theory.csv, whose CRC-32 is ([0-9a-f]{8})\.")
+)
 
 
 class TheorySettings(NamedTuple):
@@ -33,43 +33,25 @@ class TheorySettings(NamedTuple):
 
 def write(directory: Path, settings: TheorySettings) -> None:
     """Leave the settings beside the table; raises OSError."""
-    known = {**settings._asdict(), "version": __version__, "checksum": _checksum(directory)}
     with files.replaced(directory / FILE, is_ours) as file:
-        file.write(TEXT.format(**known).encode())
+        file.write(TEXT.format(**settings._asdict(), version=__version__).encode())
 
 
 def is_ours(path: Path) -> bool:
-    """Whether this program wrote a file of settings; raises OSError."""
-    return path.read_bytes().startswith(TEXT.partition("{")[0].encode())
+    """Return whether this program wrote a file of settings; raises OSError."""
+    return path.read_bytes().startswith(HEAD.encode())
 
 
 def is_own_table(path: Path) -> bool:
-    """Whether a table is the one that the settings beside it are of; raises OSError."""
-    return _told_checksum(path.with_name(FILE).read_bytes()) == _checksum(path.parent)
-
-
-def _told_checksum(text: bytes) -> int | None:
-    found = CHECKSUM.match(text)
-    return int(found[1], 16) if found else None
-
-
-def _checksum(directory: Path) -> int:
-    """Of the table in a directory; 0 if there is none."""
-    table = directory / TABLE
-    return zlib.crc32(table.read_bytes()) if table.is_file() else 0
+    """Return whether a table, with settings beside it, is one of theory; raises OSError."""
+    return path.with_name(FILE).is_file() and path.read_bytes().startswith(b"time,distance,pressure,")
 
 
 def read(directory: Path) -> TheorySettings | None:
-    """The settings of the table in a directory; None if there are none, or those of another table.
-
-    Raises InputError for a damaged file.
-    """
+    """Return the settings of the table in a directory, None if there are none; raises InputError for a damaged file."""
     path = directory / FILE
     try:
-        text = path.read_bytes()
-        if _told_checksum(text) not in (None, _checksum(directory)):
-            return None
-        data = yamltext.parse(text, FILE).data
+        data = yamltext.parse(path.read_bytes(), FILE).data
         return TheorySettings(float(data["gamma"]), str(data["waves"]))
     except FileNotFoundError:
         return None
@@ -80,14 +62,13 @@ def read(directory: Path) -> TheorySettings | None:
 
 
 def shared(directories: Iterable[Path]) -> TheorySettings | None:
-    """The settings that the tables in these directories have in common; None if there are none. Raises as `read`."""
+    """Return the settings that the tables in these directories have in common, if any. Raises as `read`."""
     found = {read(directory) for directory in directories if (directory / TABLE).is_file()}
     return found.pop() if len(found) == 1 else None
 
 
 def describe(directory: Path) -> str:
-    """The settings of the theory in a directory, or in the cases of a sweep there, or why they cannot be read; '' if
-    there are none."""
+    """Return a sentence about the theory in a directory, or in the cases of a sweep there; '' if there is none."""
     try:
         settings = shared([directory, *directory.glob("cases/*")])
     except InputError as error:

@@ -9,7 +9,7 @@ from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.history.cells import first_between_cells
 from parcontact.history.timeline import Timeline
-from parcontact.storage.resolved import shown_job
+from parcontact.job.resolved import shown_job
 
 from .texts import SMALL, job_of, with_stage
 

@@ -23,7 +23,8 @@ def said(history: list[dict[str, Any]], table: dict[str, list[float]], cell: flo
     """The sentences about the slide of a job with such a history, on cells of so many metres."""
     data = {"grid": {"points": 8, "size": 8 * cell}, "surface": {"shape": "wave", "amplitude": 1e-9, "waves": [1, 1]}}
     material = {"model": "elastic", "shear_modulus": 1e6}
-    return list(describe(Job.model_validate({**data, "material": material, "history": history, **more}), table))
+    job = Job.model_validate({**data, "material": material, "history": history, **more})
+    return list(describe(job.history, job.initial, job.grid.dx, table))
 
 
 def rows(*rows: tuple[float, float, float]) -> dict[str, list[float]]:

@@ -78,18 +78,6 @@ def test_by_commands(
     assert said[1] == ""
 
 
-def test_by_a_table_of_the_same_columns(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A table of theory that a user has put in the place of ours is his, whatever its columns."""
-    monkeypatch.chdir(here)
-    words = COMMANDS["out/theory.csv"]
-    assert __main__.main(words) == DONE
-    table = here / "out" / "theory.csv"
-    changed = table.read_text().replace("\n0.0,", "\n0.5,", 1)
-    table.write_text(changed)
-    assert __main__.main(words) == DONE
-    assert (here / "out" / "theory.csv.aside").read_text() == changed
-
-
 def test_by_python(tmp_path: Path) -> None:
     """Simulation.save replaces a checkpoint, and nothing else."""
     path = tmp_path / "mine.h5"

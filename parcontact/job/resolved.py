@@ -6,9 +6,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..job import Job
-from ..job.text import yamltext
-from . import hdf5
+from .model import Job
+from .text import yamltext
 
 RESOLVED = "job.resolved.yaml"
 STEADY_RESOLVED = "steady.resolved.yaml"
@@ -17,14 +16,15 @@ FILES = ("file", "topography")  # shapes that come from files
 
 
 def shown_job(path: Path) -> Job:
-    """What pictures show of the resolved job; its files of heights need not be there any more."""
+    """Return what pictures show of the resolved job; its files of heights need not be there any more."""
     try:
         data = yamltext.parse(path.read_bytes(), str(path)).data
         data = {name: data[name] for name in SHOWN if name in data}
         data["surface"] = [{"shape": "flat"} if _comes_from_a_file(shape) else shape for shape in data["surface"]]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:
-        raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from error
+        reason = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+        raise InputError(f"{path} cannot be read: {reason}") from error
 
 
 def _comes_from_a_file(shape: dict[str, Any]) -> bool:
