@@ -164,7 +164,7 @@ class Simulation:
         provenance = runner.provenance_of(self.job, slab, self._saved)
         facts = Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last))
         entries = {**march.entries(), **self._errors_so_far.entries(), "plans/all": Entry(wisdom.gather(slab))}
-        heights.store(self.job, file.parent, slab)
+        heights.store(self.job.surface, file.parent, slab)
         checkpoint.write(file, slab, facts, entries)
 
     @classmethod

@@ -185,7 +185,7 @@ def _begin(
     job, added = built.job, columns_of(built.followers)
     row.columns(0, added)  # refuses names that are taken
     directory.make(job.path, job.resolved(), claim)
-    heights.store(job, directory.path, built.slab)
+    heights.store(job.surface, directory.path, built.slab)
     if origin and origin.own:
         directory.go_back(origin.contents.step)
     elif origin is None:
