@@ -34,7 +34,7 @@ def phases(timeline: Timeline) -> Iterator[Phase]:
     """The stages of a history as phases of one velocity."""
     for span in timeline.spans:
         first, last = _first_and_last(span)
-        duration = span.ends[span.count] * span.stage.seconds if span.count else 0.0
+        duration = span.ends.elapsed(span.count) if span.count else 0.0
         yield Phase(duration, first, last, span.stage.velocity, span.jumps)
 
 

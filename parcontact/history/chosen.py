@@ -1,9 +1,8 @@
 """Stages that choose their own time steps: within which bounds, which were chosen, and a guess of those to come.
 
-Which step is next is decided when the one before it has been made (`march.choosing`). What was chosen is kept, so that
-a history has numbered steps here as everywhere, and a run goes on from them. What is not known yet is taken to be a
-ladder: steps double from the shortest to the longest that are allowed and go on with these, as they do where the error
-permits it.
+The next step is decided when the one before it has been made (`march.choosing`). The chosen steps are kept, so that a
+history has numbered steps here as everywhere, and a run goes on from them. Those to come are guessed as a ladder: steps
+double from the shortest to the longest that are allowed and go on with these, as they do where the error permits it.
 """
 
 import math
@@ -18,17 +17,17 @@ from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
 from ..job.sections.settings import Grid
 from ..job.sections.stages import Stage
 
-SAME_TIME = 1e-9  # relative: a duration this close to a whole number of steps is one
-HALVINGS = 10  # of a cell, in the shortest step of a surface that slides
-LEAST_SHARE = 2.0**-20  # of its duration, in the shortest step of a stage
-SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/next": "s"}  # of what is remembered
-MOST_CELLS = 4  # in the longest
-WAVE_STEPS = 8  # in which the shortest wave passes, at least
-RAMP_STEPS = 16  # at least, while a load changes
+SAME_TIME = 1e-9  # accuracy: a duration this close, relatively, to a whole number of steps is one
+HALVINGS = 10  # tuning: of a cell, in the shortest step of a surface that slides
+LEAST_SHARE = 2.0**-20  # tuning: of its duration, in the shortest step of a stage
+MOST_CELLS = 4  # tuning: slid in the longest step
+WAVE_STEPS = 8  # accuracy: in which the shortest wave passes, at least
+RAMP_STEPS = 16  # accuracy: at least, while a load changes
+SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/next": "s"}  # in checkpoints
 
 
 def reached(time: float, until: float) -> bool:
-    """Whether a time is the one asked for, or later."""
+    """Return whether a time is the one asked for, or later."""
     return time >= until * (1.0 - SAME_TIME)
 
 
@@ -41,8 +40,10 @@ class Bounds:
 
 
 def most_cells(grid: Grid, surface: Sequence[Any]) -> int:
-    """The longest step of a surface that slides, in cells, a power of two: an eighth of its shortest wave; one cell
-    where that is shorter, or a file may have any wave."""
+    """Return how many cells the longest step slides, a power of two: an eighth of the shortest wave.
+
+    It is one cell where that is shorter, or where a file may have any wave.
+    """
     waves = [2.0 * MOST_CELLS * WAVE_STEPS]
     for shape in surface:
         if isinstance(shape, Wave):
@@ -55,8 +56,7 @@ def most_cells(grid: Grid, surface: Sequence[Any]) -> int:
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """In sliding from a small part of a cell, or of a stage that is short for one, to so many; at rest from a small
-    part of the stage to all of it."""
+    """Return the bounds of steps that slide by at most some `cells`; at rest the longest is the whole stage."""
     most = stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
@@ -80,7 +80,7 @@ class Ladder:
 
     @property
     def count(self) -> int:
-        """How many they are."""
+        """The number of steps."""
         if self.seconds <= 0.0:
             return 0
         top = self.first * 2.0**self.doublings
@@ -89,7 +89,7 @@ class Ladder:
         return self.doublings + math.ceil(self.seconds / top * (1.0 - SAME_TIME))
 
     def end(self, index: int) -> float:
-        """When step `index`, from 1, ends [s]; 0 is the start."""
+        """Return when step `index`, from 1, ends [s]; 0 is the start."""
         if index <= 0:
             return 0.0
         doubled = min(index - 1, self.doublings)
@@ -98,7 +98,7 @@ class Ladder:
 
 @dataclass(frozen=True)
 class ChosenEnds:
-    """Ends of the steps of a stage as fractions of it: those that were `made` [s after its start], then a ladder.
+    """Ends of the steps of a stage: those that were `made` [s after its start], then a ladder.
 
     The stage ends at the first of `stops` [s]; a later one is where it was asked to go on to.
     """
@@ -108,29 +108,24 @@ class ChosenEnds:
     ladder: Ladder
     limits: Bounds
 
-    growth = 0.0  # not all alike
-
     @property
     def count(self) -> int:
+        """The number of steps, made and guessed."""
         return len(self.made) + self.ladder.count
 
-    @property
-    def last(self) -> float:
-        """How much the last step is of the stage."""
-        return self[self.count] - self[self.count - 1]
-
-    def beyond(self, until: float) -> int:
-        """None: steps that go on are among them."""
-        return 0
-
     def elapsed(self, index: int) -> float:
-        """When the step ends [s after the start of the stage]."""
+        """Return when the step ends [s after the start of the stage]."""
         if index <= len(self.made):
             return self.made[index - 1] if index > 0 else 0.0
         now = self.made[-1] if self.made else 0.0
         return self.stops[-1] if index >= self.count else now + self.ladder.end(index - len(self.made))
 
+    def interval(self, index: int, since: int | None = None) -> float:
+        """Return how long the step takes, or all steps since another one [s]."""
+        return self.elapsed(index) - self.elapsed(index - 1 if since is None else since)
+
     def __getitem__(self, index: int) -> float:
+        """Return the end of step `index` as a fraction of the stage."""
         return self.elapsed(index) / self.stops[0]
 
 
@@ -146,27 +141,32 @@ class ChosenSteps:
 
     @classmethod
     def of(cls, job: Job, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
-        """Those that the stages of a job had chosen when a checkpoint with these numbers was written; none without."""
-        none = cls(most_cells(job.grid, job.surface))
-        return none.restored(saved) if saved is not None else none
+        """Return those that the stages of a job had chosen when a checkpoint with these arrays was written."""
+        found = cls(most_cells(job.grid, job.surface))
+        if saved is not None and SYMBOLS.keys() <= saved.keys():
+            ends = iter(saved["clock/ends"].tolist())
+            for stage, count in zip(saved["clock/stages"], saved["clock/counts"], strict=True):
+                found.ends[int(stage)] = list(islice(ends, int(count)))
+            found.next = float(saved["clock/next"])
+        return found
 
     @property
     def count(self) -> int:
-        """How many."""
+        """The number of steps chosen."""
         return sum(map(len, self.ends.values()))
 
-    def of_stage(self, stage: int, asked: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
-        """Those of a stage that may go on to `until` [s after its start]."""
-        made, limits = self.ends.get(stage, []), bounds(asked, grid, self.cells)
-        stops = (asked.seconds, *([until] if not reached(asked.seconds, until) else []))
-        left = 0.0 if made and reached(made[-1], stops[-1]) else stops[-1] - (made[-1] if made else 0.0)
-        first = self.next if made and self.next else limits.least
-        longest = min(limits.most, one_cell(asked, grid)) if asked.speed else limits.most
-        ladder = Ladder(min(first, limits.most), max(min(first, limits.most), longest), left)
-        return ChosenEnds(made, stops, ladder, limits)
+    def of_stage(self, index: int, stage: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
+        """Return those of a stage that may go on to `until` [s after its start]."""
+        made, limits = self.ends.get(index, []), bounds(stage, grid, self.cells)
+        stops = (stage.seconds, *([until] if not reached(stage.seconds, until) else []))
+        now = made[-1] if made else 0.0
+        left = 0.0 if reached(now, stops[-1]) else stops[-1] - now
+        first = min(self.next if made and self.next else limits.least, limits.most)
+        longest = min(limits.most, one_cell(stage, grid)) if stage.speed else limits.most
+        return ChosenEnds(made, stops, Ladder(first, max(first, longest), left), limits)
 
     def numbers(self) -> dict[str, list[float] | float]:
-        """By the names that they have in a checkpoint."""
+        """Return all this by the names that it has in a checkpoint."""
         stages = sorted(self.ends)
         return {
             "clock/stages": [float(stage) for stage in stages],
@@ -175,25 +175,15 @@ class ChosenSteps:
             "clock/next": self.next,
         }
 
-    def restored(self, saved: Mapping[str, Any]) -> "ChosenSteps":
-        """Those of a checkpoint, from its arrays; none were chosen before one that has no such arrays."""
-        found = ChosenSteps(self.cells)
-        if SYMBOLS.keys() <= saved.keys():
-            ends = iter(saved["clock/ends"].tolist())
-            for stage, count in zip(saved["clock/stages"], saved["clock/counts"], strict=True):
-                found.ends[int(stage)] = list(islice(ends, int(count)))
-            found.next = float(saved["clock/next"])
-        return found
-
 
 def describe_steps(job: Job) -> str:
-    """Which stages choose their own time steps, how, and why; '' if none does."""
-    cells = most_cells(job.grid, job.surface)
+    """Return which stages choose their own time steps, how, and why; '' if none does."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
         return ""
     if not job.remembers:
         return f"{names}: an elastic body has no error of time, one cell of sliding per step, one step at rest"
+    cells = most_cells(job.grid, job.surface)
     slides = any(stage.chooses and stage.speed for stage in job.history)
     limits = f", at most {cells} cell{'s' * (cells > 1)} of sliding" * slides
     return f"{names}: steps follow the error that numerics.accuracy {job.numerics.accuracy:g} allows{limits}"

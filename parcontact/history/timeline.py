@@ -13,9 +13,10 @@ from ..job import Job
 from ..job.sections.settings import Grid
 from ..job.sections.stages import GeometricStep, Ramp, Stage
 from .chosen import ChosenEnds, ChosenSteps, reached
-from .division import Fractions, divided
+from .given import GivenEnds, divide
 
-ROUNDINGS = 4.0  # of an instant, between two that are the same
+ROUNDINGS = 4.0  # accuracy: of an instant, between two that are the same
+SAME_PLACE = 1e-6  # accuracy: a displacement this close to whole cells [cells] is one of whole cells
 
 
 class Step(NamedTuple):
@@ -56,7 +57,7 @@ class Span:
     before: int
     jumps: bool
     count: int
-    ends: Fractions | ChosenEnds
+    ends: GivenEnds | ChosenEnds
     start: float
     origin: tuple[float, float]
 
@@ -67,42 +68,26 @@ class Span:
 
     @property
     def moves(self) -> bool:
+        """Whether the surface slides."""
         return self.count > 0 and any(self.stage.velocity)
 
     @cached_property
     def rests(self) -> bool:
         """Whether it stands under a constant load, and its steps may be as long as what happens allows."""
-        stage = self.stage
-        return (
-            not any(stage.velocity)
-            and stage.load.constant
-            and (stage.chooses or isinstance(stage.time_step, GeometricStep))
-        )
-
-    def elapsed(self, index: int) -> float:
-        """How long after the start of the stage the step `index` of those that last ends [s]."""
-        if isinstance(self.ends, ChosenEnds):
-            return self.ends.elapsed(index)
-        return self.ends[index] * self.stage.seconds if index else 0.0
-
-    def time(self, index: int) -> float:
-        """When the step `index` of those that last ends [s]."""
-        return self.start + self.elapsed(index)
+        free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
+        return free and not any(self.stage.velocity) and self.stage.load.constant
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """How long the step `index` takes, or all steps `since` another one have taken with it [s].
+        """Return how long the step `index` takes, or all steps `since` another one have taken with it [s]."""
+        return self.ends.interval(index, since)
 
-        From the stage alone, as late instants may have no digits for it; steps that are alike are so to the last bit.
-        """
-        if isinstance(self.ends, ChosenEnds):
-            return self.elapsed(index) - self.elapsed(index - 1 if since is None else since)
-        if since is None and self.ends.growth == 1.0:
-            return self.stage.seconds / self.ends.count
-        return (self.ends[index] - self.ends[index - 1 if since is None else since]) * self.stage.seconds
+    def time(self, index: int) -> float:
+        """Return when the step `index` of those that last ends [s]."""
+        return self.start + self.ends.elapsed(index)
 
     def position(self, index: int) -> tuple[float, float]:
-        """Where the surface then is [m]."""
-        slid = self.elapsed(index)
+        """Return where the surface then is [m]."""
+        slid = self.ends.elapsed(index)
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
@@ -112,20 +97,20 @@ class Span:
 
     @cached_property
     def facts(self) -> tuple[tuple[float, float], str]:
-        """Of all steps: velocity and control."""
+        """Velocity and control of all steps."""
         return self.stage.velocity, self.stage.control
 
     def place(self, number: int) -> int:
-        """Which of those that last the step of this number is; 0 is the jump."""
+        """Return which of those that last the step of this number is; 0 is the jump."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:
-        """The steps from one number to another in one."""
+        """Return the steps from one number to another as one."""
         dt = self.interval(self.place(target), since=self.place(number) - 1)
         return self.step(target)._replace(dt=dt, growth=0.0, passed=target - number)
 
     def step(self, number: int) -> Step:
-        """The step of this number of the history."""
+        """Return the step of this number of the history."""
         index = self.place(number)
         if index == 0:
             return Step(number, self.index, self.start, 0.0, self.origin, *self.facts, self.load.start, 0.0)
@@ -157,15 +142,12 @@ class Timeline:
         self.history, self.grid, self.until, self.chosen = history, grid, until, chosen
         self.chooses = chosen is not None and any(stage.chooses for stage in history)
         self._before = None if pressure is None else ("pressure", pressure)
-        self._spans: list[Span] = []  # of the first stages
-        self._lasts: list[int] = []  # the numbers of their last steps
-        self._open, self._seen = 0, self._chosen_so_far()
-        total = self.spans[-1].last if history else 0
-        self._from = [*(total - span.before for span in self._spans), 0]  # steps from a stage on that has not begun
+        self._spans: list[Span] = []
+        self._open, self._seen = 0, 0  # the stage that was choosing its steps, and how many had been chosen
 
     @classmethod
     def of(cls, job: Job, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
-        """All steps of a job; its last stage goes on to `until` [s] if that is later than its end.
+        """Return all steps of a job; its last stage goes on to `until` [s] if that is later than its end.
 
         `chosen` are the steps that stages have chosen so far; those to come are guessed.
         """
@@ -174,71 +156,56 @@ class Timeline:
 
     @property
     def spans(self) -> list[Span]:
-        """Those of all stages."""
-        return self._first_spans(len(self.history))
-
-    def _first_spans(self, count: int) -> list[Span]:
-        """Those of so many stages, or more."""
-        if (now := self._chosen_so_far()) != self._seen:
-            self._seen = now
-            del self._spans[self._open :], self._lasts[self._open :]
-        while len(self._spans) < min(max(count, self._seen[0]), len(self.history)):
-            self._add_span()
+        """The steps of each stage, with those that have been chosen by now."""
+        chosen = self.chosen.count if self.chosen is not None else 0
+        if chosen != self._seen:
+            del self._spans[self._open :]
+            self._open, self._seen = max(self.chosen.ends) if self.chosen and self.chosen.ends else 0, chosen
+        while len(self._spans) < len(self.history):
+            self._spans.append(self._next_span())
         return self._spans
 
-    def _chosen_so_far(self) -> tuple[int, int]:
-        """Up to which stage steps were chosen, and how many of its own."""
-        if self.chosen is None or not self.chosen.ends:
-            return 0, 0
-        last = next(reversed(self.chosen.ends))
-        return last + 1, len(self.chosen.ends[last])
-
-    def _add_span(self) -> None:
+    def _next_span(self) -> Span:
         index, last = len(self._spans), self._spans[-1] if self._spans else None
         stage, number, time, position, before = self.history[index], 0, 0.0, (0.0, 0.0), self._before
         if last is not None:
             number, time, position = last.last, last.time(last.ends.count), last.position(last.ends.count)
             before = (last.stage.control, last.stage.load.end)
-        ends = self._ends(index, stage, self.until - time)
-        more = ends.beyond((self.until - time) / stage.seconds) if ends.count and self._is_last(index) else 0
-        span = Span(index, stage, number, _jumps(stage, before), ends.count + more, ends, time, position)
-        if self._open == index and not (isinstance(ends, ChosenEnds) and ends.ladder.count):
-            self._open = index + 1
-        self._spans.append(span)
-        self._lasts.append(span.last)
-
-    def _is_last(self, index: int) -> bool:
-        return index == len(self.history) - 1
-
-    def _ends(self, index: int, stage: Stage, until: float) -> Fractions | ChosenEnds:
-        if self.chosen is None or not stage.chooses:
-            return divided(stage, self.grid)
-        return self.chosen.of_stage(index, stage, self.grid, until if self._is_last(index) else 0.0)
+        until = self.until - time if index == len(self.history) - 1 else 0.0
+        ends: GivenEnds | ChosenEnds
+        if self.chosen is not None and stage.chooses:
+            ends = self.chosen.of_stage(index, stage, self.grid, until)
+            count = ends.count
+        else:
+            ends = divide(stage, self.grid)
+            count = ends.count + (ends.beyond(until) if ends.count else 0)
+        return Span(index, stage, number, _jumps(stage, before), count, ends, time, position)
 
     def follow(self, times: Mapping[int, float]) -> "Timeline":
         """Take the times [s] of steps that were made, by their numbers, as those that the stages have chosen."""
-        for index in range(len(self.history) if self.chooses else 0):
-            assert self.chosen is not None
-            span = self._first_spans(index + 1)[index]
-            while isinstance(span.ends, ChosenEnds) and span.ends.ladder.count:
-                number = span.before + span.jumps + len(span.ends.made) + 1
-                if number not in times:
-                    return self
-                self.chosen.ends.setdefault(index, []).append(_elapsed(span, times[number]))
-                span = self._first_spans(index + 1)[index]
+        for index in range(len(self.history)):
+            span = self.spans[index]
+            if self.chosen is None or not isinstance(span.ends, ChosenEnds):
+                continue
+            made, number = list(span.ends.made), span.before + span.jumps + len(span.ends.made) + 1
+            while number in times and not (made and reached(made[-1], span.ends.stops[-1])):
+                made.append(_elapsed(span.start, span.ends.stops, times[number]))
+                number += 1
+            if not made:
+                break
+            self.chosen.ends[index] = made
         return self
+
+    def __len__(self) -> int:
+        return self.spans[-1].last if self.history else 0
 
     @property
     def count(self) -> int:
-        """The number of steps, however many."""
-        known = self._first_spans(1 if self.history else 0)
-        return (known[-1].last if known else 0) + self._from[len(known)]
-
-    def __len__(self) -> int:
-        return self.count
+        """The number of steps."""
+        return len(self)
 
     def __getitem__(self, number: int) -> Step:
-        """The step of this number, from 1."""
+        """Return the step of this number, from 1."""
         if not 1 <= number <= len(self):
             raise IndexError(number)
         return self.span(number).step(number)
@@ -247,14 +214,12 @@ class Timeline:
         return self.after(0)
 
     def after(self, number: int) -> Iterator[Step]:
-        """The steps that follow."""
+        """Return the steps that follow one."""
         return (self[later] for later in range(number + 1, len(self) + 1))
 
     def span(self, number: int) -> Span:
-        """That of a step."""
-        while self._first_spans(1)[-1].last < number and len(self._spans) < len(self.history):
-            self._add_span()
-        return self._spans[bisect_left(self._lasts, number)]
+        """Return the span that holds a step."""
+        return self.spans[bisect_left(self.spans, number, key=lambda span: span.last)]
 
     @property
     def end(self) -> float:
@@ -272,26 +237,47 @@ class Timeline:
         return any(span.moves for span in self.spans)
 
     def first_reaching(self, time: float) -> int:
-        """The number of the first step that reaches a time [s], or that of the last step."""
+        """Return the number of the first step that reaches a time [s], or that of the last step."""
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:
-        """How many of the first steps are those of another history too, stage by stage."""
+        """Return how many of the first steps are those of another history too, stage by stage."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
 
+    def first_between_cells(self) -> Step | None:
+        """Return the first step after which the surface is not moved by whole cells along x."""
+        for span in filter(lambda span: span.moves, self.spans):
+            first = span.before + span.jumps + 1
+            if isinstance(span.ends, ChosenEnds):
+                return span.step(first)
+            if span.ends.growth == 1.0 and not span.stage.velocity[1]:
+                cells, moved = span.origin[0] / self.grid.dx, span.position(span.ends.count)[0] - span.origin[0]
+                each = moved / self.grid.dx / span.ends.count
+                off, drift = abs(cells - round(cells)), abs(each - round(each))
+                if off + drift * (1 + span.count) < SAME_PLACE / 2:
+                    continue
+                first += max(0, int((SAME_PLACE - off) / drift) - 2) if drift else 0  # none before is that far off
+            for step in map(span.step, range(first, span.last + 1)):
+                cells = step.position[0] / self.grid.dx
+                if step.position[1] != 0.0 or abs(cells - round(cells)) > SAME_PLACE:
+                    return step
+        return None
 
-def _elapsed(span: Span, time: float) -> float:
-    """How long after the start of a stage an instant is [s]: its end, if times have no digits to tell them apart."""
-    assert isinstance(span.ends, ChosenEnds)
-    for stop in span.ends.stops:
-        if math.isclose(time, span.start + stop, rel_tol=ROUNDINGS * sys.float_info.epsilon):
+
+def _elapsed(start: float, stops: tuple[float, ...], time: float) -> float:
+    """Return how long after the start of a stage an instant is [s].
+
+    It is a stop of the stage if times have no digits to tell them apart.
+    """
+    for stop in stops:
+        if math.isclose(time, start + stop, rel_tol=ROUNDINGS * sys.float_info.epsilon):
             return stop
-    return time - span.start
+    return time - start
 
 
 def _jumps(stage: Stage, before: tuple[str, float] | None) -> bool:
-    """Whether the stage begins with a jump: an instantaneous stage, another load than before, or another control."""
+    """Return whether the stage begins with a jump: it is instantaneous, or has another load or control than before."""
     if stage.seconds == 0.0:
         return True
     if before is None:

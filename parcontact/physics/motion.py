@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from ..history.cells import SAME_PLACE
+from ..history.timeline import SAME_PLACE
 from .body import Heights
 from .surface import Surface
 

@@ -14,7 +14,6 @@ from ..effects.effect import Decision, Effect
 from ..effects.folded_branches import bands, phases
 from ..effects.interface import interface_of
 from ..effects.relaxation import relaxation_of, time_factor_of
-from ..history.cells import first_between_cells
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, extension
@@ -145,7 +144,7 @@ class Choices:
             return Decision(name, True, "a free box is not cyclic: the heights are made anew")
         if self.slides_along_x and self.further_starts.on:
             return Decision(name, True, "stages that choose their own steps begin with parts of a cell where they must")
-        step = first_between_cells(self.timeline, self.grid)
+        step = self.timeline.first_between_cells()
         if step is None:
             return Decision(name, False, "every step is of whole cells along x")
         why = "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"

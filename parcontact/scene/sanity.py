@@ -13,6 +13,7 @@ from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
 from ..job.checks import advice, meaning, size
+from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
@@ -37,10 +38,9 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
 
 
 def _endless(timeline: Timeline) -> str:
-    most = 10**18
-    return (
-        f"the history would have {timeline.count:.3g} steps; it has at most {most:.0e}" if timeline.count > most else ""
-    )
+    if timeline.count <= MOST_STEPS:
+        return ""
+    return f"the history would have {timeline.count:.3g} steps; it has at most {MOST_STEPS:.0e}"
 
 
 def is_quickly_made(job: Job) -> bool:

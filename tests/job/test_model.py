@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from parcontact.errors import InputError
 from parcontact.job import (
     Elastic,
     GeometricStep,
@@ -17,6 +18,7 @@ from parcontact.job import (
     log_range,
 )
 from parcontact.job.checks.advice import cells_per_wave
+from parcontact.storage.resolved import shown_job
 
 from .texts import SMALL, job_of, replaced
 
@@ -274,3 +276,22 @@ def test_parts_can_be_made_without_a_file() -> None:
 
 def test_job_error_joins_its_mistakes() -> None:
     assert str(JobError(["a", "b"])) == "a\nb"
+
+
+@pytest.mark.parametrize(
+    "title", ["2026-01-01", "010", "1e3", "0x1F", "yes", "~", "12:30", "a: b", "# no", "é\u2028", "=", "<<"]
+)
+def test_a_resolved_job_reads_back_with_any_title(tmp_path: Path, title: str) -> None:
+    """By the reader of pictures, too."""
+    job = job_of(tmp_path, SMALL)
+    titled = job.model_copy(update={"title": title})
+    path = tmp_path / "job.resolved.yaml"
+    path.write_text(titled.resolved())
+    assert shown_job(path).title == title
+
+
+def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "job.resolved.yaml"
+    path.write_text("[1, 2")
+    with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):
+        shown_job(path)

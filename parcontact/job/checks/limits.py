@@ -19,7 +19,7 @@ from ..text.fault import Fault
 from ..text.places import Key
 
 SMALLEST, LARGEST = 1e-70, 1e70  # fourth powers and their reciprocals are normal numbers of double precision
-MOST_STEPS = 10**18  # of a history: instants are counted in 64 bits
+MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
 
 
 def _outside(value: float) -> bool:

@@ -1,4 +1,4 @@
-"""Warnings about what a job needs: memory, steps, disk; against those of this machine, and lower bounds all of them."""
+"""Warnings about what a job needs: memory and disk, against those of this machine, and lower bounds all of them."""
 
 from __future__ import annotations
 
@@ -10,23 +10,15 @@ from pathlib import Path
 from ..sections.settings import Grid, Output
 
 MAPS, MAPS_FREE = 9.0, 18.0  # of 8 bytes per point that any run holds, at least; free ones have padded transforms
-MANY_STEPS = 10**8  # at a millisecond each, more than a day; and no step takes less than a tenth of that
 MOST_INSTANTS = 10**6  # of fields in one file: each has its place in it from the start
 GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
 def warnings(grid: Grid, count: int, output: Output) -> Iterator[str]:
-    """Sentences: memory, steps, of which there are about `count`, disk."""
+    """Yield sentences: memory, and disk for about `count` steps."""
     if text := beyond_memory(grid):
         yield text
-    if count > MANY_STEPS:
-        seconds = 1e-4 * count
-        duration = f"{seconds / 3.156e7:.2g} years" if seconds > 3.156e7 else f"{seconds / 3600:.2g} hours"
-        yield (
-            f"history: {count:.3g} steps take at least {duration}, at a tenth of a millisecond each; use longer time "
-            "steps (time_step, cells_per_step) or a shorter history"
-        )
     if output.fields:
         saved = -(-count // output.every)
         needed, free = float(saved) * len(output.fields) * grid.nx * grid.ny * 8, _free(output.directory)

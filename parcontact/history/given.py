@@ -1,0 +1,68 @@
+"""The steps of a stage that follow from the job alone: all alike, or each a factor longer than the one before."""
+
+import math
+from dataclasses import dataclass
+
+from ..job.checks.limits import first_step
+from ..job.sections.settings import Grid
+from ..job.sections.stages import AUTO, GeometricStep, Stage
+from .chosen import RAMP_STEPS, SAME_TIME, reached
+
+
+@dataclass(frozen=True)
+class GivenEnds:
+    """Ends of `count` steps as fractions of a stage of some `seconds`, each `growth` times as long as the one before.
+
+    The last is 1; what goes on beyond it goes on with the last step.
+    """
+
+    count: int
+    growth: float
+    seconds: float
+
+    def __getitem__(self, index: int) -> float:
+        """Return the end of step `index`, from 1; 0 is the start of the stage."""
+        if index > self.count:
+            return 1.0 + (index - self.count) * self._last
+        if self.growth == 1.0 or index == self.count:
+            return index / self.count
+        return math.expm1(index * math.log(self.growth)) / math.expm1(self.count * math.log(self.growth))
+
+    @property
+    def _last(self) -> float:
+        """The last step as a fraction of the stage."""
+        return 1.0 - self[self.count - 1]
+
+    def elapsed(self, index: int) -> float:
+        """Return when the step ends [s after the start of the stage]."""
+        return self[index] * self.seconds if index else 0.0
+
+    def interval(self, index: int, since: int | None = None) -> float:
+        """Return how long the step takes, or all steps since another one [s]; steps that are alike are so exactly."""
+        if since is None and self.growth == 1.0:
+            return self.seconds / self.count
+        return (self[index] - self[index - 1 if since is None else since]) * self.seconds
+
+    def beyond(self, until: float) -> int:
+        """Return how many more steps it takes to reach the time `until` [s after the start of the stage]."""
+        fraction = until / self.seconds
+        more = max(0, math.ceil((fraction * (1.0 - SAME_TIME) - 1.0) / self._last) - 1)
+        while not reached(self[self.count + more], fraction):
+            more += 1
+        return more
+
+
+def divide(stage: Stage, grid: Grid) -> GivenEnds:
+    """Return the steps of a stage: none is longer than asked for, and an instantaneous stage has none.
+
+    Of a body without memory that may choose its own: one cell in sliding, the whole stage at rest, some on a ramp.
+    """
+    if stage.seconds == 0.0:
+        return GivenEnds(0, 1.0, 0.0)
+    if stage.time_step == AUTO and not stage.load.constant and not stage.speed:
+        return GivenEnds(RAMP_STEPS, 1.0, stage.seconds)
+    steps = stage.seconds / first_step(stage, grid)
+    growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
+    if growth != 1.0:
+        steps = math.log1p(steps * (growth - 1.0)) / math.log(growth)
+    return GivenEnds(max(1, math.ceil(steps * (1.0 - SAME_TIME))), growth, stage.seconds)
