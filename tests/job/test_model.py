@@ -18,7 +18,7 @@ from parcontact.job import (
     log_range,
 )
 from parcontact.job.checks.advice import cells_per_wave
-from parcontact.storage.resolved import shown_job
+from parcontact.job.resolved import shown_job
 
 from .texts import SMALL, job_of, replaced
 
