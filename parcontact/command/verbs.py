@@ -238,13 +238,21 @@ def report(options: argparse.Namespace) -> int:
 
 def doctor(options: argparse.Namespace) -> int:
     world = ranks.start()
-    from ..doctor import cases
+    from pathlib import Path
 
-    outcomes = [cases.examine(case, world, options.precision) for case in cases.CASES]
-    wrong = [f"{outcome.case.name}: {text}" for outcome in outcomes for text in outcome.wrong]
-    if world.rank == 0:
-        print(cases.table(outcomes))
-        print("\n".join(wrong) or "all is well")
+    from ..doctor import checks, machine
+
+    def tell(text: str) -> None:
+        if world.rank == 0:
+            print(text, flush=True)
+
+    for line in machine.describe_machine(world, Path.cwd()):
+        tell(line)
+    results = [checks.run_check(check, world, options.precision) for check in checks.CHECKS]
+    tell("\n" + checks.markdown(results))
+    wrong = [f"{result.check.name}: {text}" for result in results for text in result.wrong]
+    wrong += filter(None, [machine.find_broken_files(world, Path.cwd())])
+    tell("\n".join(wrong) or "all is well")
     return FAILED if wrong else DONE
 
 

@@ -1,1 +1,1 @@
-"""Hard cases: what a contact code may get wrong, small enough to be examined anywhere in seconds."""
+"""Checks of an installation: exact answers, ranks, files, and times."""

@@ -1,4 +1,4 @@
-"""A bench for hard cases: marches small jobs, checks in every step what must always hold, and notes what came out."""
+"""A bench for checks: it marches small jobs, looks in every step at what must always hold, and notes what came out."""
 
 import dataclasses
 import math

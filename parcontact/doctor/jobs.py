@@ -1,9 +1,11 @@
-"""The small jobs that hard cases are made of, as data."""
+"""The small jobs that checks are made of, as data."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
+from ..physics.prony import Integrator
 
 Json = dict[str, Any]
 
@@ -17,6 +19,8 @@ K = 2 * np.pi / WAVELENGTH
 FAST = 1.0 / (K * RELAXATION)  # m/s, at which the wave passes in one relaxation time per radian
 
 RADIUS = 1e-2  # m, of spheres
+CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under a pressure, over p side/G
+INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
 
 
 def zener(modulus_inf: float, moduli: Sequence[float], times: Sequence[float]) -> Json:

@@ -1,12 +1,27 @@
-"""Sliding: the shortest wave, a very long box, reversal, stop, no velocity and far too much."""
+"""Hard cases of sliding: waves of two cells, a long box, one point, reversal, stop, no velocity and far too much."""
 
 import numpy as np
 
-from ..physics import prony as viscoelastic
-from ..theory import full_contact, westergaard
-from .bench import Bench
-from .jobs import FAST, GLASSY, HEIGHT, LONG_TERM, MEAN, PRONY, RELAXATION, WAVELENGTH, K, crossed, wave, zener
-from .times import INTEGRATORS
+from parcontact.doctor.bench import Bench
+from parcontact.doctor.jobs import (
+    FAST,
+    GLASSY,
+    HEIGHT,
+    INTEGRATORS,
+    LONG_TERM,
+    MEAN,
+    PRONY,
+    RADIUS,
+    RELAXATION,
+    WAVELENGTH,
+    K,
+    crossed,
+    sphere,
+    wave,
+    zener,
+)
+from parcontact.physics import prony as viscoelastic
+from parcontact.theory import full_contact, westergaard
 
 STIFF = 2 * HEIGHT  # pressure amplitude of a wave in full contact over modulus and wavenumber
 CELLS = 6
@@ -129,3 +144,19 @@ def extreme_velocities(bench: Bench) -> None:
             bench.expect("area", row.measures.contact_area, area, 2 / 128, scale=1.0)
             bench.expect("friction", row.measures.friction, 0.0, 1e-7, scale=K * HEIGHT)
             bench.expect("peak", row.measures.max_pressure, peak, 1e-2)
+
+
+def single_point(bench: Bench) -> None:
+    """One cell: its area is h^2, its force p h^2 dH/dx exactly; it slides, and its neighbour takes over."""
+    cell, force, off = 1e-4, 1e-7, 0.3
+    centre = [(4 + off) * cell, 4 * cell]
+    surface = {"shape": "sphere", "radius": RADIUS, "center": centre}
+    sliding = {"force": force, "velocity": 0.1, "duration": 1e-3, "time_step": 5e-5}
+    unit = force * cell / RADIUS
+    _, rows = bench.march(sphere([{"force": force}, sliding], points=8, size=8 * cell, surface=surface))
+    for row in rows[1:]:
+        where = off + row.distance / cell
+        where -= round(where)
+        if abs(abs(where) - 0.5) > 0.1:  # not about half-way, where two points touch
+            bench.expect("points", 64 * row.measures.contact_area, 1.0, 0.0)
+            bench.expect("force", row.measures.force_x, unit * where, 1e-9, scale=unit)

@@ -1,15 +1,30 @@
-"""Times of all sizes: steps far from the relaxation times, moduli far apart, branches that are none, twelve decades."""
+"""Hard cases of time: steps far from the relaxation times, moduli far apart, branches that are none, recovery."""
 
 import numpy as np
 
-from ..march.step import March
-from ..physics import prony as viscoelastic
-from .bench import Bench
-from .jobs import GLASSY, HEIGHT, LONG_TERM, PRONY, RELAXATION, WAVELENGTH, Json, K, crossed, sphere, wave, zener
+from parcontact.doctor.bench import Bench
+from parcontact.doctor.jobs import (
+    CELL,
+    CREEP,
+    GLASSY,
+    HEIGHT,
+    INTEGRATORS,
+    LONG_TERM,
+    PRONY,
+    RELAXATION,
+    WAVELENGTH,
+    Json,
+    K,
+    crossed,
+    sphere,
+    wave,
+    zener,
+)
+from parcontact.march.step import March
+from parcontact.physics import prony as viscoelastic
 
-INTEGRATORS: tuple[viscoelastic.Integrator, ...] = ("exponential", "backward-euler")
 STIFF = 2 * K * HEIGHT  # pressure amplitude of the wave in full contact over the modulus
-CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under a pressure, over p side/G
+FORCE = 0.15  # N
 
 
 def long_steps(bench: Bench) -> None:
@@ -89,34 +104,27 @@ def odd_branches(bench: Bench) -> None:
     bench.expect("springs only", bench.amplitude(march), STIFF * 1e6, 1e-9)
 
 
-SHARES = (300, 350, 220, 80, 24, 7, 2.4, 1, 0.5, 0.3, 0.2, 0.15)  # MPa
-TYRE = (1e6, [1e6 * share for share in SHARES], [5 * 10.0**exponent for exponent in range(-9, 3)])
+def load_again(bench: Bench) -> None:
+    """Without load the body recovers with the creep time, not the relaxation time; it remembers, and then forgets."""
+    steps = {"first": 1e-4, "growth": 1.12}
+    press = {"force": FORCE, "duration": CREEP, "time_step": steps}
+    rest = {"force": 0.0, "duration": CREEP, "time_step": 2.5e-4}
+    long_rest = {"force": 0.0, "duration": 10 * CREEP, "time_step": {"first": 4e-4, "growth": 1.02}}
+    middle: list[tuple[float, float]] = []
 
+    def keep(march: March) -> None:
+        if march.row.measures.pressure == 0.0:
+            middle.append((march.row.time, bench.whole(march, "displacement")[16, 16]))
 
-FULL = 5e7  # Pa, enough for full contact
-
-
-def many_decades(bench: Bench) -> None:
-    """Relaxation times from 5 ns to 500 s in one step: the modulus that 8 steps per period give, still settling."""
-    for omega in (1e4, 1e6):
-        dt = 2 * np.pi / 8 / omega
-        for integrator in INTEGRATORS:
-            stage = {"pressure": FULL, "velocity": omega / K, "duration": 16 * dt, "time_step": dt}
-            job = wave([stage], material=zener(*TYRE), numerics={"integrator": integrator})
-            march, rows = bench.march(job)
-            modulus = _settling(omega, dt, len(rows) - 2, integrator)
-            friction = STIFF * HEIGHT * K / 2 * modulus.imag / FULL
-            bench.expect("amplitude", bench.amplitude(march), STIFF * abs(modulus), 1e-9)
-            bench.expect("friction", rows[-1].measures.friction, friction, 1e-9)
-
-
-def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
-    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value."""
-    spring, moduli, times = TYRE
-    total = complex(spring)
-    for modulus, time in zip(moduli, times, strict=True):
-        share = complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator)) / modulus
-        z = dt / time
-        decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
-        total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)
-    return total
+    _, rows = bench.march(sphere([press, rest, {"force": FORCE}], size=2e-3, numerics={"tolerance": 1e-6}), keep)
+    virgin, again = rows[1].measures, rows[-1].measures
+    t, u = np.array(middle).T
+    bench.expect("at once", virgin.approach, 21.869e-6, 5e-3)
+    bench.expect("snap back", u[0], 67.231e-6, 5e-3)
+    bench.expect_all("recovery", u / u[0], np.exp(-(t - t[0]) / CREEP), 2e-3)
+    unloaded = [row.measures for row in rows if row.measures.pressure == 0.0]
+    bench.expect("pressure without load", max(measures.max_pressure for measures in unloaded), 0.0, 0.0)
+    bench.expect("approach again", again.approach, 43.877e-6, 1e-2)
+    bench.expect("area again over virgin", again.contact_area / virgin.contact_area, (0.537 / 0.470) ** 2, 0.1)
+    _, rows = bench.march(sphere([press, long_rest, {"force": FORCE}], size=2e-3, numerics={"tolerance": 1e-6}))
+    bench.expect("approach after a long rest", rows[-1].measures.approach, virgin.approach, 5 * np.exp(-10.0))

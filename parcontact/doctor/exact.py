@@ -1,15 +1,33 @@
-"""Contacts of all sizes: one point, almost all points, all points, none."""
+"""Contacts with exact answers: almost full, full and flat ones, vanishing loads, sliding, unloading, many branches."""
 
 import numpy as np
 
 from ..physics import prony as viscoelastic
-from ..theory import full_contact, hertz, jgh, persson, persson_rings, westergaard
+from ..theory import full_contact, hertz, jgh, lee_radok, persson, persson_rings, westergaard
 from .bench import Bench
-from .jobs import GLASSY, HEIGHT, MEAN, PRONY, RADIUS, RELAXATION, WAVELENGTH, K, flat, sphere, wave, zener
+from .jobs import (
+    CELL,
+    GLASSY,
+    HEIGHT,
+    INTEGRATORS,
+    MEAN,
+    PRONY,
+    RADIUS,
+    RELAXATION,
+    WAVELENGTH,
+    K,
+    flat,
+    sphere,
+    wave,
+    zener,
+)
 
 ITERATIONS = 60  # a contact may take this many at most
 RUBBER = zener(GLASSY, [], [])
-CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under a pressure, over p side/G
+WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # and their heights
+SHARES = (300, 350, 220, 80, 24, 7, 2.4, 1, 0.5, 0.3, 0.2, 0.15)  # MPa
+TYRE = (1e6, [1e6 * share for share in SHARES], [5 * 10.0**exponent for exponent in range(-9, 3)])
+FULL = 5e7  # Pa, enough for full contact
 
 
 def nearly_full(bench: Bench) -> None:
@@ -77,25 +95,6 @@ def vanishing_load(bench: Bench) -> None:
         bench.expect("friction without load", free.friction, 0.0, 0.0)
 
 
-def single_point(bench: Bench) -> None:
-    """One cell: its area is h^2, its force p h^2 dH/dx exactly; it slides, and its neighbour takes over."""
-    cell, force, off = 1e-4, 1e-7, 0.3
-    centre = [(4 + off) * cell, 4 * cell]
-    surface = {"shape": "sphere", "radius": RADIUS, "center": centre}
-    sliding = {"force": force, "velocity": 0.1, "duration": 1e-3, "time_step": 5e-5}
-    unit = force * cell / RADIUS
-    _, rows = bench.march(sphere([{"force": force}, sliding], points=8, size=8 * cell, surface=surface))
-    for row in rows[1:]:
-        where = off + row.distance / cell
-        where -= round(where)
-        if abs(abs(where) - 0.5) > 0.1:  # not about half-way, where two points touch
-            bench.expect("points", 64 * row.measures.contact_area, 1.0, 0.0)
-            bench.expect("force", row.measures.force_x, unit * where, 1e-9, scale=unit)
-
-
-WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # and their heights
-
-
 def closed_by_load(bench: Bench) -> None:
     """Many waves in full contact, sliding: the force is the sum over them, in closed form, steady and of steps, and
     after Persson for any gamma."""
@@ -119,3 +118,45 @@ def closed_by_load(bench: Bench) -> None:
             expected = persson.friction_coefficient(1e6, rings, velocity, 0.0, modulus, gamma)
             bench.expect("friction", friction, float(expected), 1e-8)
     bench.expect("area", min(row.measures.contact_area for row in rows), 1.0, 0.0)
+
+
+def retraction(bench: Bench) -> None:
+    """Ting: a sphere pressed in and pulled back lets go while it is still deep; its force is never negative."""
+    depth, rise, steps = 5e-5, 1e-3, 25
+    ramps = ((0.0, depth), (depth, 0.0))
+    history = [{"approach": {"from": a, "to": b}, "duration": rise, "time_step": rise / steps} for a, b in ramps]
+    _, rows = bench.march(sphere(history, size=2e-3, numerics={"tolerance": 1e-6}))
+    t = np.array([row.time for row in rows])
+    force = np.array([row.measures.pressure for row in rows]) * 2e-3**2
+    exact = lee_radok.triangle_force(t, depth, rise, RADIUS, *PRONY)
+    bench.expect_all("force", force, exact, 1e-2)
+    lift_off = lee_radok.triangle_lift_off_time(rise, *PRONY)
+    bench.expect("lift-off", t[np.flatnonzero(force)[-1]], lift_off, rise / steps / lift_off)
+    bench.expect("force after", force[t > lift_off].max(), 0.0, 0.0)
+    bench.expect("area after", max(row.measures.contact_area for row in rows if row.time > lift_off), 0.0, 0.0)
+
+
+def many_decades(bench: Bench) -> None:
+    """Relaxation times from 5 ns to 500 s in one step: the modulus that 8 steps per period give, still settling."""
+    for omega in (1e4, 1e6):
+        dt = 2 * np.pi / 8 / omega
+        for integrator in INTEGRATORS:
+            stage = {"pressure": FULL, "velocity": omega / K, "duration": 16 * dt, "time_step": dt}
+            job = wave([stage], material=zener(*TYRE), numerics={"integrator": integrator})
+            march, rows = bench.march(job)
+            modulus = _settling(omega, dt, len(rows) - 2, integrator)
+            friction = K * HEIGHT * HEIGHT * K * modulus.imag / FULL
+            bench.expect("amplitude", bench.amplitude(march), 2 * K * HEIGHT * abs(modulus), 1e-9)
+            bench.expect("friction", rows[-1].measures.friction, friction, 1e-9)
+
+
+def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
+    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value."""
+    spring, moduli, times = TYRE
+    total = complex(spring)
+    for modulus, time in zip(moduli, times, strict=True):
+        share = complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator)) / modulus
+        z = dt / time
+        decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
+        total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)
+    return total

@@ -1,0 +1,78 @@
+"""This machine as a run finds it: ranks, libraries, whether files come back as they were, and where it is slow."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+
+from ..job import Job, load
+from ..parallel.root import on_root
+from ..parallel.slab import Slab
+from ..plan.costs import measure_write_rate
+from ..plan.trial import PER_POINT
+from ..run import runner
+from ..storage import header
+from .bench import Bench
+from .jobs import GLASSY, crossed, zener
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+POINTS = 512  # along each side of the contact that is timed
+SLOW = 4.0  # times the usual time of an operator call
+SLOW_DISK = 50e6  # bytes per second
+SAME = 1e-6  # of the largest pressure
+STEPS = 4  # of the run whose files are read again
+
+
+def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
+    """Lines on ranks, libraries and times, and warnings where it is slow; collective, all ranks must take all."""
+    yield from header.lines(comm)
+    yield f"HDF5 {h5py.version.hdf5_version}"
+    cores = len(os.sched_getaffinity(0))
+    here = sum(name == os.uname().nodename for name in comm.allgather(os.uname().nodename))
+    if here > cores:
+        yield f"warning: {here} ranks share {cores} cores of this machine"
+    bench = Bench(comm)
+    loads = [{"pressure": 1e4}, {"pressure": 1.1e4}]
+    _, rows = bench.march(crossed(loads, POINTS, material=zener(GLASSY, [], []), numerics={"tolerance": 1e-6}))
+    seconds, usual = rows[-1].seconds / rows[-1].operator_calls, PER_POINT * POINTS**2 / comm.size
+    yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms for an operator call and all that belongs to it"
+    if seconds > SLOW * usual:
+        yield f"warning: that is slow, {1e3 * usual:.2g} ms are usual; are other programs at work, or too many threads?"
+    rate = comm.bcast(measure_write_rate(where))
+    yield f"files: {rate / 1e6:.3g} MB/s in {where}"
+    if rate < SLOW_DISK:
+        yield "warning: that is slow; save fewer fields and checkpoints, or write to another disk"
+
+
+def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
+    """Run a small job in two parts below a directory and read its fields; what is wrong, or ''. Collective."""
+    place = Path(comm.bcast(tempfile.mkdtemp(prefix="doctor-", dir=where) if comm.rank == 0 else None))
+    try:
+        stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-3 / STEPS}
+        output = {"directory": str(place / "out"), "fields": ["pressure"], "every": 1}
+        given = Job.model_validate(crossed([stage], output=output))
+        on_root(comm, lambda: (place / "job.yaml").write_text(given.resolved()))
+        job = load(place / "job.yaml")
+        slab = Slab(comm, *job.grid.points)
+        for until in (0.5e-3, None):
+            runner.run(job, slab, runner.Options(quiet=True, until=until))
+        bench = Bench(comm)
+        march, _ = bench.march(crossed([stage], numerics=job.numerics.model_dump()))
+        expected = bench.whole(march, "pressure")
+        with h5py.File(place / "out" / "fields.h5") as file:
+            found = file["pressure"][-1]
+        sound = np.allclose(found, expected, rtol=0.0, atol=SAME * expected.max())
+        return (
+            "" if comm.bcast(bool(sound)) else "fields.h5 of a run that was stopped and went on is not as it should be"
+        )
+    finally:
+        comm.Barrier()
+        if comm.rank == 0:
+            shutil.rmtree(place, ignore_errors=True)

@@ -1,0 +1,72 @@
+"""The doctor's verb, and what it says of checks that go wrong; that they are right is tested with all hard cases."""
+
+from pathlib import Path
+
+import pytest
+from marching import ROOT
+from mpi4py import MPI
+
+from parcontact import __main__
+from parcontact.doctor import checks, machine
+from parcontact.doctor.bench import Bench, Finding
+from parcontact.doctor.checks import CHECKS, Check, CheckResult, markdown, run_check
+from parcontact.run import runner
+
+
+def test_a_case_that_goes_wrong_is_seen() -> None:
+    """Numbers beyond their limit, numbers that are none, solves that fail."""
+
+    def wrong(bench: Bench) -> None:
+        bench.expect("area", 0.5, 0.6, 0.1)
+        bench.expect("force", float("nan"), 1.0, 0.1)
+        bench.expect("peak", 1.0, 1.05, 0.1)
+
+    result = run_check(Check("name", "expected", wrong), MPI.COMM_SELF)
+    assert result.wrong == ["area = 0.5 (0.6 +- 0.06)", "force = nan (1 +- 0.1)"]
+    assert "WRONG" in markdown([result])
+    failed = CheckResult(result.check, (), 0.0, 0, "the contact solve stalled")
+    assert failed.wrong == ["the contact solve stalled"]
+    assert Finding("gap", 0.0, 0.0, 0.0).ok
+    assert not Finding("gap", 1e-300, 0.0, 0.0).ok
+
+
+@pytest.mark.parametrize(
+    ("allowed", "code", "said"), [(0.2, 0, "all is well"), (0.1, 1, "a case: area = 0.5 (0.6 +- 0.06)")]
+)
+def test_verb(
+    allowed: float,
+    code: int,
+    said: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    check = Check("a case", "an area", lambda bench: bench.expect("area", 0.5, 0.6, allowed))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(checks, "CHECKS", (check,))
+    assert __main__.main(["doctor"]) == code
+    assert capsys.readouterr().out.splitlines()[-1] == said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_table_of_the_readme() -> None:
+    """It has every check, with what is expected of it."""
+    text = (ROOT / "README.md").read_text()
+    for number, check in enumerate(CHECKS, start=1):
+        assert f"| {number} | {check.name} | {check.expected} |" in " ".join(text.split())
+
+
+@pytest.mark.mpi(2)
+def test_files_that_come_back_as_they_were(comm: MPI.Intracomm, tmp_path: Path) -> None:
+    where = Path(comm.bcast(str(tmp_path)))
+    assert machine.find_broken_files(comm, where) == ""
+    lines = list(machine.describe_machine(comm, where))
+    assert any("MB/s in" in line for line in lines)
+
+
+def test_files_that_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run whose result is another one, as after a stop from which it went on wrongly."""
+    run = runner.run
+    monkeypatch.setattr(runner, "run", lambda job, slab, options: run(job, slab, runner.Options(until=0.5e-3)))
+    assert "fields.h5" in machine.find_broken_files(MPI.COMM_SELF, tmp_path)
+    assert list(tmp_path.iterdir()) == []
