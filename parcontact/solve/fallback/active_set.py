@@ -103,13 +103,13 @@ class _Search:
         lower, upper = self.problem.constraint.bounds
         x[...] = np.where(working, x, np.where(x < upper, lower, upper))
         self.members, total = self.slab.sum(float(np.count_nonzero(working)), kernels.total(x))
-        if self.load is not None:
+        if self.load is not None and self.members:
             x += (self.load - total) / self.members * working
         self.problem.operator.apply(x, u)
 
     def _residual(self, u: Array, r: Array) -> float:
         """Put the gap on the set into r, for the d at which its mean is 0 unless that is given; its largest size."""
-        if self.load is not None:
+        if self.load is not None and self.members:
             self.d = self.slab.sum(float(np.sum((u - self.h) * self.working)))[0] / self.members
         kernels.residual(self.working, u, self.h, self.d, r)
         return self.slab.reduce((), [float(np.abs(r).max(initial=0.0))])[0]
