@@ -46,6 +46,7 @@ SCENES: dict[str, tuple[str, Any, Any, list[Any], dict[str, Any]]] = {  # bounda
     "backward-euler": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"integrator": "backward-euler"}),
     "sub-cell": ("periodic", ROUGH, ZENER, [PRESS, OBLIQUE, {**SLIDE, "cells_per_step": 0.7}], {}),
     "free": ("free", SPHERE, ZENER, [PRESS, {**OBLIQUE, "name": "slide"}], {}),
+    "yielding": ("periodic", ROUGH, {**ZENER, "hardness": 3e5}, [PRESS, SLIDE], {}),
     "approach": ("free", SPHERE, ZENER, [LIFT, {**LIFT, "velocity": 0.1}], {}),
     "ramped": ("periodic", [ROUGH, SPHERE], ZENER, [RAMP, {**SLIDE, "pressure": {"from": 3e5, "to": 0.0}}], {}),
     "mixed": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"precision": "mixed"}),

@@ -132,6 +132,7 @@ class Job(Part):
         Rule(("material",), limits.of_material),
         Rule(("grid", "material", "history"), limits.of_loads),
         Rule(("grid", "material", "initial", "steady"), limits.of_states),
+        Rule(("grid", "material", "history", "initial", "steady"), limits.of_hardness),
         Rule(("grid", "history"), limits.of_steps),
     )
 

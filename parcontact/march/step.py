@@ -197,9 +197,10 @@ class March:
         return MeanPressure(mean / (trial.alpha * scene.units.pressure))
 
     def _refuse_beyond_full_contact(self, step: Step, d: float, effective: Array) -> None:
-        """A periodic half space cannot follow an approach that puts its mean surface below its undeformed level."""
+        """A periodic half space cannot follow an approach that puts its mean surface below its undeformed level, but
+        where the rigid surface yields."""
         scene = self.scene
-        if scene.job.grid.boundary == "periodic":
+        if scene.job.grid.boundary == "periodic" and scene.job.material.hardness is None:
             mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
             datum = scene.setup.surface.datum
             rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height

@@ -217,6 +217,8 @@ def _longest_slide(timeline: Timeline) -> float:
 
 def _material(job: Job) -> Prony:
     """The incompressible body that is as stiff as the job's half space, to which nu is a factor."""
+    if job.material.hardness is not None:
+        raise InputError("the theory excludes counterbodies that yield: leave out material.hardness")
     series, factor = relaxation_of(job.material), 0.5 / (1.0 - job.material.poisson)
     return Prony(factor * series.modulus_inf, factor * series.moduli, series.relaxation_times)
 

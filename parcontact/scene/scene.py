@@ -27,6 +27,7 @@ from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
 from ..physics.units import Units
+from ..solve.bounded import Bounded
 from ..solve.constraint import Constraint, NonNegative
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
@@ -133,7 +134,8 @@ class Scene:
 
     def constraint(self, alpha: float) -> Constraint:
         """Which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
-        return NonNegative()
+        hardness = self.job.material.hardness
+        return NonNegative() if hardness is None else Bounded(hardness / (alpha * self.units.pressure))
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:

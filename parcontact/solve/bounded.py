@@ -4,10 +4,10 @@ With H the highest pressure that it bears, in the unit of p,
 
     0 <= p <= H,   g >= 0 where p < H,   g <= 0 where p > 0:
 
-where p = H the rigid surface gives way, and the gap counts how far. Each solve starts from its full heights: it does not
+where p = H the rigid surface gives way, and the gap tells how far. Each solve starts from its full heights: it does not
 remember where it gave way before (A. Almqvist, F. Sahlin, R. Larsson, S. Glavatskih, Tribol. Int. 40 (2007) 574). The
-mean pressure must be below H. Points with `0 < p < H` are free: it is from them that the approach follows, and they that
-are scaled to the load.
+mean pressure must be below H. Points with `0 < p < H` are free: the approach follows from them, and they are scaled to
+the load.
 """
 
 from dataclasses import dataclass

@@ -50,6 +50,25 @@ def of_grid(grid: Grid) -> Iterator[Fault]:
             return
 
 
+def of_hardness(
+    grid: Grid, material: Elastic | Zener, history: tuple[Stage, ...], initial: Initial, steady: Steady | None
+) -> Iterator[Fault]:
+    """Mean pressures that the counterbody bears; steady sliding, which is solved for one that does not yield."""
+    hardness = material.hardness
+    if hardness is None:
+        return
+    for key, given in (("initial", initial.state == "steady"), ("steady", steady is not None)):
+        if given:
+            yield Fault("does not go with material.hardness: slide into the steady state with a stage", (key,))
+    for index, stage in enumerate(history):
+        if stage is None or stage.control == "approach":
+            continue
+        mean = max(stage.load.start, stage.load.end) / (grid.lx * grid.ly if stage.control == "force" else 1.0)
+        if mean >= hardness:
+            sentence = f"leads to a mean pressure of {mean:.4g} Pa, no less than material.hardness = {hardness:g} Pa"
+            yield Fault(f"{sentence}: there is no equilibrium", ("history", index, stage.control))
+
+
 def of_surface(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
     """The heights of each shape, and its slopes over a cell."""
     if next(of_grid(grid), None):

@@ -17,6 +17,7 @@ from .temperature import Celsius, Shift, shifted
 from .values import NonNegative, Number, Positive
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
+Hardness = Annotated[Positive | None, Field(description="a positive pressure [Pa] at which the counterbody yields")]
 Poisson = Annotated[Number, Field(gt=-1, le=0.5, description="a Poisson ratio [-] above -1 and up to 0.5")]
 
 
@@ -88,6 +89,7 @@ class Elastic(Part):
     model: Literal["elastic"] = "elastic"
     poisson: Poisson = 0.5
     shear_modulus: Positive = Field(description="a positive shear modulus [Pa]")
+    hardness: Hardness = None
 
     @property
     def instant_modulus(self) -> float:
@@ -140,6 +142,7 @@ class Zener(Part):
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
     band: Band = None
     temperatures: Measured = None
+    hardness: Hardness = None
 
     rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
 
@@ -173,6 +176,7 @@ class Dma(Part):
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
     error: Positive = Field(default=0.02, description="a positive rms error of the logarithms of the moduli [-]")
     weight: Literal["both", "storage", "loss"] = "both"
+    hardness: Hardness = None
 
     _fitted: Zener = PrivateAttr()
     _doubts: tuple[str, ...] = PrivateAttr(default=())
@@ -187,7 +191,7 @@ class Dma(Part):
         if faults := list(shifted(made.shift, self.temperature)):
             refuse(*faults)
         self._doubts = tuple(f"material.path: {text}" for text in found.doubts())
-        self._fitted = made.model_copy(update={"temperature": self.temperature})
+        self._fitted = made.model_copy(update={"temperature": self.temperature, "hardness": self.hardness})
 
     @property
     def doubts(self) -> tuple[str, ...]:

@@ -1,0 +1,187 @@
+"""Pressures up to a hardness: the conditions, an independent solver, and what the bound costs."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.solve.bounded import Bounded
+from parcontact.solve.constraint import Constraint, NonNegative
+from parcontact.solve.contact import Contact, ContactSolver
+from parcontact.solve.fallback import active_set
+from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.solve.workspace import Workspace
+
+from .bodies import BODIES, TIGHT, Bench, Map, rough, solver, white
+
+ROUNDING = 1e-12
+LOADS = [0.1, 0.5, 3.0]
+
+
+def bounded(h: Map, highest: float, **options: Any) -> Bench:
+    body = solver(h, **options)
+    body.constraint = Bounded(highest)
+    return body
+
+
+def hardness(h: Map, mean: float, share: float, **options: Any) -> float:
+    """A pressure that this share of the contact exceeds where nothing yields."""
+    p = solver(h, **options).solve(h, MeanPressure(mean), np.zeros_like(h)).p
+    return float(np.quantile(p[p > 0.0], 1.0 - share))
+
+
+def sphere(points: int) -> Map:
+    x = (np.arange(points) + 0.5) / points - 0.5
+    return np.asarray(-(x[:, None] ** 2 + x**2) / 2.0)
+
+
+@pytest.mark.parametrize(("boundary", "kernel"), BODIES)
+@pytest.mark.parametrize("mean", LOADS)
+def test_the_conditions_hold(boundary: str, kernel: str, mean: float) -> None:
+    """To the tolerance, for the operator applied anew; where p = H the gap is closed or negative."""
+    h = rough(64)
+    options: Any = {"boundary": boundary, "kernel": kernel, "tolerance": 1e-9}
+    highest = hardness(h, mean, 0.2, **options)
+    body = bounded(h, highest, **options)
+    found = body.solve(h, MeanPressure(mean), np.zeros_like(h))
+    assert found.converged
+    p, gap = found.p, body.operator.apply(found.p, np.empty_like(h)) - h - found.d
+    yields = p == highest
+    small = 1e-8 * np.ptp(h)
+    assert p.min() >= 0.0
+    assert p.max() == highest
+    assert 0.1 < yields.sum() / np.count_nonzero(p) < 0.9
+    assert gap[~yields].min() >= -small
+    assert gap[yields].max() <= small
+    assert gap[yields].min() < -100.0 * small
+    assert np.abs(gap[(p > 0.0) & ~yields]).max() <= small
+    assert_allclose(p.mean(), mean, rtol=1e-9)
+    assert found.certificate.members >= np.count_nonzero(p) / p.size
+
+
+@pytest.mark.parametrize("highest", [0.05, 0.3, 1.0, 100.0])
+def test_agrees_with_a_bounded_least_squares_solver(highest: float) -> None:
+    """16 x 16 points, a free body: `<p, A p>/2 - <p, h + d>` as a sum of squares, to 1e-8 of the highest pressure; and
+    the load that comes out, prescribed, gives the same."""
+    h, control = 0.02 * white((16, 16)), Approach(0.0)
+    body = bounded(h, highest, boundary="free", kernel="love", tolerance=TIGHT)
+    units = np.eye(h.size).reshape(-1, *h.shape)
+    matrix = np.array([body.operator.apply(unit, np.empty_like(h)).ravel() for unit in units])
+    factor = cholesky(0.5 * (matrix + matrix.T), lower=True)
+    aim = solve_triangular(factor, (h + control.value).ravel(), lower=True)
+    expected = lsq_linear(factor.T, aim, (0.0, highest), method="bvls", tol=1e-14).x.reshape(h.shape)
+    found = body.solve(h, control, np.zeros_like(h))
+    assert found.converged
+    assert_allclose(found.p, expected, rtol=0, atol=1e-8 * expected.max())
+    assert (expected.max() > 0.999 * highest) == (highest < 10.0)
+    if np.any((expected > 0.0) & (expected < 0.999 * highest)):  # otherwise the load leaves the approach open
+        loaded = body.solve(h, MeanPressure(float(expected.mean())), np.zeros_like(h))
+        assert_allclose(loaded.p, expected, rtol=0, atol=1e-7 * expected.max())
+
+
+@pytest.mark.parametrize("mean", LOADS)
+def test_a_bound_that_is_far_away_changes_nothing(mean: float) -> None:
+    h = rough(64)
+    expected = solver(h).solve(h, MeanPressure(mean), np.zeros_like(h))
+    found = bounded(h, 1e3).solve(h, MeanPressure(mean), np.zeros_like(h))
+    assert found.iterations == expected.iterations
+    assert_allclose(found.p, expected.p, rtol=0, atol=ROUNDING * expected.p.max())
+    assert_allclose(found.d, expected.d, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize("tolerance", [5e-3, 1e-8])
+@pytest.mark.parametrize("mean", [0.05, 0.2, 1.0])
+def test_it_takes_no_longer(mean: float, tolerance: float) -> None:
+    """Up to a fifth more iterations where a fifth of the contact would be beyond the bound."""
+    h = rough(256)
+    free = solver(h, tolerance=tolerance).solve(h, MeanPressure(mean), np.zeros_like(h))
+    body = bounded(h, hardness(h, mean, 0.2, tolerance=tolerance), tolerance=tolerance)
+    found = body.solve(h, MeanPressure(mean), np.zeros_like(h))
+    assert found.converged
+    assert np.count_nonzero(found.p == body.constraint.bounds[1]) > 0.1 * np.count_nonzero(found.p)
+    assert found.iterations <= max(1.2 * free.iterations, free.iterations + 1)
+
+
+@pytest.mark.parametrize("highest", [0.03, 0.1])
+def test_where_all_yields_the_area_is_load_over_hardness(highest: float) -> None:
+    """But for the points at the rim that are between none and all."""
+    h, mean = sphere(64), 0.01
+    found = bounded(h, highest, boundary="free", kernel="love").solve(h, MeanPressure(mean), np.zeros_like(h))
+    rim = np.count_nonzero((found.p > 0.0) & (found.p < highest))
+    assert found.converged
+    assert rim < 0.1 * np.count_nonzero(found.p)
+    assert abs(np.count_nonzero(found.p) - mean * h.size / highest) <= rim
+
+
+@pytest.mark.parametrize("mean", LOADS)
+def test_the_approach_that_comes_of_a_load(mean: float) -> None:
+    """A periodic body, too, whose mean surface may now be below its undeformed level."""
+    h = rough(64)
+    body = bounded(h, 1.2 * mean, tolerance=1e-9)
+    loaded = body.solve(h, MeanPressure(mean), np.zeros_like(h))
+    p, d = loaded.p.copy(), loaded.d
+    for moved in (body.solve(h, Approach(d), np.zeros_like(h)), by_sets(body, h, MeanPressure(mean))):
+        assert moved.converged
+        assert_allclose(moved.p, p, rtol=0, atol=1e-5 * mean)
+
+
+def by_sets(body: Bench, h: Map, control: MeanPressure) -> Contact:
+    return active_set.solve(body.solver, body.problem(h, control), np.zeros_like(h))
+
+
+@pytest.mark.parametrize("total", [0.5, 30.0, 60.0, 90.0, 99.0])
+def test_any_load_below_the_hardness_can_be_given(total: float) -> None:
+    """To pressures of which half has yielded, others have none: up to H on all points, and down to any."""
+    p = np.zeros((10, 10))
+    p[:5], p[5:7] = 1.0, 0.1
+    slab = Slab(MPI.COMM_SELF, 10, 10)
+    Bounded(1.0).give_load(slab, p, float(p.sum()), total)
+    assert_allclose(p.sum(), total, rtol=ROUNDING)
+    assert p.min() >= 0.0
+    assert p.max() <= 1.0
+
+
+@pytest.mark.parametrize("shape", [(7, 33), (1, 1), (0, 16)])
+def test_kernels_without_a_bound_are_those_of_pressures_that_are_not_negative(shape: tuple[int, int]) -> None:
+    random = np.random.default_rng(1)
+    p = np.maximum(random.standard_normal(shape), 0.0)
+    u, h, t = random.standard_normal((3, *shape))
+    sets = np.ones((2, *shape), dtype=np.bool_)
+    one, other = NonNegative(), Bounded(np.inf)
+    both: list[Constraint] = [one, other]
+    assert_allclose(other.weigh(p, u, h, 0.2), one.weigh(p, u, h, 0.2), rtol=ROUNDING)
+    marked = [each.mark(p, u, h, 0.2, working) for each, working in zip(both, sets, strict=True)]
+    assert_allclose(marked[1], marked[0], rtol=ROUNDING)
+    np.testing.assert_array_equal(sets[0], sets[1])
+    moved, sums = np.empty((2, *shape)), np.empty((2, 1 + shape[0] // 16 + 1, 2 * (1 + shape[1] // 16)))
+    for each, new, cells in zip(both, moved, sums, strict=True):
+        each.advance(p, t, 0.7, new, 3, cells)
+    np.testing.assert_array_equal(moved[0], moved[1])
+    assert_allclose(sums[1], sums[0], rtol=ROUNDING, atol=ROUNDING)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(-0.01)])
+def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approach) -> None:
+    """To 1e-8 of the hardness."""
+    whole = rough(64)
+
+    def solved(on: MPI.Intracomm) -> tuple[Slab, Contact]:
+        slab = Slab(on, 64, 64)
+        fft, half_space = FFT(slab), HalfSpace((1.0, 1.0))
+        solving = ContactSolver(Workspace(slab, TIGHT), float(np.ptp(whole)), TIGHT, 500)
+        body = Bench(solving, half_space.operator(fft), half_space.inverse(fft), Bounded(1.0))
+        return slab, body.solve(whole[slab.rows].copy(), control, slab.zeros())
+
+    slab, together = solved(comm)
+    _, alone = solved(MPI.COMM_SELF)
+    assert together.converged
+    assert alone.p.max() == 1.0
+    assert_allclose(together.p, alone.p[slab.rows], rtol=0, atol=1e-8)
