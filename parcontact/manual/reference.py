@@ -11,6 +11,7 @@ import yaml
 
 from ..job import keys as job_keys
 from ..job.keys import Key, Section
+from ..job.sections.part import kind_key
 
 MEANINGS = Path(__file__).parent / "keys.yaml"
 
@@ -29,7 +30,7 @@ def keys() -> str:
 
 def heading(section: Section) -> str:
     """What a section is called: its place in a job, and its kind where there are several."""
-    kind = job_keys.kind_key(section.part)
+    kind = kind_key(section.part)
     named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
     more = section.part.label.removeprefix(named.replace(":", "")).strip()
     detail = f" {more}" if named and more else f": {more}" if more not in ("", section.place) else ""

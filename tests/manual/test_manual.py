@@ -180,7 +180,7 @@ def load_job(text: str, where: Path) -> None:
     """A whole job, or sections of one."""
     data = yamltext.parse(text, "block").data
     needed = {key: value for key, value in WHOLE.items() if key != "history" or "steady" not in data}
-    (where / "job.yaml").write_text(yaml.safe_dump({**needed, **data}))
+    (where / "job.yaml").write_text(yamltext.dump({**needed, **data}))
     assert job.load_cases(where / "job.yaml")
 
 
@@ -238,7 +238,7 @@ def test_what_to_cite(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds no run"):
         citations.describe(tmp_path)
     data = {**WHOLE, "grid": {**WHOLE["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}}
-    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
+    (tmp_path / "job.yaml").write_text(yamltext.dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
     (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
     elastic = citations.describe(tmp_path)
     assert "Love" in elastic

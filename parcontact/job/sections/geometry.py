@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
 from ..text.fault import Fault, refuse
 from .height_arrays import HeightArray
-from .part import Context, Part, Rule, chosen, existing_file
+from .part import Part, Rule, chosen, existing_file
 from .topography import RoughSpectrum, Topography
 from .values import Number, Positive, Real, Seed, Whole
 
@@ -43,7 +43,7 @@ class Rough(Part):
     shape: Literal["rough"] = "rough"
     hurst: Number = Field(gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
     long_wavelength: Wavelength
-    rolloff_wavelength: Wavelength  # default: long_wavelength, no plateau
+    rolloff_wavelength: Wavelength = Field(default_factory=lambda data: data["long_wavelength"])  # no plateau
     short_wavelength: Wavelength
     rms_slope: Annotated[Positive | None, Field(description="a positive rms slope [-]")] = None
     rms_height: Annotated[Positive | None, Field(description="a positive rms height [m]")] = None
@@ -53,13 +53,6 @@ class Rough(Part):
 
     one_of = (("rms_slope", "rms_height", "psd_constant"),)
     rules = (_ordered("rolloff_wavelength", "long_wavelength"), _ordered("short_wavelength", "rolloff_wavelength"))
-
-    @classmethod
-    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
-        """No plateau unless told otherwise: the roll-off wavelength is the long one."""
-        if "long_wavelength" in data:
-            data.setdefault("rolloff_wavelength", data["long_wavelength"])
-        return data
 
 
 class Sphere(Part):
@@ -140,7 +133,5 @@ def _shape(data: Any, info: ValidationInfo) -> Any:
     return data if isinstance(data, RoughSpectrum) else CHOSEN(data, info)
 
 
-Shape = Annotated[
-    Rough | RoughSpectrum | Sphere | Cylinder | Wave | HeightFile | HeightArray | Topography | Flat,
-    PlainValidator(_shape),
-]
+AnyShape = Rough | RoughSpectrum | Sphere | Cylinder | Wave | HeightFile | HeightArray | Topography | Flat
+Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnyShape)]

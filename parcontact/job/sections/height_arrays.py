@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, PlainValidator
+from pydantic import Field, PlainValidator, WithJsonSchema
 
 from ..text.fault import Fault, quote, refuse
 from ..text.python_data import is_array
@@ -84,7 +84,7 @@ class HeightArray(Part):
 
     label: ClassVar[str] = "shape array"
     shape: Literal["array"] = "array"
-    heights: Annotated[Heights, PlainValidator(_heights)] = Field(
+    heights: Annotated[Heights, PlainValidator(_heights), WithJsonSchema({"allOf": [False]})] = Field(
         description="a numpy array of heights [m] of shape (ny, nx)"
     )
 

@@ -79,7 +79,7 @@ def _branch(data: Any, info: ValidationInfo) -> ZenerBranch | PronyBranch:
     return (ZenerBranch if zener else PronyBranch).model_validate(data, context=info.context)
 
 
-Branch = Annotated[ZenerBranch | PronyBranch, PlainValidator(_branch)]
+Branch = Annotated[ZenerBranch | PronyBranch, PlainValidator(_branch, json_schema_input_type=ZenerBranch | PronyBranch)]
 
 
 class Elastic(Part):
@@ -226,4 +226,5 @@ def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
 
 KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}
 CALLED = dict.fromkeys(("prony", "maxwell", "viscoelastic", "sls"), "zener")  # what others name it
-Material = Annotated[Elastic | Zener | Dma, PlainValidator(chosen("model", KINDS, CALLED))]
+AnyMaterial = Elastic | Zener | Dma
+Material = Annotated[AnyMaterial, PlainValidator(chosen("model", KINDS, CALLED), json_schema_input_type=AnyMaterial)]

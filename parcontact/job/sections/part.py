@@ -8,14 +8,24 @@ right, whatever else is wrong.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails
+from pydantic_core import CoreSchema, ErrorDetails
 
 from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse, shorten
 from ..text.overrides import Included
@@ -103,6 +113,19 @@ class Part(BaseModel):
         return part
 
     @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return pydantic's schema with what keys ask of each other."""
+        found = handler.resolve_ref_schema(handler(core))
+        rules: list[Any] = [{"oneOf": [{"required": [word]} for word in group]} for group in cls.one_of]
+        rules += [{"not": {"required": list(pair)}} for group in cls.at_most_one for pair in combinations(group, 2)]
+        if rules:
+            found["allOf"] = rules
+        if kind := kind_key(cls):
+            found["required"] = [kind, *found.get("required", ())]
+        found["description"] = re.split(r"(?<=\.) (?=[A-Z])", " ".join((cls.__doc__ or "").split()))[0]
+        return found
+
+    @classmethod
     def _fault(cls, error: ErrorDetails, filled: dict[str, Any]) -> Fault:
         """Return pydantic's error as the rest of a sentence."""
         kind, path, value = error["type"], error["loc"], error["input"]
@@ -145,7 +168,7 @@ def _value(
         return getattr(part, name)
     field, wrong = kind.model_fields[name], [error["loc"] for error in errors if error["loc"][:1] == (name,)]
     if not wrong and name not in filled:
-        return field.get_default(call_default_factory=True)
+        return field.get_default(call_default_factory=True, validated_data=dict(filled))
     if not wrong:
         annotation: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
         return TypeAdapter(annotation).validate_python(filled[name], context=context)
@@ -156,6 +179,12 @@ def _value(
     adapter: TypeAdapter[Any] = TypeAdapter(item)
     items = enumerate(filled[name])
     return tuple(None if index in bad else adapter.validate_python(one, context=context) for index, one in items)
+
+
+def kind_key(part: type[Part]) -> str:
+    """Return the key that says which kind of part it is, '' for parts of which there is one kind."""
+    kinds = (word for word in ("shape", "model", "law") if word in part.model_fields)
+    return next((word for word in kinds if len(get_args(part.model_fields[word].annotation)) == 1), "")
 
 
 def _absent(error: ErrorDetails) -> bool:

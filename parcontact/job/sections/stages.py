@@ -55,7 +55,7 @@ def _ramp(number: Any, description: str) -> PlainValidator:
         ends = keys.model_validate(given, context=info.context)
         return Ramp(*(number for _, number in ends))
 
-    return PlainValidator(read)
+    return PlainValidator(read, json_schema_input_type=number | keys)
 
 
 class GeometricStep(Part):
@@ -75,6 +75,12 @@ def _time_step(value: Any, info: ValidationInfo) -> float | GeometricStep | Auto
     if isinstance(value, dict | GeometricStep):
         return GeometricStep.model_validate(value, context=info.context)
     return SECONDS.validate_python(value, context=info.context)
+
+
+TimeStep = Annotated[
+    float | GeometricStep | Auto,
+    PlainValidator(_time_step, json_schema_input_type=Positive | GeometricStep | Auto),
+]
 
 
 def _stepping(
@@ -111,7 +117,10 @@ class Stage(Part):
     velocity: Velocity = (0.0, 0.0)
     duration: Positive | None = Field(default=None, description="a positive time [s]")
     distance: Positive | None = Field(default=None, description="a positive length [m]")
-    time_step: Annotated[float | GeometricStep | Auto | None, PlainValidator(_time_step)] = Field(
+    time_step: Annotated[
+        float | GeometricStep | Auto | None,
+        PlainValidator(_time_step, json_schema_input_type=Positive | GeometricStep | Auto),
+    ] = Field(
         default=None, description="a positive time step [s], {first, growth}, or auto"
     )  # auto where the stage lasts and does not give cells_per_step either
     cells_per_step: Positive | None = Field(

@@ -79,10 +79,11 @@ class FactorsShift(Part):
 
 
 LAWS = {"wlf": WlfShift, "arrhenius": ArrheniusShift, "factors": FactorsShift}
-Shift = Annotated[WlfShift | ArrheniusShift | FactorsShift, PlainValidator(chosen("law", LAWS))]
+AnyShift = WlfShift | ArrheniusShift | FactorsShift
+Shift = Annotated[AnyShift, PlainValidator(chosen("law", LAWS), json_schema_input_type=AnyShift)]
 
 
-def shifted(shift: WlfShift | ArrheniusShift | FactorsShift | None, temperature: float | None) -> Iterator[Fault]:
+def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault]:
     """The rule of every material with a temperature: it needs a shift that reaches it."""
     if temperature is None:
         return

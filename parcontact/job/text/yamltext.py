@@ -57,6 +57,10 @@ class JobDumper(yaml.SafeDumper):
     yaml_implicit_resolvers = _implicit_resolvers()
 
 
+JobDumper.add_representer(PlacedDict, yaml.SafeDumper.represent_dict)
+JobDumper.add_representer(PlacedList, yaml.SafeDumper.represent_list)
+
+
 class TooMuchError(Exception):
     """More than a job may hold, as the rest of a sentence."""
 
