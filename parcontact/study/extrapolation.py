@@ -14,10 +14,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from scipy.optimize import brentq
+
 LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # orders outside tell of values that do not converge yet
 DOUBT = 0.5  # of the order
 LEAST_DOUBT = 0.25  # of the last difference
-BISECTIONS = 80
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Limit:
     value: float
     order: float
     uncertainty: float
+
+    @property
+    def doubt(self) -> float:
+        """The uncertainty over the value; 0 where the value is, as the friction of a body that does not slide."""
+        return abs(self.uncertainty / self.value) if self.value else 0.0
 
 
 def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
@@ -65,10 +71,6 @@ def _order(sizes: Sequence[float], values: Sequence[float]) -> float:
     def ratio(p: float) -> float:
         return float((h3**p - h2**p) / (h2**p - h1**p))
 
-    low, high = LEAST_ORDER, LARGEST_ORDER
-    if not ratio(low) <= wanted <= ratio(high):
+    if not ratio(LEAST_ORDER) <= wanted <= ratio(LARGEST_ORDER):
         return math.nan
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if ratio(middle) < wanted else (low, middle)
-    return 0.5 * (low + high)
+    return float(brentq(lambda p: ratio(p) - wanted, LEAST_ORDER, LARGEST_ORDER))

@@ -1,20 +1,28 @@
-"""What one case of a study gives and costs: friction, area, seconds, transforms."""
+"""Outcomes of the cases of a study, friction, area, seconds, transforms, and their table study.csv: one line per case,
+written when the case is done, with its errors once all are."""
 
+import contextlib
+import csv
+import io
 import math
 import re
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, fields
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 from .. import scene
-from ..job import Job
+from ..job import AUTO, Job
 from ..march import loop
 from ..march.step import March
 from ..parallel.slab import Slab
 from ..parallel.tally import Tally
 from ..steady_sliding import start
+from ..storage import files
 from ..storage.row import Row
+from .settings import Settings
 
 FIRST_STEPS = 2
 LAST_SHARE = 0.25  # of the last stage that slides (or lasts): its mean is taken for what has settled
@@ -39,7 +47,9 @@ class Outcome:
 
 
 QUANTITIES = ("mu_max", "mu_dyn", "area", "area_corrected")
-NAMES = tuple(field.name for field in fields(Outcome))
+SETTINGS, RESULTS = (tuple(field.name for field in fields(kind)) for kind in (Settings, Outcome))
+COLUMNS = ("fingerprint", *SETTINGS, *RESULTS, *(f"error_{name}" for name in QUANTITIES))  # of study.csv
+WORDS, COUNTS = ("integrator", "precision", "kernel"), ("mesh", "steps", "operator_calls")
 
 
 def warm_up(job: Job, slab: Slab) -> None:
@@ -95,3 +105,41 @@ def transform_work(counted: Tally) -> float:
             points = int(match[1]) * int(match[2])
             total += count * points * math.log2(max(points, 2))
     return total
+
+
+# -- study.csv --------------------------------------------------------------------------------------------------------
+
+
+def read_outcomes(path: Path, wanted: Mapping[Settings, str]) -> dict[Settings, Outcome]:
+    """The outcomes of the wanted cases that a table already has, if their jobs have the same fingerprints."""
+    found = {}
+    with contextlib.suppress(FileNotFoundError), path.open(newline="") as file:
+        for row in csv.DictReader(line for line in file if line.endswith("\n")):
+            if set(row) == set(COLUMNS) and None not in row.values():
+                settings = Settings(**{name: _value(name, row[name]) for name in SETTINGS})
+                if wanted.get(settings) == row["fingerprint"]:
+                    found[settings] = Outcome(**{name: _value(name, row[name]) for name in RESULTS})
+    return found
+
+
+def write_outcomes(
+    path: Path,
+    fingerprints: Mapping[Settings, str],
+    outcomes: Mapping[Settings, Outcome],
+    errors: Mapping[Settings, Mapping[str, float]] | None = None,
+) -> None:
+    """Put all outcomes into the table, in the place of the old one."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for settings, outcome in outcomes.items():
+        given = (AUTO if value is None else value for value in astuple(settings))
+        missed = [errors[settings][name] if errors else "" for name in QUANTITIES]
+        writer.writerow([fingerprints[settings], *given, *astuple(outcome), *missed])
+    files.write(path, text.getvalue())
+
+
+def _value(name: str, text: str) -> Any:
+    if name in WORDS:
+        return text
+    return None if text == AUTO else int(text) if name in COUNTS else float(text)

@@ -11,9 +11,9 @@ from ..parallel.slab import Slab
 from ..plotting import study as study_plots
 from ..storage import files, marker, stopfile
 from ..storage.directory import Directory
-from . import outcome, table, verdict
-from .cases import Case, Ladders, about_chosen_steps, ladders, overrides
-from .outcome import Outcome
+from . import outcome, verdict
+from .outcome import Outcome, read_outcomes, write_outcomes
+from .settings import Ladders, Settings, describe_chosen_steps, ladders, overrides
 
 DONE, AGAIN = 0, 3  # exit codes
 HEAD = f"  {'case':80} {'friction max':>13} {'area':>9} {'CPU [s]':>8}"
@@ -26,13 +26,13 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     All cases are read before the first is run. After a stop the same command goes on with the cases that lack.
     """
     refined = ladders(job)
-    jobs = {case: make(overrides(job, refined.own, case)) for case in refined.cases()}
+    jobs = {case: make(overrides(job, refined.own, case)) for case in refined.combine()}
     directory = Directory(job.output.directory, slab, "study")
     with Signals().noted() as signals, directory.claimed():
         plain = identity.plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
-        study = _Study(refined, jobs, directory, slab, quiet, about_chosen_steps(job))
+        study = _Study(refined, jobs, directory, quiet)
         stop = directory.stop_file
         ended = study.run(lambda: signals.stop or (slab.root and os.path.lexists(stop)))
         if not ended:
@@ -40,28 +40,19 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
                 raise RunError(problem)
             study.say(f"stopped after {len(study.outcomes)} of {len(jobs)} cases; run again to go on")
             return AGAIN
-        study.conclude()
+        study.conclude(describe_chosen_steps(job))
     return DONE
 
 
 class _Study:
     """The cases, and what has come out of them so far."""
 
-    def __init__(
-        self,
-        refined: Ladders,
-        jobs: dict[Case, Job],
-        directory: Directory,
-        slab: Slab,
-        quiet: bool,
-        notes: Sequence[str],
-    ) -> None:
-        self.notes = notes
-        self.refined, self.jobs, self.slab, self.quiet = refined, jobs, slab, quiet
+    def __init__(self, refined: Ladders, jobs: dict[Settings, Job], directory: Directory, quiet: bool) -> None:
+        self.refined, self.jobs, self.slab, self.quiet = refined, jobs, directory.slab, quiet
         self.path = directory.path / "study.csv"
         self.prints = {case: _fingerprint(one) for case, one in jobs.items()}
-        known = table.read(self.path, self.prints) if slab.root else {}
-        self.outcomes: dict[Case, Outcome] = slab.agree(known)
+        known = read_outcomes(self.path, self.prints) if self.slab.root else {}
+        self.outcomes: dict[Settings, Outcome] = self.slab.agree(known)
         self.warm: set[str] = set()
 
     def say(self, text: str) -> None:
@@ -79,12 +70,12 @@ class _Study:
                     return False
                 self.outcomes[case] = found
                 if self.slab.root:
-                    table.write(self.path, self.prints, self.outcomes)
+                    write_outcomes(self.path, self.prints, self.outcomes)
             one = self.outcomes[case]
             self.say(f"  {case!s:80} {one.mu_max:13.6g} {one.area_corrected:9.5f} {one.cpu_seconds:8.2f}")
         return True
 
-    def _one(self, case: Case, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
+    def _one(self, case: Settings, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
         slab = self.slab.resized(*job.grid.points)
         try:
             if case.precision not in self.warm:
@@ -94,25 +85,27 @@ class _Study:
         except RunError as error:
             raise RunError(f"{case}: {error}") from error
 
-    def conclude(self) -> None:
+    def conclude(self, notes: Sequence[str]) -> None:
         """Limits, errors, pictures and sentences."""
         if not self.slab.root:
             return
         ordered = {case: self.outcomes[case] for case in self.jobs}
         reference = verdict.references(self.refined, ordered)
         errors = {case: verdict.errors(found, reference) for case, found in ordered.items()}
-        table.write(self.path, self.prints, ordered, errors)
-        lines = [*self.notes, *map(str, verdict.limits(self.refined, ordered))]
+        write_outcomes(self.path, self.prints, ordered, errors)
+        lines = [*notes, *map(str, verdict.limits(self.refined, ordered))]
         lines += verdict.sentences(ordered, reference, self.slab.comm.size)
         files.write(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
         proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
-        doubts = {name: abs(one.uncertainty / one.value) if one.value else 0.0 for name, one in reference.items()}
-        curves, points = self._curves(ordered, errors), self._points(ordered, proven)
-        pictures = study_plots.plot(self.path.parent, curves, points, doubts)
+        doubts = {name: limit.doubt for name, limit in reference.items()}
+        points = {quantity: _points(ordered, proven, quantity) for quantity in verdict.NEEDED}
+        pictures = study_plots.plot(self.path.parent, self._curves(ordered, errors), points, doubts)
         for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
             self.say(line)
 
-    def _curves(self, outcomes: dict[Case, Outcome], errors: dict[Case, dict[str, float]]) -> list[study_plots.Curve]:
+    def _curves(
+        self, outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]]
+    ) -> list[study_plots.Curve]:
         """How errors fall along each ladder."""
         return [
             study_plots.Curve(quantity, integrator, name, sizes, [errors[case][quantity] for case in cases])
@@ -121,24 +114,22 @@ class _Study:
             for quantity in verdict.NEEDED
         ]
 
-    def _points(
-        self, outcomes: dict[Case, Outcome], errors: dict[Case, dict[str, float]]
-    ) -> dict[str, list[study_plots.Point]]:
-        """Error and cost of every case by quantity; those on the front with their settings."""
-        points = {}
-        for quantity in verdict.NEEDED:
-            error = {case: errors[case][quantity] for case in outcomes}
-            best = verdict.front(outcomes, error)
-            points[quantity] = [
-                study_plots.Point(
-                    found.transform_work, found.cpu_seconds, error[case], case.integrator, _short(case), case in best
-                )
-                for case, found in outcomes.items()
-            ]
-        return points
+
+def _points(
+    outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]], quantity: str
+) -> list[study_plots.Point]:
+    """Error and cost of every case; those on the front with their settings."""
+    error = {case: errors[case][quantity] for case in outcomes}
+    best = verdict.front(outcomes, error)
+    return [
+        study_plots.Point(
+            found.transform_work, found.cpu_seconds, error[case], case.integrator, _short(case), case in best
+        )
+        for case, found in outcomes.items()
+    ]
 
 
-def _short(case: Case) -> str:
+def _short(case: Settings) -> str:
     """Its settings in the order of the key of a picture."""
     steps = "auto" if case.cells_per_step is None else f"{case.cells_per_step:.3g}"
     return f"{case.mesh}, {steps}, {case.tolerance:g}, {case.precision}"

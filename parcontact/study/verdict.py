@@ -4,14 +4,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from .cases import Case, Ladders
 from .extrapolation import Limit, extrapolate
 from .outcome import QUANTITIES, Outcome
+from .settings import Ladders, Settings
 
 TARGETS = (0.05, 0.03, 0.01, 0.003)
 NEEDED = ("mu_max", "mu_dyn", "area_corrected")  # what the sentences hold the settings to
 TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
-Outcomes = Mapping[Case, Outcome]
+Outcomes = Mapping[Settings, Outcome]
 
 
 @dataclass(frozen=True)
@@ -23,26 +23,21 @@ class Found:
     ladder: str
     limit: Limit
 
-    @property
-    def relative(self) -> float:
-        """The uncertainty over the limit; NaN if nothing is known of it."""
-        return self.limit.uncertainty / abs(self.limit.value) if self.limit.value else math.inf
-
     def __str__(self) -> str:
         order = "no order found" if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
         name = f"{self.quantity} with {self.integrator}, {self.ladder}"
         if math.isnan(self.limit.uncertainty):
             return f"{name}: {self.limit.value:.6g} in the last cases, which do not differ: its error is not known"
-        return f"{name}: {self.limit.value:.6g} +- {100 * self.relative:.2g} %, {order}"
+        return f"{name}: {self.limit.value:.6g} +- {100 * self.limit.doubt:.2g} %, {order}"
 
 
-def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Case]]]:
+def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
     """Cases that differ in one thing, from coarse to fine: mesh and time together, mesh alone, time alone; with the
     sizes that belong to them. With steps that are chosen there is the mesh only."""
     usual = [
         case
         for case in outcomes
-        if case.integrator == integrator and (case.tolerance, case.precision, case.kernel) == _rest(ladders.own)
+        if replace(ladders.own, mesh=case.mesh, cells_per_step=case.cells_per_step, integrator=integrator) == case
     ]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
     together = sorted((c for c in usual if _alike(c.cells_per_step, coarse)), key=lambda case: case.mesh)
@@ -63,10 +58,6 @@ def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str
 def _alike(one: float | None, other: float | None) -> bool:
     """Whether they are the same cells per step; None for steps that are chosen."""
     return one == other if one is None or other is None else math.isclose(one, other)
-
-
-def _rest(case: Case) -> tuple[float, str, str]:
-    return case.tolerance, case.precision, case.kernel
 
 
 def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
@@ -94,11 +85,9 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
     dearest = max(outcomes, key=lambda case: (case.effort, -case.tolerance, case.precision == "double"))
     best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in QUANTITIES}
     for quantity in QUANTITIES:
-        choices = [one for one in found if one.quantity == quantity and one.limit.value]
+        choices = [one.limit for one in found if one.quantity == quantity and one.limit.value]
         if choices:
-            limit = min(
-                choices, key=lambda one: (math.isnan(one.relative), math.isnan(one.limit.order), one.relative)
-            ).limit
+            limit = min(choices, key=lambda one: (math.isnan(one.doubt), math.isnan(one.order), one.doubt))
             best[quantity] = replace(limit, uncertainty=max(limit.uncertainty, ladders.shared * abs(limit.value)))
     return best
 
@@ -113,8 +102,7 @@ def errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]
 
 def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
     """Errors, but none smaller than what is not known of its reference."""
-    doubt = {name: abs(one.uncertainty / one.value) if one.value else 0.0 for name, one in reference.items()}
-    return {name: doubt[name] if value < doubt[name] else value for name, value in error.items()}
+    return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
 
 
 def worst(error: Mapping[str, float]) -> float:
@@ -123,7 +111,7 @@ def worst(error: Mapping[str, float]) -> float:
     return max(values, default=math.nan)
 
 
-def front(outcomes: Outcomes, error: Mapping[Case, float]) -> list[Case]:
+def front(outcomes: Outcomes, error: Mapping[Settings, float]) -> list[Settings]:
     """The cases than which none is both cheaper, in transforms, and more accurate; the cheapest first."""
     best, chosen = math.inf, []
     for case in sorted(outcomes, key=lambda case: (outcomes[case].transform_work, error[case])):
@@ -137,7 +125,7 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     """For each target: the cheapest settings that reach it in all quantities, and how long they take."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
-    doubts = [abs(one.uncertainty / one.value) for name, one in reference.items() if name in NEEDED and one.value]
+    doubts = [reference[name].doubt for name in NEEDED if name in reference and reference[name].value]
     doubt = max((doubt for doubt in doubts if not math.isnan(doubt)), default=math.nan)
     lines = []
     for target in TARGETS:
@@ -145,7 +133,8 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
         text = f"for {100 * target:g} %: "
         if enough:
             case = min(enough, key=lambda case: outcomes[case].transform_work)
-            text += f"{case}; {outcomes[case].cpu_seconds:.3g} s of CPU time on {_ranks(ranks)}"
+            on = "1 rank" if ranks == 1 else f"{ranks} ranks"
+            text += f"{case}; {outcomes[case].cpu_seconds:.3g} s of CPU time on {on}"
         else:
             text += f"none of these settings; the best, {best}, are at {100 * error[best]:.2g} %"
         if math.isnan(doubt):
@@ -154,7 +143,3 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
             text += f" (the reference itself is only known to {100 * doubt:.2g} %)"
         lines.append(text)
     return lines
-
-
-def _ranks(ranks: int) -> str:
-    return "1 rank" if ranks == 1 else f"{ranks} ranks"

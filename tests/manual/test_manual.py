@@ -27,7 +27,7 @@ from parcontact.manual import reference, texts
 from parcontact.report import prediction
 from parcontact.steady_sliding import table as steady_table
 from parcontact.storage import fields, row
-from parcontact.study import table as study_table
+from parcontact.study import outcome
 from parcontact.summary import citations, sweep_table
 
 PAGES = texts.names()
@@ -146,7 +146,7 @@ COLUMNS = {
     "theory.csv": prediction.COLUMNS,
     "steady_theory.csv": prediction.SteadyInstant._fields,
     "sweep.csv": ["case", *sweep_table.COLUMNS],
-    "study.csv": study_table.COLUMNS,
+    "study.csv": outcome.COLUMNS,
     "fields.h5": [*fields.UNITS, "t", "y", "x", "step"],
 }
 

@@ -13,9 +13,9 @@ from mpi4py import MPI
 from parcontact.job import load
 from parcontact.parallel.slab import Slab
 from parcontact.study import outcome, verdict
-from parcontact.study.cases import Case, ladders, overrides
 from parcontact.study.extrapolation import Limit
 from parcontact.study.outcome import Outcome
+from parcontact.study.settings import Settings, ladders, overrides
 
 WAVE = """
 grid: {points: [32, 1], size: [2.5e-4, 2.5e-4]}
@@ -31,10 +31,10 @@ EXACT = 9.770908e-4  # k^2 h0^2 G''(k v)/P0, full contact, steady at k v tau = 1
 FULL = 11.78e-4 / EXACT  # its maximum after the jump of velocity over that, from the closed form of the transient
 
 
-def outcomes(path: Path) -> dict[Case, Outcome]:
+def outcomes(path: Path) -> dict[Settings, Outcome]:
     job = load(path)
     found = {}
-    for case in ladders(job).cases():
+    for case in ladders(job).combine():
         changed = load(path, overrides(job, ladders(job).own, case))
         found[case] = outcome.run(changed, Slab(MPI.COMM_SELF, *changed.grid.points), lambda: False)
     assert None not in found.values()
@@ -89,7 +89,7 @@ def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str
     own = ladders(job).own
 
     def errors(mesh: int, cells: float, integrator: str = integrator) -> tuple[float, float]:
-        case = Case(mesh, cells, integrator, own.tolerance, "double", "spectral")
+        case = Settings(mesh, cells, integrator, own.tolerance, "double", "spectral")
         found = outcome.run(load(path, overrides(job, own, case)), Slab(MPI.COMM_SELF, mesh, mesh), lambda: False)
         assert found is not None
         return found.mu_dyn - limit[0], found.area_corrected - limit[1]
@@ -111,7 +111,7 @@ def make(work: float, error: float) -> Outcome:
 def test_front_and_sentences() -> None:
     """The cheapest settings that are accurate enough, and no others."""
     results = [make(1.0, 0.1), make(2.0, 0.02), make(3.0, 0.04), make(4.0, 0.002)]
-    cases = {Case(2**k, 1.0, "exponential", 1e-4, "double", "spectral"): one for k, one in enumerate(results)}
+    cases = {Settings(2**k, 1.0, "exponential", 1e-4, "double", "spectral"): one for k, one in enumerate(results)}
     first, second, _, last = cases
     reference = {
         "mu_max": Limit(1.0, 1.0, 0.004),
@@ -135,13 +135,13 @@ def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
     path = tmp_path / "wave.yaml"
     path.write_text(WAVE.replace("[exponential, backward-euler]", "[exponential]"))
     refined = ladders(load(path))
-    same = dict.fromkeys(refined.cases(), make(1.0, 0.1))
+    same = dict.fromkeys(refined.combine(), make(1.0, 0.1))
     assert all("its error is not known" in str(one) for one in verdict.limits(refined, same))
     lines = verdict.sentences(same, verdict.references(refined, same), 1)
     assert all(line.endswith("(nothing is known of the error of the reference)") for line in lines)
     path.write_text(path.read_text().replace(", cells_per_step: 1}", "}").replace(", cells_per_step: [1, 0.5]", ""))
     refined = ladders(load(path))
-    found = {case: make(1.0, 1.0 / case.mesh**4) for case in refined.cases()}
+    found = {case: make(1.0, 1.0 / case.mesh**4) for case in refined.combine()}
     reference = verdict.references(refined, found)
     assert reference["mu_max"].uncertainty == 0.01 * reference["mu_max"].value
     assert verdict.sentences(found, reference, 1)[-1].endswith("(the reference itself is only known to 1 %)")
@@ -153,8 +153,8 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_path: Path) -> None:
-    """Stopped by the file `stop`, also a directory of that name, the same command goes on with what lacks, on another
-    number of ranks too; where that cannot be removed, a sentence says so."""
+    """Stopped by the file `stop` the same command goes on with what lacks, on another number of ranks too; where that
+    cannot be removed, a sentence says so."""
     job = tmp_path / "wave.yaml"
     job.write_text(WAVE.replace("[32, 64, 128]", "[32, 64]").replace(", backward-euler", ""))
     code, out, err = main("study", job, "--out", "whole")
@@ -166,10 +166,11 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_pat
     for name in ("convergence.png", "work_precision.png", "study.txt"):
         assert (tmp_path / "whole" / name).stat().st_size > 100
     stop = tmp_path / "out" / "stop"
-    (stop / "full").mkdir(parents=True)
+    stop.mkdir(parents=True)
     code, out, err = main("study", job)
-    assert (code, "stop, which cannot be removed: Directory not empty; remove it" in err) == (1, True), err
-    (stop / "full").rmdir()
+    assert (code, "stop, which cannot be removed: Is a directory; remove it" in err) == (1, True), err
+    stop.rmdir()
+    stop.touch()
     code, out, err = main("study", job)
     assert (code, "stopped after 0 of 4 cases" in out, stop.exists()) == (3, True, False), err
     kept = (tmp_path / "whole" / "study.csv").read_text().splitlines(keepends=True)

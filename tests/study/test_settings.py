@@ -8,7 +8,7 @@ import pytest
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
-from parcontact.study.cases import Case, Ladders, about_chosen_steps, ladders, overrides
+from parcontact.study.settings import Ladders, Settings, describe_chosen_steps, ladders, overrides
 
 TEXT = """
 grid: {points: [64, 32], size: [1.0e-3, 5.0e-4]}
@@ -40,7 +40,7 @@ def test_cases(path: Path) -> None:
         "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler], "
         "tolerance: [1e-3, 5e-3], precision: [mixed, double], kernel: [love]}",
     )
-    cases = found.cases()
+    cases = found.combine()
     assert len(cases) == len(set(cases)) == 3 * 2 * 2 + 2 * 1 + 3  # of the mesh alone, half a cell on 32 points is new
     assert {case.mesh for case in cases} == {32, 64, 128}
     alone = [case for case in cases if case.time_step == 2 / 128]
@@ -61,7 +61,7 @@ def test_cases(path: Path) -> None:
 def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, factor: float) -> None:
     """Twice as fine in time: each stage has twice the steps; growing ones are rounded up."""
     job, found = refined(path, "{mesh: [64, 128]}")
-    case = Case(mesh, cells, "backward-euler", 1e-3, "mixed", "love")
+    case = Settings(mesh, cells, "backward-euler", 1e-3, "mixed", "love")
     changed = load(path, overrides(job, found.own, case))
     assert changed.grid.points == (mesh, mesh // 2)
     assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 1e-3)
@@ -105,7 +105,7 @@ def test_mistakes(path: Path, study: str, sentence: str) -> None:
 def test_defaults_of_a_study(path: Path) -> None:
     """One ladder is enough; the rest is the job's own, with the cells per step of its first stage that has them."""
     _, found = refined(path, "{mesh: 32}")
-    assert found.cases() == [Case(32, 2.0, "exponential", 5e-3, "double", "spectral")]
+    assert found.combine() == [Settings(32, 2.0, "exponential", 5e-3, "double", "spectral")]
 
 
 def chosen(path: Path, study: str) -> tuple[Job, Ladders]:
@@ -119,21 +119,21 @@ def chosen(path: Path, study: str) -> tuple[Job, Ladders]:
 def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
     """Eight cells of sliding in 2, 4 and 8 steps; at rest steps are chosen, which is said."""
     job, found = chosen(path, "{cells_per_step: [4, 2, 1]}")
-    jobs = [load(path, overrides(job, found.own, case)) for case in found.cases()]
-    assert [case.steps for case in found.cases()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
+    jobs = [load(path, overrides(job, found.own, case)) for case in found.combine()]
+    assert [case.steps for case in found.combine()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
     assert [Timeline.of(one).spans[2].count for one in jobs] == [2, 4, 8]
     assert all(one.history[0].chooses for one in jobs)
-    (line,) = about_chosen_steps(job)
+    (line,) = describe_chosen_steps(job)
     assert line == "stage 1: time steps at rest are chosen in every case, they have no cells per step"
 
 
 def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
     """They say so, and on every mesh there is one case, not another with the time step of the finest mesh."""
     job, found = chosen(path, "{mesh: [32, 64], tolerance: [1e-3]}")
-    cases = found.cases()
+    cases = found.combine()
     assert [(case.mesh, case.steps) for case in cases] == [(32, "auto steps"), (64, "auto steps"), (64, "auto steps")]
     assert all(load(path, overrides(job, found.own, case)).history[2].chooses for case in cases)
-    assert "study.cells_per_step would show" in about_chosen_steps(job)[0]
+    assert "study.cells_per_step would show" in describe_chosen_steps(job)[0]
     assert found.shared == 0.01
 
 
@@ -141,7 +141,7 @@ def test_a_time_step_of_a_slide_is_told_in_cells(path: Path) -> None:
     """1e-6 s at 1 m/s over cells of 1e-3/64 m, and a ladder that refines it takes those cells."""
     path.write_text(TEXT.replace(", cells_per_step: 2", ", time_step: 1.0e-6"))
     _, found = refined(path, "{tolerance: [1e-3]}")
-    assert [case.steps for case in found.cases()] == ["0.064 cell per step"] * 2
+    assert [case.steps for case in found.combine()] == ["0.064 cell per step"] * 2
     job, found = refined(path, "{cells_per_step: [0.5, 0.25]}")
-    jobs = [load(path, overrides(job, found.own, case)) for case in found.cases()]
+    jobs = [load(path, overrides(job, found.own, case)) for case in found.combine()]
     assert [one.history[1].time_step for one in jobs] == pytest.approx([0.5e-3 / 64, 0.25e-3 / 64], rel=1e-12)

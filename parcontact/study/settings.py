@@ -1,4 +1,4 @@
-"""The cases of a study: which settings are combined, and what they change in the job.
+"""The settings of a study: which are combined, and what they change in the job.
 
 All meshes, cells per step and integrators are combined with each other. For each integrator the mesh is also refined
 alone, with the time steps of the finest mesh. Tolerance, precision and kernel are changed one at a time, on the mesh
@@ -8,8 +8,9 @@ Stages that choose their own steps do so in every case, unless there is a ladder
 place where the surface slides.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage, Study
@@ -17,7 +18,7 @@ from ..job.checks.limits import one_cell
 
 
 @dataclass(frozen=True)
-class Case:
+class Settings:
     """One combination: points along x, cells per step (of its own mesh; None if steps are chosen), and the numerics."""
 
     mesh: int
@@ -49,9 +50,6 @@ class Case:
         return f"{self.cells_per_step:.4g} cell{'s' if self.cells_per_step > 1.0 else ''} per step"
 
 
-NAMES = tuple(field.name for field in fields(Case))
-
-
 @dataclass(frozen=True)
 class Ladders:
     """What is refined, from the coarsest to the finest; one value where the job asks for none.
@@ -63,33 +61,24 @@ class Ladders:
     cells: tuple[float | None, ...]
     integrators: tuple[str, ...]
     study: Study
-    own: Case
+    own: Settings
     shared: float = 0.0
 
-    def cases(self) -> list[Case]:
-        """All of them, each once, the cheapest first."""
-        finest = self.meshes[-1]
-        found = dict.fromkeys(self._together())
-        for case in [case for case in found if case.mesh == finest and case.cells_per_step == self.cells[0]]:
-            found |= dict.fromkeys(at_time_step(case, mesh) for mesh in self.meshes)
-        found |= dict.fromkeys(self._one_at_a_time())
-        return sorted(found, key=lambda case: (case.effort, str(astuple(case))))
+    def combine(self) -> list[Settings]:
+        """All combinations, each once, the cheapest first."""
+        return sorted(set(self._combinations()), key=lambda case: (case.effort, str(astuple(case))))
 
-    def _together(self) -> Iterator[Case]:
+    def _combinations(self) -> Iterator[Settings]:
+        for integrator, mesh, cells in itertools.product(self.integrators, self.meshes, self.cells):
+            yield replace(self.own, mesh=mesh, cells_per_step=cells, integrator=integrator)
         for integrator in self.integrators:
-            for mesh in self.meshes:
-                for cells in self.cells:
-                    yield replace(self.own, mesh=mesh, cells_per_step=cells, integrator=integrator)
-
-    def _one_at_a_time(self) -> Iterator[Case]:
+            finest = replace(self.own, mesh=self.meshes[-1], cells_per_step=self.cells[0], integrator=integrator)
+            yield from (at_time_step(finest, mesh) for mesh in self.meshes)
         mesh = min(self.meshes, key=lambda points: abs(points - self.own.mesh))
         base = replace(self.own, mesh=mesh, cells_per_step=self.cells[0], integrator=self.integrators[0])
-        for tolerance in self.study.tolerance:
-            yield replace(base, tolerance=tolerance)
-        for precision in self.study.precision:
-            yield replace(base, precision=precision)
-        for kernel in self.study.kernel:
-            yield replace(base, kernel=kernel)
+        for name in ("tolerance", "precision", "kernel"):
+            for value in getattr(self.study, name):
+                yield replace(base, **{name: value})
 
 
 def _cells_of_time_steps(job: Job) -> float:
@@ -98,7 +87,7 @@ def _cells_of_time_steps(job: Job) -> float:
     return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
 
 
-def at_time_step(case: Case, mesh: int) -> Case:
+def at_time_step(case: Settings, mesh: int) -> Settings:
     """The same time step on another mesh; steps that are chosen are so there too."""
     if case.cells_per_step is None:
         return replace(case, mesh=mesh)
@@ -122,14 +111,14 @@ def ladders(job: Job) -> Ladders:
         own = _cells_of_time_steps(job)
     if own is None and study.cells_per_step:
         own = 1.0
-    case = Case(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
+    case = Settings(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
     cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
     shared = numerics.accuracy if _sliding(job) and not study.cells_per_step else 0.0
     return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case, shared)
 
 
-def overrides(job: Job, own: Case, case: Case) -> list[str]:
+def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     """What makes a case of the job, as for `--set`; time steps of all kinds change in the same proportion."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
@@ -157,11 +146,10 @@ def _sliding(job: Job) -> list[Stage]:
     return [stage for stage in job.history if stage.chooses and stage.speed]
 
 
-def about_chosen_steps(job: Job) -> list[str]:
+def describe_chosen_steps(job: Job) -> list[str]:
     """Sentences on the stages whose steps are chosen in every case, so that no ladder shows what they add."""
-    chosen = [stage for stage in job.history if stage.chooses]
     sliding = [] if job.study and job.study.cells_per_step else _sliding(job)
-    rest = [stage for stage in chosen if not stage.speed]
+    rest = [stage for stage in job.history if stage.chooses and not stage.speed]
     lines = []
     if sliding:
         lines.append(
