@@ -151,17 +151,17 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
 @ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
     from .. import job as jobs
-    from ..plotting import compounds
+    from ..plotting import compound as files
     from ..rubber import compound
     from ..rubber.shift import given
     from ..scene.measured_range import excited_band
 
     target = options.out or options.table.with_suffix(".yaml")
-    compounds.refuse_foreign(target)
+    files.refuse_foreign(target)
     band = excited_band(jobs.load(options.job)) if options.job else None
     law = given(options.shift, options.reference)
     made = compound.fitted(options.table, options.poisson, options.reference, law, options.error, options.weight)
-    for line in compounds.write(made, target, band):
+    for line in files.write(made, target, band):
         print(line)
     return DONE
 
@@ -185,7 +185,7 @@ def surface(options: argparse.Namespace) -> int:
     from .. import scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..plotting import surfaces
+    from ..report import road as drawing
     from ..scene import sanity
     from . import measured_maps
 
@@ -200,7 +200,7 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    print("\n".join(surfaces.describe(job, heights, base.preparation_notes, base.shortest, picture)))
+    print("\n".join(drawing.describe(job, heights, base.preparation_notes, base.shortest, picture)))
     for text in doubts:
         print(f"warning: {text}")
     for line in measured_maps.start(job, given, options.start) if alone else ():

@@ -1,6 +1,5 @@
 """Charts: what is drawn over something, as numbers, and how it is drawn. Runs and friction curves both give charts."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.textpath import TextPath
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ..parallel.slab import Array
 from . import style, units
@@ -18,13 +17,14 @@ SPIKE_SHARE = 0.02  # of the abscissa, at its beginning: what stands out there o
 SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
 AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
-FEW_NAMES = 2  # of lines, for which a key finds room among them
+MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
+LEVELS = 3  # of names above each other, before they are turned
+FEW_NAMES = 2  # of lines, for which a legend finds room among them
 HEADROOM = 1.08  # of a panel over its highest point
 FRACTION = "contact area /\nnominal area"
-MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
+FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are told
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white")]  # of words that lines may cross
-LEVELS = 3  # of names above each other, before they are turned
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class Axis:
 @dataclass(frozen=True)
 class Chart:
     """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
-    are names, starts and ends over `x`; `peak`: whether the highest point is told, and so stays in the picture;
-    `beside`: whether the key is beside the panel, which then needs the whole width."""
+    are names, starts and ends over `x`, `named` whether their names are shown; `peak`: whether the highest point is
+    named, and so stays in the picture."""
 
     key: str
     x: Axis
@@ -63,123 +63,109 @@ class Chart:
     named: bool = False
     legend_title: str = ""
     log_x: bool = False
-    beside: bool = False
-
-    def __call__(self, axes: Axes) -> None:
-        draw(self, axes)
-
-
-def with_key_beside(chart: Chart) -> Chart:
-    """A chart that stands alone: the key of many lines is beside them, where it hides none."""
-    return replace(chart, beside=sum(bool(one.name) for one in chart.series) > FEW_NAMES)
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a chart; `log` names the axes of logarithmic scale."""
+    """Draw a chart; `log` names the axes of logarithmic scale. The legend of many lines is beside a panel that has the
+    whole width."""
     log_x, log_y = "none" not in log and (chart.log_x or "x" in log), "y" in log
-    xs = [_shown(one.x, log_x) for one in chart.series]
-    there = [np.where(np.isfinite(x), one.y, np.nan) for x, one in zip(xs, chart.series, strict=True)]
-    ys = [_shown(y, log_y) for y in there]
-    highest = max(map(_highest, ys))
-    top = _below_spike(xs, ys) if chart.spikes and not (chart.peak or log_x or log_y) else math.inf
-    x_unit, xs = (chart.x.unit, xs) if log_x else units.scaled(chart.x.unit, *xs)  # powers of ten need no prefix
-    y_unit = chart.y.unit if log_y else units.scaled(chart.y.unit, *(y[y <= top] for y in ys))[0]
-    size = units.size_of(y_unit, chart.y.unit) if y_unit else 1.0
-    ys, highest, top = [y / size for y in ys], highest / size, top / size
-    lonely = all(np.isfinite(x * y).sum() < 2 for x, y in zip(xs, ys, strict=True))
-    for one, x, y in zip(chart.series, xs, ys, strict=True):
-        axes.plot(x, y, label=one.name or None, **{**one.look, **({"marker": "o"} if lonely else {})})
+    series = [_on_axes(one, log_x, log_y) for one in chart.series]
+    lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
+    for one in series:
+        axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
         if one.error is not None:
-            _draw_errors(axes, x, y, one.error, one.look["color"])
-    axes.set(xlabel=units.labelled(chart.x.name, x_unit), ylabel=units.labelled(chart.y.name, y_unit))
-    _scale(axes, "x", xs, log_x)
-    _scale(axes, "y", ys, log_y)
-    if chart.bottom and not log_y and not any((y < 0.0).any() for y in ys):
-        roofs = [_highest(_with_bar(y, one.error)) for y, one in zip(ys, chart.series, strict=True)]
-        axes.set_ylim(0.0, HEADROOM * max(highest, *roofs) or 1.0)
-        if not highest:
-            axes.set_yticks([0.0])  # a scale would be made up
-    if top < math.inf:
-        axes.set_ylim(top=top)
-        told = f"↑ {highest:.3g} {y_unit}".rstrip()
-        axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
-    if chart.peak and not log_y:
-        _tell_peak(axes, xs[0], ys[0], x_unit)
-    width = units.size_of(x_unit, chart.x.unit) if x_unit else 1.0
-    _mark(axes, [(name, a / width, b / width) for name, a, b in chart.stages], chart.named)
-    if any(one.name for one in chart.series):
-        place: dict[str, Any] = {"ncols": 1 + (len(chart.series) > 4)}
-        legend = axes.legend(
-            title=chart.legend_title or None, title_fontsize=9, **(style.BESIDE if chart.beside else place)
-        )
-        for text in legend.get_texts():
+            _draw_errors(axes, one, one.error)
+    set_scale(axes, "x", chart.x.name, chart.x.unit, log_x)
+    set_scale(axes, "y", chart.y.name, chart.y.unit, log_y)
+    if not log_y:
+        _limit(axes, chart, series, log_x)
+        if chart.peak:
+            _name_peak(axes, series[0], chart.x.unit)
+        units.label(axes.yaxis, chart.y.name, chart.y.unit)
+    _mark(axes, chart.stages, chart.named)
+    if names := sum(bool(one.name) for one in series):
+        place = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {"ncols": 1 + (len(series) > 4)}
+        for text in axes.legend(title=chart.legend_title or None, **place).get_texts():
             text.set_path_effects(HALO)
 
 
-def _draw_errors(axes: Axes, x: Array, y: Array, share: Array, color: str) -> None:
-    """Bars of the errors that are known; of more than all of a value down to next to nothing, on any axis."""
-    size = np.where(np.isfinite(share), np.abs(share * y), 0.0)
-    below = np.minimum(size, LEAST * np.abs(y))
-    axes.errorbar(x, y, yerr=[below, size], fmt="none", ecolor=color, elinewidth=1.0, capsize=2.5, alpha=0.7)
+def _on_axes(one: Series, log_x: bool, log_y: bool) -> Series:
+    """Return a line without the points that logarithmic axes cannot show."""
+    x, y = np.asarray(one.x, dtype=float), np.asarray(one.y, dtype=float)
+    there = np.isfinite(x) & ((x > 0.0) | (not log_x)) & ((y > 0.0) | (not log_y))
+    return replace(one, x=np.where(there, x, np.nan), y=np.where(there, y, np.nan))
 
 
-def _with_bar(y: Array, share: Array | None) -> Array:
-    """The upper ends of bars of errors; those of more than all of a value may leave the picture."""
-    return y if share is None else y * (1.0 + np.where(np.isfinite(share), np.minimum(share, 1.0), 0.0))
+def _draw_errors(axes: Axes, one: Series, share: Array) -> None:
+    """Draw bars of the errors that are known; one of more than all of a value goes down to next to nothing."""
+    size = np.where(np.isfinite(share), np.abs(share * one.y), 0.0)
+    look: dict[str, Any] = {"ecolor": one.look["color"], "elinewidth": 1.0, "capsize": 2.5, "alpha": 0.7}
+    axes.errorbar(one.x, one.y, yerr=[np.minimum(size, LEAST * np.abs(one.y)), size], fmt="none", **look)
 
 
-def _shown(values: Array, log: bool) -> Array:
-    """Without what a logarithmic axis cannot show."""
-    return np.where(values > 0.0, values, np.nan) if log else np.asarray(values, dtype=float)
-
-
-def _scale(axes: Axes, which: str, series: Sequence[Array], log: bool) -> None:
-    """Few ticks, so that their labels do not touch; room around a single value."""
-    values = np.concatenate([one[np.isfinite(one)] for one in series])
-    axis, limit = (axes.xaxis, axes.set_xlim) if which == "x" else (axes.yaxis, axes.set_ylim)
-    if log and values.size and values.min() == values.max():
-        limit(0.5 * values[0], 1.5 * values[0])
-        axis.set_ticks([values[0]], [f"{values[0]:.{units.DIGITS}g}"])
-    elif log and values.size:
-        (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-        axis.set_major_locator(LogLocator(numticks=5))
+def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
+    """Give an axis its name, unit and scale, with few ticks, so that their labels do not touch."""
+    axis, few = axes.xaxis if which == "x" else axes.yaxis, True
+    if log:
+        axes.set(**{f"{which}scale": "log"})
+        low, high = axis.get_view_interval()
+        few = high < 10.0**FEW_DECADES * low
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
         axis.set_minor_formatter(NullFormatter())
-        if values.max() < 30.0 * values.min():  # hardly a decade
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     else:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+    if few:
+        units.label(axis, name, unit)
+    else:  # powers of ten need no prefix
+        axis.set_label_text(f"{name} [{unit}]" if unit else name)
 
 
-def _below_spike(xs: Sequence[Array], ys: Sequence[Array]) -> float:
-    """Where a picture ends that leaves out what stands out in the first moments only; inf where nothing does."""
-    start, end = min(np.nanmin(x) for x in xs), max(np.nanmax(x) for x in xs)
-    early = [x <= start + SPIKE_SHARE * (end - start) for x in xs]
-    rest = max(_highest(y[~first]) for y, first in zip(ys, early, strict=True))
-    return 1.25 * rest if end > start and rest > 0.0 and max(map(_highest, ys)) > SPIKE_HEIGHT * rest else math.inf
+def _limit(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> None:
+    """Show zero, and room above bars of errors up to the whole of a value; leave out a spike, whose height is told."""
+    ys = np.concatenate([one.y for one in series])
+    highest = _highest(ys)
+    if chart.bottom and not (ys < 0.0).any():
+        bars = [one.y * (1.0 + np.nan_to_num(np.minimum(one.error, 1.0))) for one in series if one.error is not None]
+        axes.set_ylim(0.0, HEADROOM * max(highest, *map(_highest, bars), 0.0) or 1.0)
+        if not highest:
+            axes.set_yticks([0.0])  # a scale would be made up
+    if chart.spikes and not chart.peak and not log_x:
+        xs = np.concatenate([one.x for one in series])
+        late = xs > np.nanmin(xs) + SPIKE_SHARE * (np.nanmax(xs) - np.nanmin(xs))
+        rest = _highest(ys[late])
+        if 0.0 < SPIKE_HEIGHT * rest < highest:
+            axes.set_ylim(top=1.25 * rest)
+            told = f"↑ {units.text(highest, chart.y.unit)}"
+            axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
 
 
 def _highest(values: Array) -> float:
-    """The highest of what is positive and known."""
+    """Return the highest of what is positive and known."""
     return float(values[np.isfinite(values)].max(initial=0.0))
 
 
-def _tell_peak(axes: Axes, x: Array, y: Array, unit: str) -> None:
-    """The highest point of a line, if it is inside and the line has come down from it."""
-    size = np.where(np.isfinite(x * y), np.abs(y), 0.0)
-    peak = int(np.argmax(size))
-    if 0 < peak < size.size - 1 and size[peak] > 1.02 * size[-1]:
-        axes.plot(x[peak], y[peak], "o", color=style.RED)
-        share = (x[peak] - np.nanmin(x)) / (float(np.ptp(x[np.isfinite(x)])) or 1.0)
-        side = "left" if share < 0.4 else "center" if share < 0.6 else "right"
-        below, aside = y[peak] < 0.0, {"left": 6, "center": 0, "right": -6}[side]
-        told = f"{y[peak]:.3g} at {x[peak]:.3g} {unit}".rstrip()
-        look: dict[str, Any] = {"ha": side, "va": "top" if below else "bottom", "color": style.RED, "fontsize": 9}
-        look["path_effects"] = HALO
-        axes.annotate(told, (x[peak], y[peak]), (aside, -5 if below else 5), textcoords="offset points", **look)
-        low, high = axes.get_ylim()
-        room = 0.15 * (high - low)
-        axes.set_ylim(low - room * below, high + room * (not below))
+def _name_peak(axes: Axes, one: Series, unit: str) -> None:
+    """Name the highest point of a line, if it is inside and the line has come down from it."""
+    height = np.nan_to_num(np.abs(one.y))
+    at = int(np.argmax(height))
+    if not (0 < at < height.size - 1 and height[at] > 1.02 * height[-1]):
+        return
+    x, y, below = one.x[at], one.y[at], one.y[at] < 0.0
+    axes.plot(x, y, "o", color=style.RED, scalex=False, scaley=False)
+    shown, size = units.prefixed(unit, axes.get_xlim()[1])
+    share = _share(axes, x)
+    side, aside = ("left", 6) if share < 0.4 else ("center", 0) if share < 0.6 else ("right", -6)
+    look: dict[str, Any] = {"ha": side, "va": "top" if below else "bottom", "color": style.RED, "fontsize": 9}
+    look |= {"xytext": (aside, -5 if below else 5), "textcoords": "offset points", "path_effects": HALO}
+    axes.annotate(f"{y:.3g} at {x / size:.3g} {shown}".rstrip(), (x, y), **look)
+    low, high = axes.get_ylim()
+    room = 0.15 * (high - low)
+    axes.set_ylim(low - room * below, high + room * (not below))
+
+
+def _share(axes: Axes, x: float) -> float:
+    """Return where a number is on the x axis, from 0 at the left to 1 at the right."""
+    return float((axes.transScale + axes.transLimits).transform((x, 1.0))[0])
 
 
 def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -> None:
@@ -188,60 +174,34 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
         axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
     if not named or len(stages) < 2:
         return
-    width = _panel_width(axes) * AXES_SHARE
-    middles = [width * share for share in _shares(axes, stages)]
-    levels = _levels([(x, _width(name)) for (name, *_), x in zip(stages, middles, strict=True)])
+    width = AXES_SHARE * 72.0 * axes.figure.bbox.width / axes.figure.dpi / _panels_beside(axes)
+    ends = np.clip([[_share(axes, start), _share(axes, end)] for _, start, end in stages], 0.0, 1.0)
+    names = [style.plain(name, MAX_NAME) for name, _, _ in stages]
+    middles = width * ends.mean(axis=1)
+    levels = _levels(middles, [TextPath((0, 0), name, size=NAMES).get_extents().width + NAMES / 2 for name in names])
     turned = max(levels) >= LEVELS
-    if turned:
-        names = sorted(sorted(range(len(stages)), key=lambda k: stages[k][1] - stages[k][2])[: int(width / LINE)])
-        stages, levels = [stages[k] for k in names], [0] * len(names)
-        middles = _spread([middles[k] for k in names], width)
+    if turned:  # those of the longest stages, as near to them as they may be without touching
+        longest = np.sort(np.argsort(ends[:, 0] - ends[:, 1], kind="stable")[: int(width / LINE)])
+        names, offsets = [names[k] for k in longest], LINE * np.arange(longest.size)
+        middles = np.maximum.accumulate(middles[longest] - offsets) + offsets
+        middles, levels = np.minimum(middles, width - offsets[::-1]), [0] * len(names)
     look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": style.GREY, "fontsize": NAMES}
-    for (name, *_), x, level in zip(stages, middles, levels, strict=True):
-        place: dict[str, Any] = {
-            "xycoords": "axes fraction",
-            "textcoords": "offset points",
-            "rotation": 90 if turned else 0,
-        }
-        axes.annotate(style.plain(name, MAX_NAME), (x / width, 1.0), (0, 2 + LINE * level), **place, **look)
+    look |= {"xycoords": "axes fraction", "textcoords": "offset points", "rotation": 90 if turned else 0}
+    for name, x, level in zip(names, middles, levels, strict=True):
+        axes.annotate(name, (x / width, 1.0), (0, 2 + LINE * level), **look)
 
 
-def _panel_width(axes: Axes) -> float:
-    """Of the panel of axes, with what is beside them [points]."""
+def _panels_beside(axes: Axes) -> int:
+    """Return the number of panels in the row of one."""
     place = axes.get_subplotspec()
-    return 72.0 * axes.figure.bbox.width / axes.figure.dpi / (place.get_gridspec().ncols if place else 1)
+    return place.get_gridspec().ncols if place else 1
 
 
-def _width(name: str) -> float:
-    """Of the name of a stage, with a blank [points]."""
-    return float(TextPath((0, 0), style.plain(name, MAX_NAME), size=NAMES).get_extents().width) + NAMES / 2
-
-
-def _shares(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> list[float]:
-    """Where the middles of stages are, from 0 at the left to 1 at the right."""
-    log = axes.get_xscale() == "log"
-    low, high = axes.get_xlim()
-    edges = np.clip([stage[1:] for stage in stages], low, high)
-    if log:
-        edges, low, high = np.log10(edges), float(np.log10(low)), float(np.log10(high))
-    return [float(share) for share in (edges.mean(axis=1) - low) / (high - low)]
-
-
-def _spread(middles: Sequence[float], width: float) -> list[float]:
-    """Places of turned names: as near to their stages as they may be without touching."""
-    places = list(middles)
-    for k in range(1, len(places)):
-        places[k] = max(places[k], places[k - 1] + LINE)
-    for k in reversed(range(len(places))):
-        places[k] = min(places[k], width - LINE * (len(places) - 1 - k))
-    return places
-
-
-def _levels(texts: Sequence[tuple[float, float]]) -> list[int]:
-    """The lowest levels on which texts of given middles and widths, in order, do not touch."""
+def _levels(middles: Array, widths: Sequence[float]) -> list[int]:
+    """Return the lowest levels on which texts of given middles and widths, in order, do not touch."""
     ends: list[float] = []
     levels = []
-    for middle, width in texts:
+    for middle, width in zip(middles, widths, strict=True):
         level = next((k for k, end in enumerate(ends) if end <= middle - width / 2), len(ends))
         ends[level : level + 1] = [middle + width / 2]
         levels.append(level)
@@ -249,7 +209,7 @@ def _levels(texts: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
-    """Charts of several runs: the same measures in one, the lines of each run in its colour, named after it."""
+    """Return charts of several runs: the same measures in one, the lines of each run in its colour, named after it."""
     found: dict[tuple[str, Axis, Axis], Chart] = {}
     for number, (name, charts) in enumerate(runs):
         for chart in charts:
@@ -257,7 +217,11 @@ def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
                 replace(
                     one,
                     name=", ".join(filter(None, (style.plain(name), one.name))),
-                    look={**one.look, **_look(number, k)},
+                    look={
+                        **one.look,
+                        "color": style.line(number)["color"],
+                        "linestyle": style.line(number + k)["linestyle"],
+                    },
                 )
                 for k, one in enumerate(chart.series)
             ]
@@ -266,7 +230,3 @@ def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
             spikes, log_x = known.spikes and chart.spikes, known.log_x and chart.log_x
             found[key] = replace(known, series=(*known.series, *lines), spikes=spikes, log_x=log_x)
     return list(found.values())
-
-
-def _look(run: int, part: int) -> dict[str, Any]:
-    return {"color": style.COLORS[run % len(style.COLORS)], "linestyle": style.DASHES[(run + part) % len(style.DASHES)]}

@@ -1,106 +1,99 @@
 """Pressures on a line: along a narrow map, or through the axis of a sphere or cylinder."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 
-from ..job import Cylinder, Elastic, Job, Sphere
+from ..job import Cylinder, Elastic, Sphere
 from ..parallel.slab import Array
 from ..theory import hertz
 from . import style, units
-from .run import Fields, Panel, Run
+from .run import Fields, Run
 
 INSTANTS = 5  # at most so many lines in one panel
+RANGE = 1.3  # that is shown over that of the contact
+
+Curve = tuple[str, Array, Array]  # its name, and pressures [Pa] on a line [m]
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Pressures [Pa] on a line [m] at an instant."""
-
-    name: str
-    along: Array
-    pressure: Array
+def panels(run: Run, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
+    """Yield the panel of a narrow map, or of the only shape of a surface if that is round."""
+    shape = run.job.surface[0]
+    if narrow:
+        yield _strip(run, fields)
+    elif len(run.job.surface) == 1 and isinstance(shape, Sphere | Cylinder):
+        yield _profile(run, fields, shape)
 
 
 def _chosen(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], str]:
-    """Some of the saved instants, evenly, and what tells them apart; and the load of all if it is one, for a title."""
+    """Return some saved instants, evenly, and what tells them apart; and the load of all if it is one, for a title."""
     indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
-    steps = [int(fields.steps[index]) for index in indices]
-    loads = {run.pressed(step) for step in steps}
+    instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
+    loads = {run.pressed(step) for _, step, _ in instants}
     if run.lasts and len(loads) == 1:
-        return [(index, units.text(float(fields.times[index]), "s")) for index in indices], f", {loads.pop()}"
-    return [(k, run.instant(step, float(fields.times[k]))) for k, step in zip(indices, steps, strict=True)], ""
+        return [(index, units.text(time, "s")) for index, _, time in instants], f", {loads.pop()}"
+    return [(index, run.instant(step, time)) for index, step, time in instants], ""
 
 
-def _draw_curves(axes: Axes, curves: Sequence[Curve]) -> tuple[float, float]:
-    """Draw pressures on lines; returns the units of length [m] and pressure [Pa]."""
-    length, distances = units.scaled("m", *(curve.along for curve in curves))
-    unit, pressures = units.scaled("Pa", *(curve.pressure for curve in curves))
-    for number, (curve, x, p) in enumerate(zip(curves, distances, pressures, strict=True)):
-        shade = 0.85 * number / (len(curves) - 1) if len(curves) > 1 else 0.45
-        axes.plot(x, p, color=colormaps[style.SEQUENCE](shade), label=curve.name)
-    axes.set(xlabel=f"[{length}]", ylabel=f"pressure [{unit}]")
+def _draw(
+    axes: Axes, curves: Sequence[Curve], along: str, title: str, theory: Sequence[Curve] = (), reach: float = 0.0
+) -> None:
+    """Draw pressures on lines up to `reach` on both sides, if it is given, beside theory."""
+    shades = np.linspace(0.0, 0.85, len(curves)) if len(curves) > 1 else [0.45]
+    for (name, x, pressure), shade in zip(curves, shades, strict=True):
+        axes.plot(x, pressure, color=colormaps[style.SEQUENCE](shade), label=name)
+    for (name, x, pressure), dashes in zip(theory, ("--", ":"), strict=False):
+        axes.plot(x, pressure, "k" + dashes, lw=1.0, label=name)
+    if reach:
+        axes.set_xlim(-reach, reach)
+    axes.set_ylim(bottom=0.0)
+    axes.set_title(title)
     axes.locator_params(nbins=5)
-    return units.size_of(length, "m"), units.size_of(unit, "Pa")
+    units.label(axes.xaxis, along, "m")
+    units.label(axes.yaxis, "pressure", "Pa")
+    axes.legend(**style.BESIDE)
 
 
-def strips(run: Run, fields: Fields) -> Panel:
-    """Pressures along the long side of a narrow map."""
+def _strip(run: Run, fields: Fields) -> style.Panel:
+    """Return a panel of pressures along the long side of a narrow map."""
     lies = fields.x.size > fields.y.size
     chosen, load = _chosen(run, fields)
-    curves = []
-    for index, name in chosen:
-        field = fields.file["pressure"][index]
-        curves.append(Curve(name, fields.x if lies else fields.y, field[0] if lies else field[:, 0]))
-
-    def draw(axes: Axes) -> None:
-        _draw_curves(axes, curves)
-        axes.set_xlabel(("x " if lies else "y ") + axes.get_xlabel())
-        some = "some of the " if len(curves) < len(fields.shown) else "the "
-        axes.set_title(f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads")
-        axes.legend(**style.BESIDE)
-
-    return draw
+    maps = [(name, fields.file["pressure"][index]) for index, name in chosen]
+    curves = [(name, fields.x, field[0]) if lies else (name, fields.y, field[:, 0]) for name, field in maps]
+    some = "some of the " if len(curves) < len(fields.shown) else "the "
+    title = f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads"
+    return partial(_draw, curves=curves, along="x" if lies else "y", title=title)
 
 
-def profiles(run: Run, fields: Fields, shape: Sphere | Cylinder) -> Panel:
-    """Pressures along a line through the axis, seen from the axis, beside Hertz's under the last load."""
+def _profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
+    """Return a panel of pressures on a line through the axis, seen from it, beside Hertz's under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
     chosen, load = _chosen(run, fields)
-    curves = []
+    curves: list[Curve] = []
     for index, name in chosen:
         moved = run.moved(int(fields.steps[index]))
         x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
         line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
-        curves.append(Curve(name, y if across else x, line))
+        curves.append((name, y if across else x, line))
     force = float(field.mean() * run.area)
-    reach = 1.3 * max(float(np.abs(curve.along[curve.pressure > 0.0]).max(initial=0.0)) for curve in curves)
-
-    def draw(axes: Axes) -> None:
-        length, unit = _draw_curves(axes, curves)
-        if isinstance(shape, Sphere) and force > 0.0:
-            r = np.linspace(-reach, reach, 401)
-            for name, modulus, dashes in _moduli(run.job):
-                pressure = hertz.pressure(np.abs(r), force, shape.radius, modulus, run.job.material.poisson)
-                axes.plot(r / length, pressure / unit, "k" + dashes, lw=1.0, label=name)
-        axes.set_xlabel(f"{'y' if across else 'x'} from the axis {axes.get_xlabel()}")
-        axes.set_title(f"pressure on a line through the axis{load}")
-        if reach > 0.0:
-            axes.set_xlim(-reach / length, reach / length)
-        axes.set_ylim(bottom=0.0)
-        axes.legend(**style.BESIDE)
-
-    return draw
+    reach = RANGE * max(float(np.abs(along[pressure > 0.0]).max(initial=0.0)) for _, along, pressure in curves)
+    theory: list[Curve] = []
+    if isinstance(shape, Sphere) and force > 0.0:
+        r, poisson = np.linspace(-reach, reach, 401), run.job.material.poisson
+        for name, modulus in _moduli(run):
+            theory.append((name, r, hertz.pressure(np.abs(r), force, shape.radius, modulus, poisson)))
+    along, title = f"{'y' if across else 'x'} from the axis", f"pressure on a line through the axis{load}"
+    return partial(_draw, curves=curves, along=along, title=title, theory=theory, reach=reach)
 
 
-def _moduli(job: Job) -> list[tuple[str, float, str]]:
-    """Of the elastic bodies to compare with, and how they are drawn."""
-    material = job.material
+def _moduli(run: Run) -> list[tuple[str, float]]:
+    """Return the shear moduli [Pa] of the elastic bodies to compare with."""
+    material = run.job.material
     if isinstance(material, Elastic):
-        return [("Hertz", material.shear_modulus, "--")]
-    ends = [("Hertz, G(0)", material.instant_modulus, "--"), ("Hertz, G(∞)", material.long_modulus, ":")]
+        return [("Hertz", material.shear_modulus)]
+    ends = ("Hertz, G(0)", material.instant_modulus), ("Hertz, G(∞)", material.long_modulus)
     return [end for end in ends if end[1] > 0.0]

@@ -1,20 +1,23 @@
-"""Maps of the last saved instant."""
+"""Maps of saved instants: panels of one, and frames of all for films and reports."""
 
-from collections.abc import Iterator
+import io
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from PIL import Image
 
 from ..errors import InputError
-from ..job import Cylinder, Sphere
 from ..parallel.slab import Array
-from . import lines, units
-from .run import Fields, Panel, Run
+from . import lines, style, units
+from .run import Fields, Run
+
+Window = tuple[slice, slice]
 
 
 class Look(NamedTuple):
@@ -28,51 +31,61 @@ class Look(NamedTuple):
 
 LOOKS = {
     "pressure": Look("Pa", "inferno"),
-    "gap": Look("m", "Blues_r", "k", "contact black"),
+    "gap": Look("m", "Blues_r", "k", " (contact black)"),
     "displacement": Look("m", "viridis"),
-    "height": Look("m", "cividis", note="up is into the body"),
+    "height": Look("m", "cividis", note=" (up is into the body)"),
 }
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
+BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
 
-def maps(run: Run, at: str = "") -> list[Panel]:
-    """Panels of the last saved instant, or of the one that is asked for; none if nothing was saved. Raises InputError
-    where nothing is saved at the instant that is asked for."""
+def maps(run: Run, at: str = "") -> list[style.Panel]:
+    """Return panels of the last saved instant, or of the one that is asked for; none if nothing was saved.
+
+    Raises InputError where nothing is saved at the instant that is asked for.
+    """
     try:
         with h5py.File(run.directory / "fields.h5", "r", locking=False) as file:
             return list(_panels(run, Fields(file, at)))
     except (OSError, KeyError):
         if at:
-            raise InputError(
-                f"--at {at}: {run.directory} holds no maps; output: {{fields: [...]}} saves them"
-            ) from None
+            told = f"--at {at}: {run.directory} holds no maps; output: {{fields: [...]}} saves them"
+            raise InputError(told) from None
         return []
 
 
-def _panels(run: Run, fields: Fields) -> Iterator[Panel]:
-    names = ("pressure", "gap", "displacement", "height")
-    pressure, gap, displacement, height = (fields.last(name) for name in names)
-    if not fields.saved:
+def _panels(run: Run, fields: Fields) -> Iterator[style.Panel]:
+    found = {name: fields.last(name) for name in LOOKS}
+    pressure = found["pressure"]
+    if pressure is not None:
+        yield from lines.panels(run, fields, min(fields.x.size, fields.y.size) <= STRIP)
+    if not fields.saved or min(fields.x.size, fields.y.size) <= STRIP:
         return
-    if min(fields.x.size, fields.y.size) <= STRIP:
-        if pressure is not None:
-            yield lines.strips(run, fields)
-        return
-    rounds = [shape for shape in run.job.surface if isinstance(shape, Sphere | Cylinder)]
-    if pressure is not None and len(run.job.surface) == 1 and rounds:
-        yield lines.profiles(run, fields, rounds[0])
+    if found["gap"] is not None:
+        del found["displacement"]  # one of both says enough
     last = fields.shown[-1]
     instant = run.instant(int(fields.steps[last]), float(fields.times[last]))
-    window = _window(pressure)
-    beside = displacement if gap is None else None  # one of both says enough
-    found = {"pressure": pressure, "gap": gap, "displacement": beside, "height": height}
     for name, values in found.items():
         if values is not None:
-            yield _map(fields, shown(name, values, pressure), name, instant, window)
+            yield _panel(fields, name, shown(name, values, pressure), instant, _window(pressure))
+
+
+def _panel(fields: Fields, name: str, values: Array, instant: str, window: Window) -> style.Panel:
+    rows, columns = window
+    part = values[window]
+    limits = colour_range(part)
+
+    def draw(axes: Axes) -> None:
+        beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
+        show = _draw_map(axes, name, (fields.x[columns], fields.y[rows]), limits, extend=beyond, shrink=0.9)
+        show(part)
+        axes.set_title(f"{name}{LOOKS[name].note}\n{instant}")
+
+    return draw
 
 
 def shown(name: str, values: Array, pressure: Array | None) -> Array:
-    """A map as it is drawn: pressures where there are any, gaps where there is no contact, none of them negative."""
+    """Return a map as it is drawn: pressures where there are any, gaps, none negative, where there is no contact."""
     if name == "pressure":
         return np.where(values > 0.0, values, np.nan)
     if name == "gap":
@@ -81,80 +94,89 @@ def shown(name: str, values: Array, pressure: Array | None) -> Array:
     return values
 
 
-def _window(pressure: Array | None) -> tuple[slice, slice]:
-    """The rows and columns around a contact that fills only a part of the box; else all of them."""
-    window = (slice(None), slice(None))
+def _window(pressure: Array | None) -> Window:
+    """Return the rows and columns around a contact that fills only a part of the box; else all of them."""
+    whole = slice(None), slice(None)
     if pressure is None or not (pressure > 0.0).any():
-        return window
+        return whole
     cut = []
     for axis in (1, 0):
         touched = np.flatnonzero((pressure > 0.0).any(axis=axis))
         margin = (touched[-1] - touched[0]) // 2 + 3
         cut.append(slice(max(touched[0] - margin, 0), touched[-1] + margin + 1))
-    whole = pressure[cut[0], cut[1]].size > 0.5 * pressure.size
-    return window if whole else (cut[0], cut[1])
-
-
-def _map(
-    fields: Fields,
-    values: Array,
-    name: str,
-    instant: str,
-    window: tuple[slice, slice],
-) -> Panel:
-    x, y, look = fields.x, fields.y, LOOKS[name]
-    label, (scaled,) = units.scaled(look.unit, values)
-    title = name + (f" ({look.note})" if look.note else "") + f"\n{instant}"
-    length, (right, top) = units.scaled("m", edges(x), edges(y))
-
-    def draw(axes: Axes) -> None:
-        axes.set_facecolor(look.blank)
-        axes.grid(False)
-        part = scaled[window]
-        columns, lines = slice(window[1].start, _edge(window[1])), slice(window[0].start, _edge(window[0]))
-        limits = colour_range(part)
-        cells = right[columns], top[lines], part
-        mesh = axes.pcolormesh(*cells, cmap=look.colors, norm=norm(limits), rasterized=True)
-        axes.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=title, aspect="equal")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
-        beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
-        add_colorbar(axes, mesh, f"{name} [{label}]", limits, extend=beyond, shrink=0.9)
-
-    return draw
-
-
-def edges(points: Array) -> Array:
-    """Of cells that begin at points of equal spacing."""
-    return np.append(points, 2 * points[-1] - points[-2])
-
-
-def _edge(part: slice) -> int | None:
-    return None if part.stop is None else part.stop + 1
+    return whole if pressure[cut[0], cut[1]].size > 0.5 * pressure.size else (cut[0], cut[1])
 
 
 def colour_range(values: Array) -> tuple[float, float]:
-    """Of the colours: from 0 if nothing is negative; a few very high points do not darken all others.
+    """Return the range of the colours: from 0 if nothing is negative; few very high points do not darken all others.
 
     Where no point has a value the range is empty, from inf to -inf.
     """
     finite = values[np.isfinite(values)]
     if not finite.size:
         return np.inf, -np.inf
-    most, highest = float(np.percentile(finite, 99.5)), float(finite.max())
-    return min(float(finite.min()), 0.0), highest if highest < 1.4 * most else most
+    most, highest = float(np.percentile(finite, BRIGHTEST)), float(finite.max())
+    return min(float(finite.min()), 0.0), highest if highest < OUTLIER * most else most
 
 
-def norm(limits: tuple[float, float]) -> Normalize:
-    """The colours of a range, which may be one number or empty."""
-    low, high = limits
-    return Normalize(low, high) if high > low else Normalize(high, high + 1.0) if high == low else Normalize(0.0, 1.0)
-
-
-def add_colorbar(axes: Axes, mesh: QuadMesh, label: str, limits: tuple[float, float], **look: Any) -> None:
-    """What colours mean: of one number that alone, of none nothing, for a scale would be made up."""
-    low, high = limits
+def _draw_map(
+    axes: Axes, name: str, points: tuple[Array, Array], limits: tuple[float, float], **bar: Any
+) -> Callable[[Array], None]:
+    """Draw an empty map in colours; returns what fills it. Colours of one number have one tick, of none no scale."""
+    look, (low, high) = LOOKS[name], limits
+    width = 1.0 if high < low else (high - low or abs(high) or 1.0)
+    norm = Normalize(low, low + width) if low <= high else Normalize(0.0, width)
+    x, y = (np.append(along, 2 * along[-1] - along[-2]) for along in points)
+    axes.set_facecolor(look.blank)
+    axes.grid(False)
+    empty = np.full((y.size - 1, x.size - 1), np.nan)
+    mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=norm, rasterized=True)
+    axes.set_aspect("equal")
+    for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+        units.label(axis, along, "m")
     if low <= high:
-        bar = axes.figure.colorbar(mesh, ax=axes, label=label, **look)
-        if low == high:
-            bar.set_ticks([low])
+        scale = axes.figure.colorbar(mesh, ax=axes, ticks=[low] if low == high else None, **bar).ax.yaxis
+        units.label(scale, name, look.unit)
+    return mesh.set_array
+
+
+def _draw_line(
+    axes: Axes, name: str, points: tuple[Array, Array], limits: tuple[float, float]
+) -> Callable[[Array], None]:
+    """Draw an empty map that is so narrow that it is a line; returns what fills it."""
+    lies = points[0].size > points[1].size
+    along, (low, high) = points[0] if lies else points[1], limits
+    (line,) = axes.plot(along, np.zeros_like(along), color=style.BLUE)
+    if high > low:
+        axes.set_ylim(low, low + 1.05 * (high - low))
+    else:  # a scale would be made up
+        axes.set_yticks([low if high == low else 0.0])
+    units.label(axes.xaxis, "x" if lies else "y", "m")
+    units.label(axes.yaxis, name, LOOKS[name].unit)
+    return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
+
+
+def frames(
+    file: h5py.File, name: str, labels: Mapping[int, str], size: tuple[float, float] = (4.5, 4.0), dpi: int = 110
+) -> Iterator[Image.Image]:
+    """Draw a map of shape (instant, y, x) in a file at each index that has a label, with one range of colours."""
+
+    def read(index: int) -> Array:
+        pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
+        return shown(name, file[name][index], pressure)
+
+    ranges = [colour_range(read(index)) for index in labels]
+    limits = min(low for low, _ in ranges), max(high for _, high in ranges)
+    figure, x, y = Figure(figsize=size, layout="constrained"), file["x"][...], file["y"][...]
+    axes = figure.subplots()
+    fill = (_draw_line if min(x.size, y.size) <= STRIP else _draw_map)(axes, name, (x, y), limits)
+    for index, label in labels.items():
+        fill(read(index))
+        axes.set_title(f"{name}, {label}")
+        if figure.get_layout_engine() is not None:  # once: the first frame has the place of all others
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")
+        png = io.BytesIO()
+        figure.savefig(png, format="png", dpi=dpi)
+        yield Image.open(png).convert("RGB")

@@ -11,19 +11,23 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5py
+import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..job.reading import CASES
 from ..storage import files, hdf5
 from ..summary import sweep_table, theory_settings
-from . import charts, histories, layout, movie, steady, style, sweep
+from . import charts, histories, maps, steady, style, sweep
 from .charts import Chart
-from .maps import maps
-from .run import Panel, Run
+from .run import Run, frame_labels
 
-FORMATS = ("png", "pdf", "svg")
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "steady", "maps")
+MEASURES = "measures.csv"
+FRAMES = 200  # of a movie at most: instants in between are left out
+SECONDS = 8.0  # for which a movie plays, unless its frames are too few
+FASTEST, SLOWEST = 20, 2  # frames per second
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,24 @@ class Options:
     at: str | None = None
     out: Path | None = None
 
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.panels if name not in PANELS]:
+            raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(PANELS)}")
+        if unknown := [name for name in self.log if name not in ("x", "y", "none")]:
+            raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y, x,y or none")
+        if self.at and (self.movie or self.compare):
+            raise InputError("--at chooses the maps of one picture, and goes with neither --movie nor --compare")
+
+    def wants(self, key: str) -> bool:
+        return not self.panels or key in self.panels
+
+    def chosen(self, found: Sequence[Chart]) -> list[Chart]:
+        """Return the charts that are asked for, in that order."""
+        return [chart for name in self.panels for chart in found if chart.key == name] if self.panels else list(found)
+
+    def drawn(self, found: Sequence[Chart]) -> list[style.Panel]:
+        return [partial(charts.draw, chart, log=self.log) for chart in found]
+
 
 def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path]:
     """Draw what is in each directory, or compare them in one picture; returns the pictures' paths.
@@ -48,12 +70,6 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
     """
     if options.out and len(directories) > 1 and not options.compare:
         raise InputError("--out names one picture: give one directory, or --compare several in one")
-    if unknown := [name for name in options.panels if name not in PANELS]:
-        raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(PANELS)}")
-    if unknown := [name for name in options.log if name not in ("x", "y", "none")]:
-        raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y, x,y or none")
-    if options.at and (options.movie or options.compare):
-        raise InputError("--at chooses the maps of one picture, and goes with neither --movie nor --compare")
     with style.drawing():
         if options.movie:
             return [_movie(directory, options) for directory in directories]
@@ -65,144 +81,146 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        panels = [_steady(table.parent, Options())]
-        figure = layout.figure_of(_wrapped(steady.title(table.parent)), panels, legend=True)
-        return _save(figure, table.with_suffix(""), Options())
+        panels = Options().drawn(steady.charts(table.parent))
+        return _save(
+            style.figure_of(_wrapped(steady.title(table.parent)), [panels], legend=True), table.with_suffix("")
+        )
 
 
 def _wrapped(title: str) -> str:
-    return "\n".join(textwrap.wrap(title, layout.LINE))
+    return "\n".join(textwrap.wrap(title, style.LINE))
+
+
+def _save(figure: Figure, stem: Path, options: Options = Options()) -> Path:
+    target = options.out or stem.with_name(f"{stem.name}.{options.format or 'png'}")
+    kind = options.format or target.suffix.lstrip(".")
+    if kind not in style.MARKED:
+        raise InputError(f"{target}: pictures are {', '.join(style.MARKED)}; say which with --format")
+    try:
+        return style.save(figure, target, kind)
+    except OSError as error:
+        raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
 
 
 def _movie(directory: Path, options: Options) -> Path:
-    target = options.out or directory / f"{options.movie}.gif"
+    """Write all saved instants of a map as a GIF, with one range of colours."""
+    path, name = directory / "fields.h5", options.movie
+    target = options.out or directory / f"{name}.gif"
     if target.suffix != ".gif":
         raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
-    return movie.make(directory, options.movie, target)
-
-
-def _save(figure: Figure, stem: Path, options: Options) -> Path:
-    target = options.out or stem.with_name(f"{stem.name}.{options.format or FORMATS[0]}")
-    kind = options.format or target.suffix.lstrip(".")
-    if kind not in FORMATS:
-        raise InputError(f"{target}: pictures are {', '.join(FORMATS)}; say which with --format")
     try:
-        with files.replaced(target, files.is_marked) as file:
-            style.save(figure, file, kind)
-    except OSError as error:
-        raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
+        with h5py.File(path, "r", locking=False) as file:
+            labels = frame_labels(Run(directory), file)
+            there = [key for key in ("pressure", "displacement", "gap", "height") if key in file]
+            if name not in there or not labels:
+                raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
+            chosen = spread(labels, FRAMES)
+            duration = int(1000 / np.clip(round(len(chosen) / SECONDS), SLOWEST, FASTEST))  # of a frame [ms]
+            with files.replaced(target, files.is_marked) as movie:
+                first, *others = maps.frames(file, name, chosen)
+                look: dict[str, Any] = {"append_images": others, "duration": duration, "loop": 0}
+                first.save(movie, "GIF", save_all=True, comment=files.MARK.encode(), **look)
+    except hdf5.FAILURES as error:
+        raise InputError(f"no movie from {path}: {hdf5.reason(error)}") from error
     return target
 
 
+def spread(labels: dict[int, str], most: int) -> dict[int, str]:
+    """Return at most so many instants, evenly, the first and the last among them."""
+    indices = list(labels)
+    kept = np.linspace(0, len(indices) - 1, min(len(indices), most)).astype(int)
+    return {indices[k]: labels[indices[k]] for k in kept}
+
+
 def _picture(directory: Path, options: Options) -> Figure:
-    """All that there is in a directory."""
-    groups: list[Sequence[Panel]] = []
-    title = directory.absolute().name
-    if (directory / "measures.csv").is_file():
+    """Draw all that there is in a directory."""
+    has_run, has_curve, has_sweep = ((directory / name).is_file() for name in (MEASURES, steady.TABLE, sweep.TABLE))
+    groups: list[Sequence[style.Panel]] = []
+    titles = []
+    if has_run:
         run = Run(directory)
-        title = run.job.title or title
-        title = _wrapped(title) + ("" if run.curves else f"\n{histories.numbers(run)}")
-        if options.over == "velocity" and not (directory / steady.TABLE).is_file():
+        found = _wrapped(run.job.title or directory.absolute().name)
+        titles.append(found if run.curves else f"{found}\n{histories.numbers(run)}")
+        if options.over == "velocity" and not has_curve:
             histories.refuse_one_velocity(run)
-        found = _chosen(histories.charts(run, options.over), options)
-        groups = [_panels(found, options), maps(run, options.at or "") if _wanted("maps", options) else []]
+        groups.append(options.drawn(options.chosen(histories.charts(run, options.over))))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
-    if (directory / steady.TABLE).is_file() and _wanted("steady", options):
-        title = title if groups else _wrapped(steady.title(directory))
-        groups.insert(1, _steady(directory, options))
-    if (directory / sweep.TABLE).is_file():
-        title = title if groups else _wrapped(sweep.title(directory) or title)
-        groups += [_panels([chart], options) for chart in _chosen(sweep.charts(directory), options)]
-    elif not groups:
+    if has_curve and options.wants("steady"):
+        titles.append(_wrapped(steady.title(directory)))
+        groups.append(options.drawn(steady.charts(directory, options.over)))
+    if has_run and options.wants("maps"):
+        groups.append(maps.maps(run, options.at or ""))
+    if has_sweep:
+        titles.append(_wrapped(sweep.title(directory) or directory.absolute().name))
+        groups += [options.drawn([chart]) for chart in options.chosen(sweep.charts(directory))]
+    if not (has_run or has_curve or has_sweep):
         raise InputError(
-            f"{directory} holds no run and no friction curve: it has no measures.csv and no {steady.TABLE}"
+            f"{directory} holds no run and no friction curve: it has no {MEASURES} and no {steady.TABLE}"
             f"{_instead(directory)}"
         )
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    alone = (directory / steady.TABLE).is_file() and len(groups) == 1
-    return layout.figure_of("\n".join(filter(None, (title, theory_settings.describe(directory)))), groups, alone)
+    title = "\n".join(filter(None, (*titles[:1], theory_settings.describe(directory))))
+    return style.figure_of(title, groups, legend=has_curve and len(groups) == 1)
 
 
 def _instead(path: Path) -> str:
-    """Which directory may have been meant: the first below it that holds something, or that of a job file."""
+    """Return which directory may have been meant: the first below it that holds something, or that of a job file."""
     if path.is_file():
         return "; give the output directory of a run, as out/job"
-    tables = ("measures.csv", steady.TABLE, sweep.TABLE)
-    found = next((table.parent for name in tables for table in sorted(path.glob(f"*/{name}"))), None)
-    return f"; did you mean {found}?" if found else ""
+    found = [table.parent for name in (MEASURES, steady.TABLE, sweep.TABLE) for table in sorted(path.glob(f"*/{name}"))]
+    return f"; did you mean {found[0]}?" if found else ""
 
 
 def _comparison(directories: Sequence[Path], options: Options) -> Figure:
-    """The lines of all directories in one picture."""
+    """Draw the lines of all directories in one picture."""
     for directory in directories:
         if not _lines(directory, options):
             raise InputError(f"{directory} holds nothing to compare")
-    return layout.figure_of("", [_panels(compared_charts(directories, options), options)], legend=True)
+    return style.figure_of("", [options.drawn(compared_charts(directories, options))], legend=True)
 
 
 def compared_charts(directories: Sequence[Path], options: Options = Options()) -> list[Chart]:
-    """Charts with the lines of all directories that have any."""
+    """Return charts with the lines of all directories that have any."""
     found = [(name, _lines(path, options)) for name, path in zip(_names(directories), directories, strict=True)]
     return charts.compared([(name, lines) for name, lines in found if lines])
 
 
 def _lines(directory: Path, options: Options) -> list[Chart]:
-    lines: list[Chart] = []
-    if (directory / "measures.csv").is_file():
-        lines += _chosen(histories.charts(Run(directory), options.over), options)
-    if (directory / steady.TABLE).is_file() and _wanted("steady", options):
-        lines += steady.charts(directory, options.over)
-    return lines
+    found: list[Chart] = []
+    if (directory / MEASURES).is_file():
+        found += options.chosen(histories.charts(Run(directory), options.over))
+    if (directory / steady.TABLE).is_file() and options.wants("steady"):
+        found += steady.charts(directory, options.over)
+    return found
 
 
 def _names(directories: Sequence[Path]) -> list[str]:
-    """What tells directories apart: of cases of one sweep their keys, else the last parts of paths."""
+    """Return what tells directories apart: of cases of one sweep their keys, else the last parts of paths."""
     if named := _names_of_cases(directories):
         return named
     parts = [directory.absolute().parts for directory in directories]
     for count in range(1, max(map(len, parts), default=1) + 1):
         names = ["/".join(part[-count:]) for part in parts]
         if len(set(names)) == len(names):
-            return names
-    return [str(directory) for directory in directories]
+            break
+    return names
 
 
 def _names_of_cases(directories: Sequence[Path]) -> list[str]:
-    """`velocity 0.1, seed 2`, the keys in which cases of one sweep differ; nothing if these are not such cases."""
+    """Return the keys in which cases of one sweep differ, as `velocity 0.1, seed 2`; nothing for other directories."""
     paths = [directory.absolute() for directory in directories]
     table = paths[0].parent.parent / sweep.TABLE if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
         return []
     known = {f"{int(row['case']):03d}": row for row in sweep_table.read(table)}
-    if not all(path.name in known for path in paths):
-        return []
-    rows = [known[path.name] for path in paths]
-    keys = list(rows[0])[1 : list(rows[0]).index("state")]
+    rows = [known[path.name] for path in paths if path.name in known]
+    keys = list(rows[0])[1 : list(rows[0]).index("state")] if rows else []
     differing = [key for key in keys if len({row[key] for row in rows}) > 1]
     names = [", ".join(f"{key.split('.')[-1]} {_short(row[key])}" for key in differing) for row in rows]
-    return names if len(set(names)) == len(names) and all(names) else []
+    return names if len(set(names)) == len(paths) and all(names) else []
 
 
 def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _steady(directory: Path, options: Options) -> list[Panel]:
-    return _panels(steady.charts(directory, options.over), options)
-
-
-def _wanted(key: str, options: Options) -> bool:
-    return not options.panels or key in options.panels
-
-
-def _chosen(found: Sequence[Chart], options: Options) -> list[Chart]:
-    """In the order in which they were asked for."""
-    if not options.panels:
-        return list(found)
-    return [chart for name in options.panels for chart in found if chart.key == name]
-
-
-def _panels(found: Sequence[Chart], options: Options) -> list[Panel]:
-    return [partial(charts.draw, chart, log=options.log) for chart in found]

@@ -1,12 +1,11 @@
 """What a picture of a run is drawn from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
 import h5py
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from ..errors import InputError
@@ -15,15 +14,14 @@ from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import measures
 from . import units
-
-Panel = Callable[[Axes], None]
+from .charts import FRACTION, Axis
 
 MEASURED = (
     *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
     *("mean_gap", "max_pressure", "work", "stored", "dissipated"),
 )
 NEAREST = 3  # steps with maps that a message names
-VISCOUS = "friction_viscous"  # what an interface is not part of; in the table of a run with one
+VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
 class Run:
@@ -31,10 +29,13 @@ class Run:
 
     def __init__(self, directory: Path) -> None:
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
+        self.area = self.job.grid.lx * self.job.grid.ly  # of the box [m^2]
+        self.free = self.job.grid.boundary == "free"
         self._columns = table(directory / "measures.csv", MEASURED)
         if not self._columns["step"].size:
             raise InputError(f"{directory} holds no step yet")
         self._first = 1 if self._columns["pressure"][0] == 0.0 and self._columns["step"].size > 1 else 0
+        self.lasts, self.slides = self._columns["time"][-1] > 0.0, self._columns["distance"][-1] > 0.0
 
     def column(self, name: str) -> Array:
         return self._columns[name][self._first :]
@@ -45,19 +46,12 @@ class Run:
         return self.column(VISCOUS) if VISCOUS in self._columns else None
 
     @property
-    def area(self) -> float:
-        """Of the box [m^2]."""
-        return self.job.grid.lx * self.job.grid.ly
+    def load(self) -> tuple[Axis, Array]:
+        return load_of(self.column("pressure"), self.area * self.free)
 
     @property
-    def free(self) -> bool:
-        return self.job.grid.boundary == "free"
-
-    @property
-    def load(self) -> tuple[str, str, Array]:
-        """What presses: its name, unit and values."""
-        pressure = self.column("pressure")
-        return ("force", "N", pressure * self.area) if self.free else ("pressure", "Pa", pressure)
+    def in_contact(self) -> tuple[Axis, Array]:
+        return contact_of(self.column("contact_area"), self.area * self.free)
 
     @property
     def signed(self) -> Array:
@@ -72,6 +66,11 @@ class Run:
         velocities = [stage.velocity for stage in self.job.history]
         return any(x < 0.0 for x, _ in velocities) and not any(y for _, y in velocities)
 
+    @property
+    def curves(self) -> bool:
+        """Whether there is anything to draw over time or load: a single solve is a few numbers."""
+        return bool(self.lasts) or len(set(self.column("pressure"))) > 1
+
     @cached_property
     def timeline(self) -> Timeline:
         """What the job says about each step."""
@@ -79,45 +78,37 @@ class Run:
         return Timeline.of(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
-    def stages(self) -> NDArray[np.int64]:
-        """The stage of every row, -1 where the job knows of none; the initial state belongs to the first."""
-        return np.array([self._stage(n) for n in self.column("step").astype(int).tolist()])
+    def rows_of_stages(self) -> dict[int, list[int]]:
+        """The rows of each stage, by its number; the initial state belongs to the first."""
+        found: dict[int, list[int]] = {}
+        for row, step in enumerate(self.column("step").astype(int).tolist()):
+            if (stage := self._stage(step)) >= 0:
+                found.setdefault(stage, []).append(row)
+        return found
 
     def _stage(self, step: int) -> int:
+        """Return the stage of a step, -1 where the job knows of none."""
         step = max(step, 1)
         return self.timeline.span(step).index if step <= len(self.timeline) else -1
 
     def instant(self, step: int, time: float) -> str:
-        """When a map was saved and what pressed then: `2.1 ms, 100 kPa`, `150 mN`, `2.1 ms, approach 20 µm`."""
+        """Return when a map was saved and what pressed then: `2.1 ms, 100 kPa`, `150 mN`, `2.1 ms, approach 20 µm`."""
         when = units.text(time, "s", 4) if self.lasts else ""
         return ", ".join(filter(None, (when, self.pressed(step))))
 
     def pressed(self, step: int) -> str:
-        """What presses after a step, as its stage prescribes it; '' where no row tells."""
+        """Return what presses after a step, as its stage prescribes it; '' where no row tells."""
         rows, stage = np.flatnonzero(self._columns["step"] == step), self._stage(step)
         if not rows.size:
             return ""
         if stage >= 0 and self.job.history[stage].control == "approach":
             return f"approach {units.text(self._columns['approach'][rows[-1]], 'm')}"
-        pressure = self._columns["pressure"][rows[-1]]
-        return units.text(pressure * self.area, "N") if self.free else units.text(pressure, "Pa")
+        axis, loads = load_of(self._columns["pressure"], self.area * self.free)
+        return units.text(loads[rows[-1]], axis.unit)
 
     def moved(self, step: int) -> tuple[float, float]:
-        """Where the surface is after a step [m]; where it began if the job does not know of that step."""
+        """Return where the surface is after a step [m]; where it began if the job does not know of that step."""
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
-
-    @property
-    def lasts(self) -> bool:
-        return self._columns["time"][-1] > 0.0
-
-    @property
-    def curves(self) -> bool:
-        """Whether there is anything to draw over time or load: a single solve is a few numbers."""
-        return self.lasts or len(set(self.column("pressure"))) > 1
-
-    @property
-    def slides(self) -> bool:
-        return self._columns["distance"][-1] > 0.0
 
 
 class Fields:
@@ -131,37 +122,37 @@ class Fields:
         self.steps: NDArray[np.int64] = file["step"][...]
         self.x, self.y = file["x"][...], file["y"][...]
         self.times: Array = file["t"][...]
-        self.saved = [k for k, t in enumerate(self.times) if not np.isnan(t)]
+        self.saved = np.flatnonzero(~np.isnan(self.times)).tolist()
         self.shown = [self._index(at)] if at else self.saved
 
     def last(self, name: str) -> Array | None:
-        """The newest map of a name among those that are shown, if it was saved."""
+        """Return the newest map of a name among those that are shown, if it was saved."""
         field = self.file[name][self.shown[-1]] if name in self.file and self.shown else None
         return field if field is not None and np.isfinite(field).all() else None
 
     def _index(self, at: str) -> int:
-        """Raises InputError where no map is saved then."""
+        """Return the instant that is asked for; raises InputError where no map is saved then."""
         if not self.saved:
             raise InputError(f"--at {at}: no map is saved yet")
         steps, times = self.steps[self.saved], self.times[self.saved]
-        if at.isdecimal():
-            if int(at) in steps:
-                return self.saved[int(np.flatnonzero(steps == int(at))[0])]
-            near = ", ".join(map(str, sorted(steps[np.argsort(np.abs(steps - int(at)))[:NEAREST]])))
-            raise InputError(f"--at {at}: no map is saved after step {at}; the nearest steps with maps are {near}")
-        if not times[0] <= float(at) <= times[-1]:
+        if not at.isdecimal() and not times[0] <= float(at) <= times[-1]:
             raise InputError(f"--at {at}: maps are saved from {times[0]:g} to {times[-1]:g} s")
-        return self.saved[int(np.argmin(np.abs(times - float(at))))]
+        order = np.argsort(np.abs(steps - int(at) if at.isdecimal() else times - float(at)), kind="stable")
+        if at.isdecimal() and int(at) not in steps:
+            near = ", ".join(map(str, sorted(steps[order[:NEAREST]])))
+            raise InputError(f"--at {at}: no map is saved after step {at}; the nearest steps with maps are {near}")
+        return int(self.saved[order[0]])
 
 
-def frame_label(run: Run, fields: Fields, index: int) -> str:
-    """What tells a saved map from the others of a run."""
-    step = int(fields.steps[index])
-    return f"{run.instant(step, float(fields.times[index]))} (step {step})".lstrip()
+def frame_labels(run: Run, file: h5py.File) -> dict[int, str]:
+    """Return when each map of a run was saved, and what pressed then, by its index."""
+    fields = Fields(file)
+    told = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)
+    return {k: f"{run.instant(step, time)} (step {step})".lstrip() for k, step, time in told}
 
 
 def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
-    """Columns of a table by name; raises InputError where one of those that are needed is missing."""
+    """Return columns of a table by name; raises InputError where one of those that are needed is missing."""
     columns = {name: np.array(values, dtype=float) for name, values in measures.read(path).items()}
     if missing := [name for name in names if name not in columns]:
         raise InputError(f"{path} has no column {', '.join(missing)}")
@@ -169,9 +160,19 @@ def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
 
 
 def box(directory: Path) -> float:
-    """The area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
+    """Return the area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
     for name in (STEADY_RESOLVED, RESOLVED):
         if (directory / name).is_file():
             grid = shown_job(directory / name).grid
             return grid.lx * grid.ly if grid.boundary == "free" else 0.0
     return 0.0
+
+
+def load_of(pressure: Array, area: float) -> tuple[Axis, Array]:
+    """Return what presses: the force on the box of a free scene of this area, else the mean pressure."""
+    return (Axis("force", "N"), pressure * area) if area else (Axis("pressure", "Pa"), pressure)
+
+
+def contact_of(fraction: Array, area: float) -> tuple[Axis, Array]:
+    """Return the contact area of a free scene, whose box has this area, else its fraction of the nominal one."""
+    return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)

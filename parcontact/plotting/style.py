@@ -1,23 +1,28 @@
 """How all pictures look: readable when printed 8 cm wide, in colours that colour-blind readers can tell apart."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, BinaryIO
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ..storage import files
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+Panel = Callable[[Axes], None]  # draws one panel
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito 2008, no yellow
-DASHES = ("-", "--", "-.", ":")  # with the colours, for who prints in black and white
+DASHES = ("-", "--", "-.", ":")  # with the colours, for black and white prints
 BLUE, RED, GREEN, *_ = COLORS
 GREY = "0.4"
 SEQUENCE = "viridis"  # of lines in an order, like instants
 WIDTH, HEIGHT = 5.8, 2.25  # of a picture and of a row of panels [inch]: 10 points are 5.4 when printed 8 cm wide
 COLUMNS = 2  # panels beside each other
+LINE = 68  # letters of a title
+LEGEND_LINE = 0.2  # height of each line of a legend [inch]
 DPI = 200
 RC: dict[Any, Any] = {
     "axes.grid": True,
@@ -28,6 +33,7 @@ RC: dict[Any, Any] = {
     "font.size": 10,
     "grid.alpha": 0.25,
     "legend.fontsize": 9,
+    "legend.title_fontsize": 9,
     "legend.frameon": False,
     "legend.handlelength": 1.6,
     "lines.linewidth": 1.5,
@@ -35,40 +41,69 @@ RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
-
-
 BESIDE: dict[str, Any] = {  # where the legend of a panel is that leaves it no room
     "loc": "upper left",
     "bbox_to_anchor": (1.0, 1.0),
     "borderaxespad": 0.0,
     "handlelength": 1.2,
 }
+MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures name the program
 
 
 @contextmanager
 def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
-    """Pictures look as these settings say, and otherwise as Matplotlib's own: a matplotlibrc of others has no say."""
-    import matplotlib as mpl  # slow to import, and for pictures only
-
+    """Draw with these settings, and otherwise with Matplotlib's own: a matplotlibrc of others has no say."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(settings)
         yield
 
 
-MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures say what has made them
-
-
-def save(figure: Figure, file: BinaryIO, kind: str = "png", dpi: int = DPI) -> None:
-    """Write a picture, a png, pdf or svg, that is known as one of this program."""
-    figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})
+def save(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -> Path:
+    """Write a png, pdf or svg that is known as one of this program, and may replace such a one; returns its path."""
+    with files.replaced(path, files.is_marked) as file:
+        figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})
+    return path
 
 
 def plain(text: str, most: int = 1000) -> str:
-    """A text as it is, up to so many letters: between dollars, there would be a formula."""
+    """Return a text of at most so many letters, without formulas: a dollar would begin one."""
     return (text if len(text) <= most else text[: most - 1] + "…").replace("$", r"\$")
 
 
 def line(number: int) -> dict[str, Any]:
-    """Colour and dashes of the line of this number, from 0."""
+    """Return colour and dashes of the line of this number, from 0."""
     return {"color": COLORS[number % len(COLORS)], "linestyle": DASHES[number % len(DASHES)]}
+
+
+def figure_of(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False) -> Figure:
+    """Draw groups of panels below each other, each in even rows; with `legend` one for all panels, under the title."""
+    rows = [row for group in groups for row in _rows(group)]
+    height = 0.25 + 0.2 * (title.count("\n") + 1) + HEIGHT * len(rows)
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    if title and not legend:
+        figure.suptitle(plain(title), fontsize=11)
+    for part, panels in zip(figure.subfigures(len(rows) or 1, 1, squeeze=False)[:, 0], rows, strict=False):
+        for panel, axes in zip(panels, part.subplots(1, len(panels), squeeze=False)[0], strict=True):
+            panel(axes)
+    if legend and rows:
+        _put_legend_above(figure, title)
+    return figure
+
+
+def _rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
+    count = -(-len(group) // COLUMNS)
+    return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
+
+
+def _put_legend_above(figure: Figure, title: str) -> None:
+    """Replace the legends of all panels by one above them, whose title is that of the figure."""
+    found: dict[str, Artist] = {}
+    for axes in figure.axes:
+        found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        if legend := axes.get_legend():
+            legend.remove()
+    columns = max(1, min(len(found), LINE // (8 + max(map(len, found), default=0))))
+    figure.set_figheight(figure.get_figheight() + LEGEND_LINE * -(-len(found) // columns))
+    place: dict[str, Any] = {"loc": "outside upper center", "ncols": columns, "title_fontsize": 11}
+    figure.legend(list(found.values()), list(found), title=plain(title), **place)

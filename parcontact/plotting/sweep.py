@@ -15,88 +15,86 @@ from ..parallel.slab import Array
 from ..summary import sweep_table
 from ..summary.sweep_table import SEED
 from . import style, units
-from .charts import FRACTION, Axis, Chart, Series, with_key_beside
+from .charts import FRACTION, Axis, Chart, Series
 
 TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "force": "N", "size": "m", "distance": "m", "duration": "s"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "shear_modulus": "Pa"}
 MAX_LINES = 3  # of a second key
-MAX_COLORS = len(style.COLORS)
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
-SHOWN = (("friction", "friction coefficient", ("mu_max", "mu_dyn")), ("area", FRACTION, ("contact_area",)))
-LABELS = {"mu_max": "highest", "mu_dyn": "dynamic", "contact_area": "simulation"}
-THEORY = "theory"
+PANELS = (  # measures and their columns by the names of lines
+    ("friction", "friction coefficient", {"highest": "mu_max", "dynamic": "mu_dyn"}),
+    ("area", FRACTION, {"simulation": "contact_area"}),
+)
 
 Rows = Sequence[dict[str, Any]]
 
 
 def charts(directory: Path) -> list[Chart]:
-    """Panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
+    """Return panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
     rows = sweep_table.read(directory / TABLE)
     keys = _keys(rows)
     if not keys:
         return []
     key, *others = keys
-    found = []
-    for panel, title, names in SHOWN:
-        wanted = [(label, part, name) for label, part in _parts(rows, others) for name in names]
-        series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.COLORS[k % MAX_COLORS])]
+    word = key.split(".")[-1]
+    x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
+    for panel, title, columns in PANELS:
+        wanted = [(name + part, own, column) for part, own in _parts(rows, others) for name, column in columns.items()]
+        series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.line(k)["color"])]
         if series:
             dots = next((k for k, one in enumerate(series) if one.look.get("marker") == "."), None)
             if dots is not None:
                 series[dots] = replace(series[dots], name="each case")
             values = np.concatenate([one.x for one in series])
-            wide = values.min() > 0.0 and values.max() >= WIDE * values.min()
-            word = key.split(".")[-1]
-            x = Axis(word.replace("_", " "), UNITS.get(word, ""))
-            found.append(with_key_beside(Chart(panel, x, Axis(title), series, log_x=wide)))
+            wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
+            found.append(Chart(panel, x, Axis(title), series, log_x=wide))
     return found
 
 
 def title(directory: Path) -> str:
-    """Of the job, as its cases have it; '' if there is none."""
+    """Return the title of the job, as its cases have it; '' if there is none."""
     jobs = sorted(directory.glob(f"cases/*/{RESOLVED}")) + sorted(directory.glob(f"cases/*/{STEADY_RESOLVED}"))
     return shown_job(jobs[0]).title if jobs else ""
 
 
 def _keys(rows: Rows) -> list[str]:
-    """Keys that have several numbers and are no seeds, the first of those that move together."""
-    if not rows:
-        return []
-    names = list(rows[0])
-    keys: list[str] = []
-    seen: list[list[Any]] = []
+    """Return the keys that have several numbers and are no seeds, the first of those that move together."""
+    names = list(rows[0]) if rows else ["case", "state"]
+    keys: dict[tuple[int, ...], str] = {}  # by which rows have the same value
     for name in names[names.index("case") + 1 : names.index("state")]:
         values = [row[name] for row in rows]
-        order = [values.index(value) for value in values]
-        if name.split(".")[-1] != SEED and len(set(map(str, values))) > 1 and order not in seen:
-            seen.append(order)
-            keys += [name] if all(isinstance(value, float) for value in values) else []
-    return keys
+        order = tuple(values.index(value) for value in values)
+        if name.split(".")[-1] != SEED and any(order):
+            keys.setdefault(order, name)
+    return [name for name in keys.values() if all(isinstance(row[name], float) for row in rows)]
 
 
 def _parts(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
-    """The rows of each line, and its name: those that agree in the second key, if it has few values."""
+    """Yield the rows of each line, and its name: those that agree in the second key, if it has few values."""
     values = sorted({row[others[0]] for row in rows}) if others else []
     if not 1 < len(values) <= MAX_LINES:
         yield "", rows
         return
-    word = others[0].split(".")[-1]
+    unit = UNITS.get(others[0].split(".")[-1], "")
     for value in values:
-        yield f", {units.text(value, UNITS.get(word, ''))}", [row for row in rows if row[others[0]] == value]
+        yield f", {units.text(value, unit)}", [row for row in rows if row[others[0]] == value]
 
 
-def _lines(label: str, rows: Rows, name: str, key: str, color: str) -> Iterator[Series]:
-    """Means as a line with its points, all cases as small dots, and the theory."""
-    x, y, theory = (_numbers(rows, column) for column in (key, name, f"theory_{name}"))
+def _lines(name: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
+    """Yield means as a line with its points, all cases as small dots, and the theory."""
+    x, y, theory = (_numbers(rows, wanted) for wanted in (key, column, f"theory_{column}"))
     if (there := np.isfinite(y)).any():
         at, means = _means(x[there], y[there])
-        yield Series(LABELS[name] + label, at, means, {"marker": "o", "linestyle": "-", "color": color})
+        yield Series(name, at, means, {"marker": "o", "linestyle": "-", "color": color})
         if at.size < there.sum():
             look = {"marker": ".", "linestyle": "none", "color": color, "alpha": 0.5, "markersize": 3}
             yield Series("", x[there], y[there], look)
     if (there := np.isfinite(theory)).any():
-        yield Series(THEORY + label, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
+        part = name.partition(", ")
+        yield Series(
+            "theory" + part[1] + part[2], *_means(x[there], theory[there]), {"linestyle": "--", "color": color}
+        )
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:

@@ -1,71 +1,52 @@
 """The section about errors: what logs and tables estimate, part by part, and whether it is as little as asked for."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from ..summary.slide import ERRORS
 from .log import Estimate
 from .parts import Section, Table
 
 NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
-Columns = Mapping[str, Sequence[float]]
 
 
-def of_run(columns: Columns, estimates: Sequence[Estimate], accuracy: float) -> Section:
-    """Of the means over a run, which the log tells, and of its steps."""
-    means = [one for one in estimates if not one.of_curve]
-    said = [text for one in means for text in (f"{one.sentence}.", _judge_mean(one, accuracy))]
-    return _section(columns, said, means, "means over the run", ("in the end", lambda values: values[-1]))
-
-
-def of_curve(columns: Columns, estimates: Sequence[Estimate], accuracy: float) -> Section:
-    """Of the points of a friction curve; the log has the parts of the worst if that misses the accuracy."""
-    worst = {one.name: one for one in estimates if one.of_curve}
-    said = [_judge_points(name, values, worst.get(name), accuracy) for name, values in _known(columns).items()]
-    return _section(columns, said, list(worst.values()), "at the worst point", ("smallest", min))
-
-
-def _section(
-    columns: Columns,
-    said: Sequence[str],
-    estimates: Sequence[Estimate],
-    where: str,
-    second: tuple[str, Callable[[Sequence[float]], float]],
+def section(
+    columns: Mapping[str, Sequence[float]], estimates: Sequence[Estimate], accuracy: float, of_curve: bool
 ) -> Section:
-    """Nothing for a table without errors."""
-    if not (known := _known(columns)):
+    """Return nothing for a table without errors, else those of the points of a friction curve, or of the means over a
+    run and of its steps. The log has the parts: of a curve those of the worst point, if that misses the accuracy."""
+    known = {what: [float(one) for one in columns.get(name, ()) if one == one] for name, what in NAMES.items()}
+    known = {what: values for what, values in known.items() if values}
+    if not known:
         return Section("Error budget")
-    name, take = second
-    rows = [(what, _percent(100 * max(values)), _percent(100 * take(values))) for what, values in known.items()]
-    tables = [Table(("estimated error of", "largest", name), rows)]
-    if estimates:
-        parts = [(one.name, _percent(one.total), *map(_percent, one.parts.values())) for one in estimates]
-        tables.insert(0, Table(("estimated error of", "in all", *estimates[0].parts), parts, f"parts, {where}"))
+    found = {one.name: one for one in estimates if one.of_curve == of_curve}
+    said = []
+    for name, values in known.items() if of_curve else ((name, [one.total / 100]) for name, one in found.items()):
+        if not of_curve:
+            said.append(f"{found[name].sentence}.")
+        said.append(_judge(name, values, found.get(name), accuracy, of_curve))
+    where, second = ("at the worst point", "smallest") if of_curve else ("means over the run", "in the end")
+    rows = [(what, _percent(max(all_)), _percent(min(all_) if of_curve else all_[-1])) for what, all_ in known.items()]
+    tables = [Table(("estimated error of", "largest", second), rows)]
+    if found:
+        parts = [
+            (name, _percent(one.total / 100), *(f"{part:.3g} %" for part in one.parts.values()))
+            for name, one in found.items()
+        ]
+        head = ("estimated error of", "in all", *next(iter(found.values())).parts)
+        tables.insert(0, Table(head, parts, f"parts, {where}"))
     return Section("Error budget", said, tables)
 
 
-def _known(columns: Columns) -> dict[str, list[float]]:
-    """The errors of friction and area that a table has numbers of."""
-    found = {name: [float(value) for value in columns.get(key, ()) if value == value] for key, name in NAMES.items()}
-    return {name: values for name, values in found.items() if values}
-
-
-def _judge_mean(one: Estimate, accuracy: float) -> str:
-    if one.total <= 100 * accuracy:
-        return f"{_asked(one.name, accuracy)} is met."
-    return f"{_asked(one.name, accuracy)} is missed; most of the error is made by the {one.largest}."
-
-
-def _judge_points(name: str, values: Sequence[float], worst: Estimate | None, accuracy: float) -> str:
-    missed = sum(value > accuracy for value in values)
+def _judge(name: str, errors: Sequence[float], worst: Estimate | None, accuracy: float, of_curve: bool) -> str:
+    """Say whether relative errors are as small as asked for, and what makes most of the worst."""
+    asked = f"The accuracy of {100 * accuracy:g} % that was asked for {name} (numerics.accuracy)"
+    missed = sum(error > accuracy for error in errors)
     if not missed:
-        return f"{_asked(name, accuracy)} is met at all points."
-    most = f"; at the worst of them most of the error is made by the {worst.largest}" if worst else ""
-    return f"{_asked(name, accuracy)} is missed at {missed} of {len(values)} points{most}."
+        return f"{asked} is met{' at all points' * of_curve}."
+    most = f"most of the error is made by the {worst.largest}" if worst else ""
+    where = f" at {missed} of {len(errors)} points" if of_curve else ""
+    return f"{asked} is missed{where}{'; ' * bool(most)}{'at the worst of them ' * bool(of_curve and most)}{most}."
 
 
-def _asked(name: str, accuracy: float) -> str:
-    return f"The accuracy of {100 * accuracy:g} % that was asked for {name} (numerics.accuracy)"
-
-
-def _percent(value: float) -> str:
-    return f"{value:.3g} %"
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"

@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from .. import job as jobs
 from ..errors import InputError
 from ..job import Job
-from ..job.resolved import RESOLVED, STEADY_RESOLVED
+from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
+from ..job.sections import listing
 from ..plotting import plots
-from ..plotting.charts import Series
-from ..storage import measures
-from . import asked, budget, log, material, origin, results, road
-from .parts import Chapter, Section, of_chart, of_file
+from . import log, material, origin, results, road
+from .parts import Chapter, Section, Table, of_chart, of_file
 
 KINDS = {  # by the table that each of them has
     "measures.csv": ("run", results.of_run),
@@ -19,64 +19,52 @@ KINDS = {  # by the table that each of them has
     "study.csv": ("study", results.of_study),
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
-TABLES = (
-    "measures.csv",
-    "theory.csv",
-    "steady.csv",
-    "steady_waves.csv",
-    "steady_theory.csv",
-    "sweep.csv",
-    "sweep_mean.csv",
-    "study.csv",
-)
+MORE_TABLES = ("theory.csv", "steady_waves.csv", "steady_theory.csv", "sweep_mean.csv")
+ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that other sections show
 
 
 def chapter(directory: Path) -> Chapter:
-    """All about a directory. Raises InputError where it holds no results."""
+    """Tell all about a directory. Raises InputError where it holds no results."""
     there = [name for name in KINDS if (directory / name).is_file()]
     if not there:
         raise InputError(f"{directory} holds no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
     found, title = log.read(directory), ""
-    if resolved := _resolved(directory):
-        job, complete = asked.read(resolved)
+    jobs_there = [*(directory / name for name in JOBS), *sorted(directory.glob(f"cases/*/{RESOLVED}"))]
+    if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
+        job, warnings = _read_job(resolved)
         title = job.title
-        sections += [asked.section(job, resolved.with_name(JOBS[resolved.name])), material.section(job)]
-        sections += [road.section(job), *_costs(directory, job, found), origin.warnings(job, complete, found)]
-    sections += [origin.section(directory, found), origin.to_cite(), _data(directory)]
+        sections += [_asked(job, resolved.with_name(JOBS[resolved.name])), material.section(job), road.section(job)]
+        if there[0] in ("measures.csv", "steady.csv"):
+            sections += origin.costs(directory / there[0], found, job.numerics.accuracy)
+        sections.append(Section("Warnings", found.warnings or warnings or ["There was no warning."]))
+    data = [of_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
+    said = "The tables, in SI units and with all digits, are inside this file:"
+    sections += [origin.section(directory, found), origin.to_cite(), Section("Data", [said], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
-    return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if not one.empty])
+    return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if one])
 
 
 def together(directories: Sequence[Path]) -> Iterator[Chapter]:
-    """What several directories have in common, in one picture each."""
+    """Yield what several directories have in common, in one picture each: lines of a directory have one colour."""
     if len(directories) > 1:
-        shared = [chart for chart in plots.compared_charts(directories) if len({_run(one) for one in chart.series}) > 1]
+        found = plots.compared_charts(directories)
+        shared = [chart for chart in found if len({one.look["color"] for one in chart.series}) > 1]
         if shared:
             yield Chapter("Comparison", Path(), "", [Section("Together", pictures=[of_chart(one) for one in shared])])
 
 
-def _run(series: Series) -> object:
-    """What tells the lines of one directory from those of others: their colour."""
-    return series.look["color"]
+def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
+    """Return the job that an output directory was made by and its warnings; of a job whose files are gone none."""
+    try:
+        job = jobs.load(resolved)
+        return job, job.warnings
+    except InputError:
+        return shown_job(resolved), ()
 
 
-def _resolved(directory: Path) -> Path | None:
-    """The job of a directory with every default: of a sweep that of its first case."""
-    paths = [*(directory / name for name in JOBS), *sorted(directory.glob(f"cases/*/{RESOLVED}"))]
-    return next((path for path in paths if path.is_file()), None)
-
-
-def _costs(directory: Path, job: Job, found: log.Log) -> Iterator[Section]:
-    """The error budget and the cost of a run, or else of a curve."""
-    for name, budget_of in (("measures.csv", budget.of_run), ("steady.csv", budget.of_curve)):
-        if (directory / name).is_file():
-            columns = measures.read(directory / name)
-            yield budget_of(columns, found.estimates, job.numerics.accuracy)
-            yield origin.cost(columns, found)
-            return
-
-
-def _data(directory: Path) -> Section:
-    data = [of_file(directory / name) for name in TABLES if (directory / name).is_file()]
-    return Section("Data", ["The tables, in SI units and with all digits, are inside this file:"], downloads=data)
+def _asked(job: Job, given: Path) -> Section:
+    """Return a table of all keys with every default, and the job file as it was given, if it is there."""
+    rows = [row for row in listing.rows(job) if not row[0].startswith(ELSEWHERE)]
+    texts = [("the job file as it was given", given.read_text(errors="replace"))] if given.is_file() else []
+    return Section("What was asked", tables=[Table(("key", "value", "unit"), rows)], texts=texts)

@@ -1,7 +1,7 @@
 """What run.log and steady.log say of a run and a curve: warnings, estimated errors, counts, and the machine."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from ..storage.curve_points import LOG
 
 LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
-STARTED = ("parcontact ", "in ", "machine: ", "batch job: ")
+MACHINE = re.compile(r"parcontact |in |machine: |batch job: |\d+ ranks?, ")  # how lines about it begin
 ESTIMATE = re.compile(r"estimated error of ([^:]*): (?:up to )?(\S+) % \(([^)]*)\)")
 PART = re.compile(r"(\w+) (\S+) %")
 
@@ -38,23 +38,23 @@ class Log:
 
     warnings: list[str]
     estimates: list[Estimate]
-    counts: list[tuple[str, str]]
+    counts: list[Sequence[str]]
     machine: list[str]
 
 
 def read(directory: Path) -> Log:
-    """Of a directory; empty where there is no log."""
+    """Return what the logs of a directory say; nothing where there is none."""
     texts = [(directory / name).read_text(errors="replace") for name in LOGS if (directory / name).is_file()]
     lines = [STAMP.sub("", line) for text in texts for line in text.splitlines()]
     warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
-    counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]
-    machine = [line for line in lines if line.startswith(STARTED) or re.match(r"\d+ ranks?, ", line)]
-    counts = list(_counts(counted[-1])) if counted else []
-    return Log(list(dict.fromkeys(warnings)), list(_estimates(lines)), counts, machine)
+    counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]  # allreduce 12, fft 64x64 3
+    counts: list[Sequence[str]] = [part.rsplit(" ", 1) for part in counted[-1].split(", ")] if counted else []
+    machine = [line for line in lines if MACHINE.match(line)]
+    return Log(list(dict.fromkeys(warnings)), _estimates(lines), counts, machine)
 
 
-def _estimates(lines: list[str]) -> Iterator[Estimate]:
-    """Of a run the last of friction and of area: it says them again when it goes on. Of a curve the largest of each."""
+def _estimates(lines: list[str]) -> list[Estimate]:
+    """Return the last ones of a run, which says them again when it goes on; of a curve the largest."""
     found: dict[tuple[str, bool], Estimate] = {}
     for line in lines:
         if match := ESTIMATE.match(line.removeprefix(WARNING)):
@@ -63,11 +63,4 @@ def _estimates(lines: list[str]) -> Iterator[Estimate]:
             before = found.get((name, of_curve))
             if before is None or not of_curve or float(match[2]) > before.total:
                 found[name, of_curve] = Estimate(name, of_curve, match.string, float(match[2]), parts)
-    yield from found.values()
-
-
-def _counts(text: str) -> Iterator[tuple[str, str]]:
-    """Names and numbers of `allreduce 12, fft 64x64 float64 3`."""
-    for part in text.split(", "):
-        name, _, number = part.rpartition(" ")
-        yield name, number
+    return list(found.values())

@@ -1,5 +1,6 @@
 """The page: all chapters in one HTML file that loads nothing from elsewhere."""
 
+import stat
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,7 +11,6 @@ from .. import progress
 from ..errors import InputError
 from ..storage import files, hdf5
 from ..storage.provenance import PROGRAM
-from . import readable
 from .chapters import chapter, together
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
@@ -21,13 +21,13 @@ def write(directories: Sequence[Path], out: Path | None = None) -> Path:
 
     Raises InputError for a directory without results, and for a file that cannot be written.
     """
-    for directory in directories:
-        if not directory.is_dir():
-            raise InputError(f"{directory} is no directory")
-        readable.refuse_others(directory)
     target = out or directories[0] / NAME
     if target.suffix not in (".html", ".htm"):
         raise InputError(f"--out must end in .html, got {str(target)!r}")
+    for directory in directories:
+        if not directory.is_dir():
+            raise InputError(f"{directory} is no directory")
+        _refuse_links(directory)
     text = render(directories)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -38,8 +38,17 @@ def write(directories: Sequence[Path], out: Path | None = None) -> Path:
     return target
 
 
+def _refuse_links(directory: Path) -> None:
+    """Raise InputError for what a report would read that is no file of the directory: it would publish another one."""
+    for path in (path for pattern in ("*", "checkpoint/*", "cases/*", "cases/*/*") for path in directory.glob(pattern)):
+        kind = path.lstat().st_mode
+        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
+            told = "a symbolic link" if stat.S_ISLNK(kind) else "no regular file"
+            raise InputError(f"{path} is {told}, which a report does not read; put the file itself in its place")
+
+
 def render(directories: Sequence[Path]) -> str:
-    """The text of the page."""
+    """Return the text of the page."""
     each = [chapter(directory) for directory in progress.shown(directories, "chapters", "chapter")]
     chapters = [*together(directories), *each]
     loader = PackageLoader("parcontact", "report")

@@ -9,9 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ..plotting import style
-from ..plotting.charts import Chart, draw, with_key_beside
-from ..plotting.run import Panel
+from ..plotting import charts, style
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
 PHONE_COLUMNS = 2  # of a table that is shown as one on a phone
@@ -70,11 +68,9 @@ class Section:
     texts: Sequence[tuple[str, str]] = ()
     downloads: Sequence[Download] = ()
 
-    @property
-    def empty(self) -> bool:
-        """Whether there is nothing to show."""
-        parts = (self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads)
-        return not any(parts)
+    def __bool__(self) -> bool:
+        """Whether there is anything to show."""
+        return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
 
 
 @dataclass(frozen=True)
@@ -87,15 +83,13 @@ class Chapter:
     sections: Sequence[Section]
 
 
-def of_chart(chart: Chart, caption: str = "") -> Picture:
-    """A picture of one chart."""
-    return of_panel(
-        partial(draw, with_key_beside(chart)), caption or f"{chart.y.name} over {chart.x.name}".replace("\n", " ")
-    )
+def of_chart(chart: charts.Chart) -> Picture:
+    """Return a picture of one chart."""
+    return of_panel(partial(charts.draw, chart), f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
 
 
-def of_panel(panel: Panel, caption: str) -> Picture:
-    """A picture of one panel, as SVG."""
+def of_panel(panel: style.Panel, caption: str) -> Picture:
+    """Return a picture of one panel, as SVG."""
     file = io.BytesIO()
     with style.drawing(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
@@ -104,12 +98,12 @@ def of_panel(panel: Panel, caption: str) -> Picture:
     return Picture(uri_of(file.getvalue(), "image/svg+xml"), caption)
 
 
-def of_file(path: Path, kind: str = "text/csv") -> Download:
-    """A file to be downloaded from the page."""
+def of_file(path: Path) -> Download:
+    """Return a table to be downloaded from the page."""
     data = path.read_bytes()
-    return Download(path.name, uri_of(data, kind), len(data))
+    return Download(path.name, uri_of(data, "text/csv"), len(data))
 
 
 def uri_of(data: bytes, kind: str) -> str:
-    """Data as a URI: nothing has to be loaded from elsewhere."""
+    """Return data as a URI: nothing has to be loaded from elsewhere."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"

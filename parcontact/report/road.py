@@ -1,23 +1,63 @@
-"""The section about the rigid surface: its shapes, its spectra, and what it is like on the grid of the job."""
+"""The rigid surface of a job: what `parcontact surface` says and draws of it, and its section of a report."""
 
+from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 
-from ..errors import InputError
-from ..job import Job
+import numpy as np
+
+from ..errors import InputError, RunError
+from ..job import Job, Topography
 from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.mpi import MPI
-from ..parallel.slab import Slab
-from ..plotting import surface, units
-from ..road import statistics
+from ..parallel.slab import Array, Slab
+from ..plotting import style, surface, units
+from ..road import statistics, treatment
+from ..road.surface import prepare
 from ..scene import rigid_surface
 from .parts import Section, Table, of_panel
 
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
+NOT_SELF_AFFINE = "no self-affine range was found"
+
+
+def describe(job: Job, heights: Array, told: list[str], shortest: float | None, picture: Path) -> Iterator[str]:
+    """Draw the picture and say what the heights [m], shape (ny, nx), are like, line by line; root only.
+
+    `shortest` [m] is the shortest wave of a measured surface, None of others. Raises InputError and RunError.
+    """
+    if picture.suffix[1:] not in style.MARKED:
+        raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
+    found, part, measured = statistics.describe(heights, job.grid.size), job.surface[0], None
+    lines = []
+    if isinstance(part, Topography) and len(job.surface) == 1:  # the map at its own points, its edges joined smoothly
+        prepared = prepare(part, job.grid)
+        (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
+        measured = statistics.describe(treatment.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size)
+        lines = [f"size           {lx:.5g} x {ly:.5g} m", f"points         {nx} x {ny}"]
+        lines.append(f"pixel          {lx / nx:.4g} x {ly / ny:.4g} m")
+        lines.append(f"missing        {float(np.isnan(prepared.cut).mean()):.2%} of its points")
+    try:
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        surface.draw(surface.Sketch(heights, job.grid.size, found, measured), picture)
+    except OSError as error:
+        raise RunError(f"{picture} cannot be written: {error}") from error
+    yield from (*lines, *told)
+    yield f"rms height     {found.rms_height:.5g} m"
+    yield f"rms slope      {found.rms_slope:.5g}"
+    yield f"rms curvature  {found.rms_curvature:.5g} 1/m"
+    yield f"Nayak          {found.nayak:.4g}"
+    yield f"spectrum       waves of {max(job.grid.size):.4g} to {2.0 * max(job.grid.dx, job.grid.dy):.4g} m"
+    yield f"Hurst          {f'{found.hurst:.3g}' if found.hurst == found.hurst else NOT_SELF_AFFINE}"
+    if shortest is not None:
+        cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
+        yield f"shortest wave  {shortest:.4g} m, {cells:.3g} cells"
+    yield f"picture: {picture}"
 
 
 def section(job: Job) -> Section:
-    """Of the surface of a job, made anew; where its files are gone or it is too large, of what the job says."""
+    """Describe the surface of a job, made anew; where its files are gone or it is too large, as the job says."""
     shapes = Table(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
     if job.grid.nx * job.grid.ny > MOST_POINTS:
         return Section("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
@@ -35,7 +75,7 @@ def section(job: Job) -> Section:
         ("rms slope", f"{found.rms_slope:.4g}"),
         ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
         ("Nayak's parameter", f"{found.nayak:.4g}"),
-        ("Hurst exponent", f"{found.hurst:.3g}" if found.hurst == found.hurst else "no self-affine range was found"),
+        ("Hurst exponent", f"{found.hurst:.3g}" if found.hurst == found.hurst else NOT_SELF_AFFINE),
     ]
     tables = [shapes, Table(("on the grid of the job", "value"), rows)]
     sketch = surface.Sketch(heights, job.grid.size, found)

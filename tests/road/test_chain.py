@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from parcontact import job as jobs
-from parcontact.plotting import compounds
+from parcontact.plotting import compound as files
 from parcontact.rubber import compound
 
 ROAD = Path(__file__).resolve().parents[2] / "jobs" / "road"
@@ -26,7 +26,7 @@ def compare(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
         shutil.copy(ROAD / name, there)
     subprocess.run([sys.executable, there / "make.py"], check=True, timeout=120)
     made = compound.fitted(there / "measured" / "compound.csv", 0.5, 20.0, "wlf", 0.02)
-    list(compounds.write(made, there / "materials" / "compound.yaml", None))
+    list(files.write(made, there / "materials" / "compound.yaml", None))
     spec = util.spec_from_file_location("compare", there / "compare.py")
     assert spec
     assert spec.loader

@@ -10,7 +10,7 @@ from drawing import ELASTIC, KINDS, LOADS, SLIDE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
-from parcontact.plotting import plots, units
+from parcontact.plotting import plots
 from parcontact.summary import theory_settings
 
 
@@ -108,25 +108,3 @@ def test_directory_without_a_run(tmp_path: Path) -> None:
     (tmp_path / "measures.csv").write_text("step\n")
     with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):
         plots.plot([tmp_path])
-
-
-@pytest.mark.parametrize(("largest", "label"), [(3.2e-5, "µm"), (999.9, "m"), (1e3, "km"), (2e-12, "nm"), (0.0, "m")])
-def test_prefixes(largest: float, label: str) -> None:
-    found, (values,) = units.scaled("m", np.array([np.nan, largest, -0.5 * largest]))
-    assert found == label
-    assert values[1] * units.size_of(label, "m") == pytest.approx(largest)
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "told"),
-    [
-        (1041.67, "Pa", "1.04 kPa"),
-        (999.96, "m", "1 km"),
-        (2.5e-8, "m²", "0.025 mm²"),
-        (3e-10, "m²", "300 µm²"),
-        (0.3, "", "0.3"),
-        (0.0, "s", "0 s"),
-    ],
-)
-def test_numbers_with_prefixes(value: float, unit: str, told: str) -> None:
-    assert units.text(value, unit) == told

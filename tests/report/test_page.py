@@ -151,7 +151,7 @@ def test_the_errors_of_a_run(tmp_path: Path, total: str, told: str) -> None:
     lines = [f"2026-01-01 00:00:00,000 {said.format(number)}\n" for number in ("77", total)]
     (tmp_path / "run.log").write_text("".join(lines))
     columns = {"error_friction": [0.02, 0.03, np.nan], "error_area": [np.nan, np.nan, np.nan]}
-    section = budget.of_run(columns, log.read(tmp_path).estimates, 0.01)
+    section = budget.section(columns, log.read(tmp_path).estimates, 0.01, of_curve=False)
     assert section.sentences == [
         f"{said.format(total)}.",
         f"The accuracy of 1 % that was asked for friction (numerics.accuracy) {told}",
@@ -213,3 +213,12 @@ def test_nothing_to_report(tmp_path: Path, name: str, out: str | None, told: str
     with pytest.raises(InputError, match=told):
         page.write([tmp_path / name], tmp_path / out if out else None)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["theory.csv", "checkpoint/step-9.h5"])
+def test_links_are_refused(tmp_path: Path, name: str) -> None:
+    """They could lead to what only who makes the report may read."""
+    (tmp_path / "checkpoint").mkdir()
+    (tmp_path / name).symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError, match=rf"{name} is a symbolic link, which a report does not read"):
+        page.write([tmp_path])
