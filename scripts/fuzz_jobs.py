@@ -85,14 +85,14 @@ def drive(path: Path) -> tuple[str, jobs.Job | None]:
             return "large", None
         assert scene.choices(job).effects
         built = scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points))
-        sanity.of_surface(built.setup)
+        sanity.check_heights(built.setup)
     except InputError:
         return "refused", None
     return march(job, built), job
 
 
 def march(job: jobs.Job, built: scene.Scene) -> str:
-    marching, watch = March(built), sanity.ContactWatch(job, Timeline.of(job))
+    marching, watch = March(built), sanity.ContactWatch(job.numerics.strict, Timeline.of(job))
     try:
         for step, _ in zip(Timeline.of(job), range(STEPS), strict=False):
             m = marching.advance(step).measures

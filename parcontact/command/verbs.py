@@ -90,7 +90,7 @@ def _doubts(job: Job) -> list[str]:
 
     found = list(describe_beyond(job))
     if sanity.is_quickly_made(job):
-        found += sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+        found += sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
     return found
 
 
@@ -115,7 +115,7 @@ def plan(options: argparse.Namespace) -> int:
         on_root(world, lambda: sweep_warnings.warn_once(chosen))
     doubts = [] if several else [*job.warnings, *describe_beyond(job)]
     if sanity.is_quickly_made(job):
-        doubts += sanity.of_surface(scene.set_up(job, slab))
+        doubts += sanity.check_heights(scene.set_up(job, slab))
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
     if several:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
@@ -197,7 +197,7 @@ def surface(options: argparse.Namespace) -> int:
     measured_maps.refuse_taken(options.start)
     job = measured_maps.load(given, options.set) if alone else _load(options)
     base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
-    doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.of_surface(base)
+    doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     print("\n".join(drawing.describe(job, heights, base.preparation_notes, base.shortest, picture)))

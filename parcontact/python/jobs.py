@@ -19,7 +19,6 @@ from ..parallel.meeting import meet
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..scene import Setup, sanity
-from ..scene.measured_range import describe_beyond
 
 Given = str | os.PathLike[str] | Mapping[str, Any] | Job
 SOMEWHERE = {"points": 2, "size": 1.0}  # a grid for what needs none
@@ -109,6 +108,6 @@ def of_parts(**parts: Any) -> Job:
 
 def warn_of(job: Job, setup: Setup) -> None:
     """Warn, on root, of what is allowed but means little; collective."""
-    for text in (*job.warnings, *describe_beyond(job), *sanity.of_surface(setup)):
+    for text in sanity.find_doubts(setup):
         if setup.slab.root:
             warnings.warn(text, UserWarning, stacklevel=4)

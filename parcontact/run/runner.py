@@ -13,7 +13,6 @@ from ..march.step import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import Scene, choices, sanity
-from ..scene.measured_range import describe_beyond
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, row, wisdom
 from ..storage.checkpoint import Contents, Facts
@@ -86,8 +85,8 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         wisdom.recall(choices(job).transforms, slab, origin.wisdom if origin else None)
         marching = steadystart.first(job, slab, options.until or 0.0, origin.contents if origin else None)
         timeline = marching.timeline(options.until or 0.0)
-        found = (*job.warnings, *describe_beyond(job), *sanity.of_surface(marching.scene.setup))
-        doubts = () if options.beside else found
+        found = sanity.find_doubts(marching.scene.setup)
+        doubts = () if options.beside else tuple(found)
         wisdom.keep(choices(job).transforms, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = restart.claim(plain, origin)
@@ -110,7 +109,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 saved = origin.contents.numbers if origin else None
                 errors = ErrorsSoFar(marching.row, saved, half)
                 told = set(sanity.ODD_CONTACTS if options.beside else ())
-                contacts = sanity.ContactWatch(job, timeline, told)
+                contacts = sanity.ContactWatch(job.numerics.strict, timeline, told)
                 parts = marching, timeline, directory, recorder, watching, facts
                 journey = Journey(*parts, options.until, errors, contacts, options.shows)
                 return Ended(journey.go(origin), marching, errors=errors)

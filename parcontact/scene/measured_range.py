@@ -2,22 +2,19 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..effects.folded_branches import bands, phases
 from ..effects.relaxation import time_factor_of
 from ..history.timeline import Timeline
 from ..job import Dma, Job, Zener
 
-NEAR = 0.5  # decades beyond the measured band that pass: a surface has little of its last waves
+NEAR = 0.5  # accuracy: decades beyond the measured band that pass, as a surface has little of its last waves
 
 
-@dataclass(frozen=True)
-class ExcitedBand:
-    """Frequencies [Hz] that a job excites at a temperature [deg C], None where moduli do not depend on it.
-
-    `factor` is the shift factor a_T there.
-    """
+class ExcitedBand(NamedTuple):
+    """Frequencies [Hz] that a job excites at a temperature [deg C], None where moduli do not depend on it, with the
+    shift factor a_T there."""
 
     temperature: float | None
     factor: float
@@ -25,29 +22,29 @@ class ExcitedBand:
 
     @property
     def reduced(self) -> tuple[float, float]:
-        """As at the reference temperature."""
+        """The frequencies [Hz] at the reference temperature at which moduli are the same."""
         return self.band[0] * self.factor, self.band[1] * self.factor
 
 
 def excited_band(job: Job) -> tuple[float, float] | None:
-    """Frequencies [Hz] with which the waves of a job's surface pass a point of the body, over all stages and steady
-    velocities; None for a surface that stands."""
-    speeds = [math.hypot(*phase.velocity) for phase in phases(Timeline.of(job))] + [math.hypot(*job.initial.velocity)]
-    speeds = [speed for speed in (*speeds, *(job.steady.velocities if job.steady else ())) if speed > 0.0]
-    waves = [(band.low, band.high) for band in bands(job.grid, job.surface)]
-    if not speeds or not waves:
+    """Return the frequencies [Hz] with which the waves of a job's surface pass a point of the body, over all stages and
+    steady velocities; None for a surface that stands."""
+    velocities = [*(phase.velocity for phase in phases(Timeline.of(job))), job.initial.velocity]
+    speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
+    moving, waves = [speed for speed in speeds if speed > 0.0], list(bands(job.grid, job.surface))
+    if not moving or not waves:
         return None
-    low, high = min(low for low, _ in waves), max(high for _, high in waves)
-    return min(speeds) * low / (2 * math.pi), max(speeds) * high / (2 * math.pi)
+    low, high = min(band.low for band in waves), max(band.high for band in waves)
+    return min(moving) * low / (2 * math.pi), max(moving) * high / (2 * math.pi)
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
-    """What a job excites at each temperature of a friction curve, or else at that of the material; nothing where the
-    surface stands."""
-    body = job.material.fitted if isinstance(job.material, Dma) else job.material
+    """Return what a job excites at each temperature of a friction curve, or else at that of the material; nothing where
+    the surface stands."""
     if (band := excited_band(job)) is None:
         return []
-    if not isinstance(body, Zener) or body.shift is None:
+    body = _body(job)
+    if body is None or body.shift is None:
         return [ExcitedBand(None, 1.0, band)]
     reference = body.shift.made.reference
     degrees = temperatures or (reference if body.temperature is None else body.temperature,)
@@ -59,14 +56,12 @@ def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[st
 
     `temperatures` [deg C] are those of a friction curve; without any, that of the material.
     """
-    body = job.material.fitted if isinstance(job.material, Dma) else job.material
-    if not isinstance(body, Zener):
+    if (body := _body(job)) is None:
         return
-    degrees = [value for value in (*temperatures, *(() if temperatures else (body.temperature,))) if value is not None]
+    degrees = [value for value in temperatures or (body.temperature,) if value is not None]
     if body.temperatures is not None:
         low, high = body.temperatures
-        beyond = [value for value in degrees if not low <= value <= high]
-        if beyond:
+        if beyond := [value for value in degrees if not low <= value <= high]:
             yield (
                 f"material: {', '.join(f'{value:g}' for value in beyond)} C is beyond the {low:g} to {high:g} C of its "
                 "measurement: the shift is an extrapolation there"
@@ -82,3 +77,9 @@ def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[st
                 f"{decades:.1f} decades {side} the measured {body.band[0]:.3g} to {body.band[1]:.3g} Hz: moduli are an "
                 "extrapolation there"
             )
+
+
+def _body(job: Job) -> Zener | None:
+    """Return the material as springs and branches; None of an elastic one."""
+    material = job.material.fitted if isinstance(job.material, Dma) else job.material
+    return material if isinstance(material, Zener) else None

@@ -4,7 +4,7 @@ What a job alone tells is in `job/checks/meaning.py`. All is judged from sums ov
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,82 +17,76 @@ from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
+from .measured_range import describe_beyond
 from .scene import Setup
 
-SEAM = (
-    2.0  # the jump across the edge of the box over the largest increment of neighbours inside: 1 if nothing is special
-)
+SEAM = 2.0  # accuracy: the jump across the edge over the largest increment inside: 1 if nothing is special
 ODD_CONTACTS = ("edge", "cells")  # at the edge of the box; a few cells wide
-FEW_CELLS = (
-    0.15  # of the area of contact that counting cells takes too large: contacts of three cells, a circle of four
-)
-FEW_POINTS = 2**22  # that are made in seconds
+FEW_CELLS = 0.15  # accuracy: of the area, too large if counted in cells: contacts of three cells, a circle of four
+FEW_POINTS = 2**22  # tuning: heights that are made in seconds
 STRICT = "an error with numerics.strict"
 
 
 def refuse_impossible(job: Job, timeline: Timeline) -> None:
     """Raise InputError for a run that cannot begin here: too many points for the memory, or too many instants."""
-    for text in (size.beyond_memory(job.grid), size.beyond_file(timeline.count, job.output), _endless(timeline)):
+    count = timeline.count
+    endless = f"the history would have {count:.3g} steps; it has at most {MOST_STEPS:.0e}" if count > MOST_STEPS else ""
+    for text in (size.beyond_memory(job.grid), size.beyond_file(count, job.output), endless):
         if text:
             raise InputError(text)
 
 
-def _endless(timeline: Timeline) -> str:
-    if timeline.count <= MOST_STEPS:
-        return ""
-    return f"the history would have {timeline.count:.3g} steps; it has at most {MOST_STEPS:.0e}"
-
-
 def is_quickly_made(job: Job) -> bool:
-    """Whether the heights of a job say more than the job does, and are few enough to be made for a look at them."""
+    """Return whether the heights of a job say more than the job does, and are few enough to be made to look at them."""
     return not meaning.says_all(job.surface) and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
-def of_surface(setup: Setup) -> list[str]:
-    """What is wrong with the heights of a scene, collective; raises InputError with `numerics.strict`."""
-    found = list(_of_surface(setup))
-    if found and setup.job.numerics.strict:
+def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[str]:
+    """Return what is allowed but means little, of the job at some temperatures [deg C] and of its heights; collective.
+    Raises InputError with `numerics.strict`."""
+    return [*setup.job.warnings, *describe_beyond(setup.job, temperatures), *check_heights(setup)]
+
+
+def check_heights(setup: Setup) -> list[str]:
+    """Return what is wrong with the heights of a scene; collective. Raises InputError with `numerics.strict`."""
+    found = list(_check_heights(setup))
+    if found and setup.choices.numerics.strict:
         raise InputError("\n".join(f"{text} ({STRICT})" for text in found))
     return found
 
 
-def _of_surface(setup: Setup) -> Iterator[str]:
+def _check_heights(setup: Setup) -> Iterator[str]:
     if setup.roughness and (text := meaning.steep(setup.roughness.rms_slope)) and text not in setup.job.warnings:
         yield text
     seams: list[str] = []
-    if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface):
-        heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
-        seams = list(_seams(setup, heights)) if setup.job.grid.boundary == "periodic" else []
+    if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
+        seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
         yield from seams
     if setup.shortest is not None and not seams:  # a seam has waves of its own
-        yield from advice.measured(setup.job.grid, setup.shortest, setup.job.numerics.accuracy)
+        yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.accuracy)
 
 
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------
 
 
 def _seams(setup: Setup, heights: Array) -> Iterator[str]:
-    """Where the first and the last points of a periodic box do not fit together."""
-    unit, grid = setup.units.height, setup.job.grid
+    """Yield where the first and the last points of a periodic box do not fit together."""
+    unit, grid = setup.units.height, setup.grid
     for name, (jump, inside, rise), length in (
         ("x", _along_x(setup.slab, heights), grid.lx),
         ("y", _along_y(setup.slab, heights), grid.ly),
     ):
         if jump <= SEAM * inside:
             continue
-        tilt = rise / length
+        times, tilt = f"{jump / inside:.3g} times" if inside else "where there is nothing at", rise / length
         remedy = "cut it where it fits, or let it fade to its mean towards the edge"
         if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside:
             remedy = f"it is tilted by {abs(tilt) * unit:.3g}: subtract its mean plane"
         yield (
             f"surface: along {name} the heights jump by {jump * unit:.3g} m (rms) across the edge of the periodic box, "
-            f"{_times(jump, inside)} the most between neighbours inside, and such a wall makes friction of its own; "
+            f"{times} the most between neighbours inside, and such a wall makes friction of its own; "
             f"{remedy}"
         )
-
-
-def _times(jump: float, inside: float) -> str:
-    return f"{jump / inside:.3g} times" if inside else "where there is nothing at"
 
 
 def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
@@ -107,7 +101,7 @@ def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 
 def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
-    """The same from row to row."""
+    """The rms jump, the largest rms increment and the mean rise from row to row."""
     before = rows.before_first(slab, heights, True)
     if slab.ny < 3:
         return 0.0, 0.0, 0.0
@@ -125,35 +119,29 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Looks at what each step of a run has measured, and tells each kind of nonsense once."""
+    """Check of what each step of a run has measured, which tells each kind of nonsense once."""
 
-    job: Job
+    strict: bool
     timeline: Timeline
-    told: set[str] = field(default_factory=set)
+    seen: set[str] = field(default_factory=set)
 
     def judge(self, step: int, measures: Measures) -> list[str]:
-        """Warnings about a step; raises RunError with `numerics.strict`."""
-        return self._new(f"step {step}", measures, step > 0 and self._ends_a_stage(step))
+        """Return warnings about a step; raises RunError where they are errors."""
+        ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
+        return self.judge_point(measures, f"step {step}", ends_a_stage)
 
-    def judge_point(self, measures: Measures, where: str) -> list[str]:
-        """The same about steady sliding."""
-        return self._new(where, measures, True)
-
-    def _new(self, where: str, measures: Measures, ends: bool) -> list[str]:
-        """What has not been told yet."""
-        found = dict(zip(ODD_CONTACTS, (at_edge(measures), few_cells(measures) if ends else ""), strict=True))
-        new = {kind: f"{where}: {text}" for kind, text in found.items() if text and kind not in self.told}
-        self.told |= new.keys()
-        if new and self.job.numerics.strict:
+    def judge_point(self, measures: Measures, where: str, final: bool = True) -> list[str]:
+        """Return warnings about a contact, of its cells if it is `final`; raises RunError where they are errors."""
+        found = dict(zip(ODD_CONTACTS, (at_edge(measures), few_cells(measures) if final else ""), strict=True))
+        new = {kind: f"{where}: {text}" for kind, text in found.items() if text and kind not in self.seen}
+        self.seen |= new.keys()
+        if new and self.strict:
             raise RunError("; ".join(f"{text} ({STRICT})" for text in new.values()))
         return list(new.values())
 
-    def _ends_a_stage(self, step: int) -> bool:
-        return step <= self.timeline.count and self.timeline.span(step).last == step
-
 
 def at_edge(measures: Measures) -> str:
-    """What to say of a contact that leaves its box, or ''."""
+    """Return what to say of a contact that leaves its box, or ''."""
     if not measures.at_edge:
         return ""
     return (
@@ -163,7 +151,7 @@ def at_edge(measures: Measures) -> str:
 
 
 def few_cells(measures: Measures) -> str:
-    """What to say of contacts that consist of their own edges, or ''."""
+    """Return what to say of contacts that consist of their own edges, or ''."""
     area = measures.contact_area
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
     if excess <= FEW_CELLS:

@@ -13,7 +13,6 @@ from ..job import Job, identity
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
 from ..scene import sanity
-from ..scene.measured_range import describe_beyond
 from ..storage import curve_points, hdf5, marker, stopfile
 from ..storage.console import always
 from ..storage.directory import ADVICE, Directory
@@ -108,7 +107,7 @@ def run(
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
         setup = scene.set_up(job, slab)
-        doubts = [*job.warnings, *describe_beyond(job, wanted.temperatures), *sanity.of_surface(setup)]
+        doubts = sanity.find_doubts(setup, wanted.temperatures)
         sliding = SteadySliding(setup)
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:
@@ -180,7 +179,7 @@ class _Curve:
         self.directory, self.signals, self.slab = directory, signals, sliding.setup.slab
         job = sliding.setup.job
         self.shows, self.others_file = shows, others_file
-        self.watch, self.failures = sanity.ContactWatch(job, Timeline.of(job)), 0
+        self.watch, self.failures = sanity.ContactWatch(job.numerics.strict, Timeline.of(job)), 0
 
     def go(self) -> int:
         """Solve what lacks; collective. Returns the exit code."""

@@ -23,7 +23,7 @@ def test_no_job_of_ours_is_told(path: Path) -> None:
     job = load_cases(path)[-1].job
     assert job.warnings == ()
     if sanity.is_quickly_made(job):
-        assert sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []
+        assert sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []
 
 
 def sound(dice: random.Random, directory: Path) -> Job:
@@ -79,5 +79,5 @@ def test_no_sound_scene_is_told(tmp_path: Path) -> None:
     for number in range(50):
         job = sound(dice, tmp_path)
         assert job.warnings == (), (number, job.resolved())
-        assert sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == [], job.resolved()
+        assert sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == [], job.resolved()
         assert run(job) == [], (number, job.resolved())

@@ -64,7 +64,6 @@ PRESS = {"pressure": 1e4}
             job_of(ROUGH, [{**PRESS, "velocity": 1e-9, "duration": 1.0, "time_step": 0.1}], material=ZENER),
             ["all more than 100 times slower than the branches", "long-term modulus"],
         ),
-        (job_of(WAVE, [{**PRESS, "duration": 5e8, "time_step": 1e-3}]), ["5e+11 steps", "years", "time_step"]),
         (
             job_of(WAVE, [{**PRESS, "duration": 1.0, "time_step": 1e-7}], output={"fields": ["gap"]}),
             ["1e+07 instants need 328 GB", "output.every"],
@@ -119,7 +118,7 @@ def test_a_measured_road_is_looked_at_before_it_runs(tmp_path: Path) -> None:
     road = {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "m", "size": [1e-3, 1e-3]}
     job = job_of(road, [{"pressure": 1e4}], grid={"points": 64, "size": 1e-3})
     assert sanity.is_quickly_made(job)
-    (text,) = sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, 64, 64)))
+    (text,) = sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, 64, 64)))
     assert "unit: um in a topography" in text
 
 
@@ -191,10 +190,12 @@ def test_every_rank_says_the_same(comm: MPI.Intracomm, communicators: list[MPI.I
         comm.Barrier()
         shape = {"shape": "file", "path": str(shared_path / "road.npy")}
         job = job_of(shape, [PRESS], grid={"points": [30, 48], "size": 1e-3})
-        (alone,) = sanity.of_surface(scene.set_up(job, Slab(MPI.COMM_SELF, 30, 48)))
+        (alone,) = sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, 30, 48)))
         assert words in alone
         for group in communicators:
-            assert group.allgather(sanity.of_surface(scene.set_up(job, Slab(group, 30, 48)))) == [[alone]] * group.size
+            assert (
+                group.allgather(sanity.check_heights(scene.set_up(job, Slab(group, 30, 48)))) == [[alone]] * group.size
+            )
         comm.Barrier()
 
 
@@ -234,6 +235,6 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
         sanity.refuse_impossible(large, Timeline.of(large))
     monkeypatch.setenv("SLURM_JOB_NUM_NODES", "64")
     sanity.refuse_impossible(large, Timeline.of(large))
-    long = job_of(WAVE, [{**PRESS, "duration": 5e8, "time_step": 1e-3}], output={"fields": ["gap"], "every": 64})
-    with pytest.raises(InputError, match=r"7\.812e\+09 instants of fields .* use every: 500000 or more"):
+    long = job_of(WAVE, [{**PRESS, "duration": 9e4, "time_step": 1e-3}], output={"fields": ["gap"], "every": 64})
+    with pytest.raises(InputError, match=r"1\.406e\+06 instants of fields .* use every: 91 or more"):
         sanity.refuse_impossible(long, Timeline.of(long))
