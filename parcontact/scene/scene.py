@@ -168,21 +168,23 @@ def build_on(setup: Setup) -> Scene:
     return scene
 
 
-def solver_on(setup: Setup, slab: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
+def solver_on(
+    setup: Setup, slab: Slab, tolerance: float, operator_type: type[np.floating] | None = None
+) -> tuple[ContactSolver, Operators]:
     """A solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
 
     Their transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give
     other last digits.
     """
-    return _solver(replace(setup, slab=slab, fft=FFT(slab, measured=False)), tolerance, setup.choices.operator_type)
+    on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
+    return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
 
 
 def solver_in_double(setup: Setup) -> Callable[[], tuple[ContactSolver, Operators]] | None:
     """What makes a solver with an operator in double precision, for a retry; None where that of the scene is."""
     if not setup.choices.single_operator.on:
         return None
-    double = replace(setup, fft=FFT(setup.slab, measured=False))
-    return partial(_solver, double, setup.choices.numerics.tolerance, np.float64)
+    return partial(solver_on, setup, setup.slab, setup.choices.numerics.tolerance, np.float64)
 
 
 def facts(scene: Scene) -> list[str]:
