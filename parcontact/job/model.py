@@ -127,11 +127,6 @@ class Job(Part):
         Rule(("history", "steady"), _some_history),
         Rule(("history", "initial"), _some_load),
         Rule(("initial", "material"), _steady_at_rest),
-        Rule(("grid",), limits.of_grid),
-        Rule(("grid", "surface"), limits.of_surface),
-        Rule(("material",), limits.of_material),
-        Rule(("grid", "material", "history"), limits.of_loads),
-        Rule(("grid", "material", "initial", "steady"), limits.of_states),
         Rule(("grid", "material", "history", "initial", "steady"), limits.of_hardness),
         Rule(("grid", "history"), limits.of_steps),
     )

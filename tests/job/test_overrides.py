@@ -214,7 +214,7 @@ def test_a_mistake_in_an_included_file_that_says_material_is_found_there() -> No
         ("[1, 2]", "m.yaml:1:1: must be one mapping with the keys of a material"),
         ("", "m.yaml:1:1: must be one mapping with the keys of a material"),
         ("{include: n, model: elastic, shear_modulus: 1}", ("m.yaml:1:2: material.include is not a key of model "
-         "elastic; there are model, poisson, shear_modulus")),
+         "elastic; there are model, poisson, shear_modulus, hardness")),
         ("{shear_modulus: 1}", "m.yaml:1:1: material.model is missing; it must be elastic | zener | dma"),
     ],
 )  # fmt: skip

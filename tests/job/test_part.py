@@ -90,7 +90,7 @@ MATERIALS = {
     "material: {model: Prony}": "3:19: material.model must be elastic | zener | dma, got 'Prony'; did you mean zener?",
     "material: {model: elastic}": ("3:11: material.shear_modulus is missing; it must be a positive shear modulus [Pa]"),
     "material: {model: elastic, shear_modulus: 1, branches: []}": (
-        "3:46: material.branches is not a key of model elastic; there are model, poisson, shear_modulus"
+        "3:46: material.branches is not a key of model elastic; there are model, poisson, shear_modulus, hardness"
     ),
     "material: {model: elastic, shear_modulus: 1, poisson: -1}": (
         "3:55: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got -1"

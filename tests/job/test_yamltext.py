@@ -141,22 +141,12 @@ def test_a_long_override_is_shortened(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (SMALL.replace("shear_modulus: 1e6", "shear_modulus: 1e300"), "material.shear_modulus leads to a shear modul"),
-        (SMALL.replace("shear_modulus: 1e6", "shear_modulus: 5e-324"), "material.shear_modulus leads to a shear modul"),
-        (with_material("{model: zener, modulus_inf: 1, branches: [{modulus: 1e200, relaxation_time: 1}]}"),
-         "material leads to a shear modulus of 1e+200 Pa"),
-        (SMALL.replace("size: 1e-3", "size: 1e308"), "grid.size leads to a cell of 1.56e+306 m, too large"),
-        (SMALL.replace("size: 1e-3", "size: [1e-3, 1e-300]"), "grid.size leads to a cell of 1.56e-302 m, too small"),
-        (SMALL.replace("amplitude: 1e-6", "amplitude: 1e300"), "surface.amplitude leads to heights of 1e+300 m"),
-        (with_surface("{shape: sphere, radius: 1e-300}"), "surface.radius leads to heights of 1e+294 m"),
-        (with_stage("{pressure: 1e300}"), "history.0.pressure leads to a mean pressure"),
-        (with_stage("{force: 1e308}"), "history.0.force leads to a mean pressure"),
-        (with_stage("{approach: 1e308}"), "history.0.approach leads to an approach of 1e+308 m"),
-        (with_stage("{pressure: 1, velocity: 1e300, duration: 1, time_step: 1}"), "history.0.velocity leads to a"),
-        (with_stage("{pressure: 1, duration: 1e300, time_step: 1e-300}"), "history.0.time_step leads to steps without"),
+        (SMALL.replace("shear_modulus: 1e6", "shear_modulus: 1e300"), "material.shear_modulus must be zero, or from 1e"),
+        (SMALL.replace("size: 1e-3", "size: [1e-3, 1e-300]"), "grid.size.1 must be zero, or from 1e-40 to"),
+        (SMALL.replace("amplitude: 1e-6", "amplitude: 1e300"), "surface.amplitude must be zero, or from 1e-40"),
+        (with_stage("{pressure: 1e300}"), "history.0.pressure must be zero, or from 1e-40 to 1e+40"),
         (with_stage("{pressure: 1, duration: 1e30, time_step: 1}"), "history.0.time_step leads to 1e+30 steps; a hist"),
-        (SMALL + "steady: {velocities: [1], pressures: [5e-324]}\n", "steady.pressures leads to a mean pressure"),
-        (SMALL + "initial: {state: steady, pressure: 5e-324}\n", "initial.pressure leads to a mean pressure"),
+        (SMALL + "steady: {velocities: [1], pressures: [5e-324]}\n", "steady.pressures.0 must be zero, or from 1e-40"),
     ],
 )  # fmt: skip
 def test_values_that_overflow_later(tmp_path: Path, text: str, sentence: str) -> None:

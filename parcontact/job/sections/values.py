@@ -13,6 +13,7 @@ from ..text.fault import Fault, quote, refuse, shorten
 
 FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
+SMALLEST, LARGEST = 1e-40, 1e40  # accuracy: of numbers, so that double precision holds what follows from them
 MOST_SEED = 2**128 - 1
 LONGEST_NUMBER = 400  # characters of a number that is given as a text
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
@@ -92,11 +93,18 @@ def log_range(text: str) -> tuple[float, ...]:
     return (*(a * (b / a) ** (i / (n - 1)) for i in range(n - 1)), b)
 
 
-NUMBER = BeforeValidator(_number)
+def _bounded(value: float) -> float:
+    """Refuse what would overflow in a run: squares of slopes and strains, quotients of lengths."""
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        refuse(Fault(f"must be zero, or from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
+    return value
+
+
+NUMBER, BOUNDED = BeforeValidator(_number), AfterValidator(_bounded)
 Number = Annotated[float, Field(strict=True), NUMBER]
-Real = Annotated[float, Field(strict=True, allow_inf_nan=False), NUMBER]
-Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False), NUMBER]
-NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False), NUMBER]
+Real = Annotated[float, Field(strict=True, allow_inf_nan=False), NUMBER, BOUNDED]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False), NUMBER, BOUNDED]
+NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False), NUMBER, BOUNDED]
 Fraction = Annotated[float, Field(strict=True, gt=0, lt=1), NUMBER]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(_countable)]
 Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(_countable)]
