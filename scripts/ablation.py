@@ -24,7 +24,7 @@ from mpi4py import MPI
 from parcontact import scene
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 from parcontact.storage.fields import FieldsFile
 from parcontact.storage.provenance import Link, Provenance

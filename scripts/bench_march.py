@@ -13,7 +13,6 @@ from bench_scale import WORLD
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact.march.rest import steps_to_make
 from parcontact.parallel.fft import transform_name
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab, deal
@@ -34,7 +33,7 @@ def march(points: int, rounds: int) -> Iterator[Line]:
     job = jobs.load(JOB, changes)
     slab = Slab(WORLD, points, points)
     run = start.first(job, slab)
-    steps = steps_to_make(run, run.timeline())
+    steps = run.steps()
     for step in steps:
         run.advance(step)
         if step.number > run.timeline().spans[0].last:

@@ -19,8 +19,7 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.compiled import loop
-from parcontact.march.rest import steps_to_make
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 
@@ -85,7 +84,7 @@ class Slide:
 
     def __init__(self, points: int, comm: MPI.Intracomm) -> None:
         self.march = March(scene.build(sliding_job(points, ENDLESS), Slab(comm, points, points)))
-        self._steps = steps_to_make(self.march, self.march.timeline())
+        self._steps = self.march.steps()
 
     def step(self) -> None:
         """Collective."""

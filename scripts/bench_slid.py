@@ -6,8 +6,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Slab
 from parcontact.storage.row import Row
 

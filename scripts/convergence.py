@@ -14,8 +14,8 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import job, scene
+from parcontact.march.loop import March
 from parcontact.march.loop import run as run_march
-from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.theory import hertz
 

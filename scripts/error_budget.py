@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from parcontact import job as jobs
 from parcontact import scene
 from parcontact.march import loop
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import Parts
 from parcontact.storage.row import Row

@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from parcontact import job, scene
 from parcontact.history.timeline import Timeline
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, ZenerBody
 from parcontact.storage.row import Row

@@ -42,7 +42,7 @@ from parcontact import scene
 from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job.text import yamltext
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 from parcontact.scene import sanity
 

@@ -20,8 +20,8 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
+from parcontact.march.loop import March
 from parcontact.march.loop import run as run_march
-from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.convolution import Convolution
 from parcontact.solve import kernels

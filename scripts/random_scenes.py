@@ -36,7 +36,6 @@ from robustness.trial import Trial, trial
 
 from parcontact.errors import RunError
 from parcontact.job import Numerics
-from parcontact.march.rest import steps_to_make
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start
 
@@ -104,7 +103,7 @@ def areas(made: Sketch, directory: Path, precision: str) -> tuple[Map, bool]:
     march = start.first(planned, Slab(MPI.COMM_SELF, *planned.grid.points))
     found = []
     try:
-        for step in steps_to_make(march, march.timeline()):
+        for step in march.steps():
             found.append(march.advance(step).measures.contact_area)
     except RunError:
         return np.array(found), True

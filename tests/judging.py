@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from parcontact import scene
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 from parcontact.scene import sanity
 

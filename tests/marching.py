@@ -12,8 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.job import Job, load
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start
 from parcontact.storage.row import Row

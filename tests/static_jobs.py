@@ -7,8 +7,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact import job, scene
+from parcontact.march.loop import March
 from parcontact.march.loop import run as run_march
-from parcontact.march.step import March
 from parcontact.parallel.slab import Slab
 from parcontact.storage.row import Row
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from marching import SLS, begun
 
-from parcontact.history.chosen import most_cells
+from parcontact.history.chosen import MadeStep, most_cells
 from parcontact.history.timeline import Step
 from parcontact.job import Grid
 from parcontact.job.sections.geometry import Flat, HeightFile, Rough, Sphere, Wave
 from parcontact.march.choosing import MOST_GROWTH, REJECTED, SAFETY, StepChooser
-from parcontact.march.step import March
+from parcontact.march.loop import March
 
 Json = dict[str, Any]
 CELL = 1e-3 / 32
@@ -31,17 +31,25 @@ def march_of(*history: Json, **numerics: Any) -> March:
 def attempts(march: March, error: Errors, most: int = 1000) -> list[list[Step]]:
     """The tries of each step that is chosen, the one that is made last, for the `error(number, step)` of each; at most
     so many steps."""
-    assert march.chosen is not None
-    chooser, found, number = StepChooser(march.scene, march.chosen, march.starts), list[list[Step]](), 0
+    chosen, found, number = march.state.chosen, list[list[Step]](), 0
+    assert chosen is not None
+    chooser = StepChooser(march.scene, chosen, march.state.starts.prefers_moved)
     while (number := number + 1) <= len(march.timeline()) and len(found) < most:
         span = march.timeline().span(number)
         if span.place(number) == 0:
             continue
         tries = [chooser.propose(span, number, is_relaxed=False)]
-        while shorter := chooser.judge(span, tries[-1], error(number, tries[-1])):
-            tries.append(shorter)
+        while isinstance(verdict := judged(tries[-1], error(number, tries[-1])), Step):
+            tries.append(verdict)
+        chosen.add(verdict)
         found.append(tries)
     return found
+
+
+def judged(step: Step, error: float) -> Step | MadeStep:
+    """What its judge says of a step."""
+    assert step.judge is not None
+    return step.judge(error)
 
 
 def made(march: March, error: Errors) -> list[Step]:

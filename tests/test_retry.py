@@ -16,8 +16,7 @@ from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, 
 from parcontact.errors import RunError
 from parcontact.history.timeline import Timeline
 from parcontact.march.failure import StepError
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 from parcontact.physics.convolution import Convolution
 from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver

@@ -1,20 +1,30 @@
 """From which pressure the solve of a step starts."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from marching import SLS, begun, marched
 
-from parcontact.history.timeline import Timeline
+from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
-from parcontact.march.rest import steps_to_make
-from parcontact.march.starts import FORGET, NAME
+from parcontact.march.loop import March
+from parcontact.march.starts import FORGET, NAME, StartStatistics, make_start
 from parcontact.parallel.slab import Array
 
 CELL = 1e-3 / 32
 WAVES = {"shape": "wave", "amplitude": 2e-6, "waves": [2, 1]}
 SCENE = {"grid": {"points": 32, "size": 1e-3}, "surface": WAVES, "material": SLS}
+
+
+def start_of(march: March, step: Step) -> Array:
+    """The start of the next step for a modulus of 2."""
+    state = march.state
+    make_start(march.scene, state.pasts, state.starts, step, 2.0, state.spare)
+    return state.spare.copy()
+
+
 SLIDE = {"pressure": 1e4, "velocity": 0.1, "distance": 6 * CELL}
 
 
@@ -31,11 +41,11 @@ def test_half_cells_start_from_a_whole_cell_earlier() -> None:
     assert max(calls(0.5)[1:]) <= max(calls(1.0))
     halves = {"pressure": 1e4, "velocity": [0.1, 0.1], "distance": 3 * 2**0.5 * CELL, "time_step": 5 * CELL}
     march = begun(Job.model_validate({**SCENE, "history": [halves]}))
-    for step in itertools.islice(steps_to_make(march, march.timeline()), 5):
+    for step in itertools.islice(march.steps(), 5):
         if step.number > 3:
-            start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
-            assert march.state.earlier is not None
-            moved = np.roll(march.state.earlier, (1, 1), (0, 1)) * (march.state.alpha_old / 2.0)
+            start = start_of(march, step)
+            earlier = march.state.pasts[1]
+            moved = np.roll(earlier.pressure, (1, 1), (0, 1)) * (earlier.alpha / 2.0)
             np.testing.assert_array_equal(start, moved)
         march.advance(step)
 
@@ -49,14 +59,14 @@ def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> No
     given = Timeline.of(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / parts}]}))
     pressures = list[Array]()
     for step in itertools.islice(given, 8):
-        start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
+        start = start_of(march, step)
         if step.number > ago + 2:
             past = march.state.pasts[ago - 1]
             np.testing.assert_array_equal(past.pressure, pressures[-ago])
             np.testing.assert_array_equal(start, np.roll(pressures[-ago], 1, 1) * (past.alpha / 2.0))
         march.advance(step)
         pressures.append(march.state.pressure.copy())
-        march.starts._moved = 0.0  # it has learnt nothing
+        march.state = replace(march.state, starts=StartStatistics())  # it has learnt nothing
 
 
 def test_the_last_two_pressures_are_the_start_where_that_took_fewer_iterations() -> None:
@@ -66,8 +76,8 @@ def test_the_last_two_pressures_are_the_start_where_that_took_fewer_iterations()
     march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
     given = Timeline.of(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / 3}]}))
     for step in itertools.islice(given, 7):
-        march.starts.restore({NAME: np.array([3.0, 2.0, 5.0])})
-        start = march.starts.make(step, march.state, 2.0, march._next_pressure).copy()
+        march.state = replace(march.state, starts=StartStatistics(3.0, 2.0, 5.0))
+        start = start_of(march, step)
         if step.number > 5:
             last, earlier = march.state.pasts[:2]
             line = (1.0 + step.growth) * last.alpha * last.pressure - step.growth * earlier.alpha * earlier.pressure
@@ -78,26 +88,24 @@ def test_the_last_two_pressures_are_the_start_where_that_took_fewer_iterations()
 def test_kinds_of_starts_are_compared() -> None:
     """The last two pressures are the start once a pressure of whole cells ago has taken more iterations; after some
     steps, the other one is tried again, and one that needs next to none is kept."""
-    chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
-    starts = begun(Job.model_validate({**SCENE, "history": [chosen]})).starts
+    starts = StartStatistics()
 
     def kinds(moved: int, extrapolated: int) -> str:
+        nonlocal starts
         found = ""
         for _ in range(40):
-            starts._has_choice, starts._is_moved = True, starts._moves
-            found += "em"[starts._moves]
-            starts.learn(moved if starts._is_moved else extrapolated)
+            found += "em"[starts.moves]
+            starts = starts.after(starts.moves, moved if starts.moves else extrapolated)
         return found
 
     assert kinds(1, 3) == 40 * "m"
     first = kinds(8, 2)
     assert first.startswith("m" + 16 * "e" + "m" + 16 * "e" + "m")
-    starts._has_choice = False
     for _ in range(FORGET):
-        starts.learn(9)
+        starts = starts.after(None, 9)
     assert np.asarray(starts.entries()[NAME].value).tolist()[:2] == [0.0, 1.0]
-    preferred = []
-    for numbers in ([3.0, 2.0, 5.0], [3.0, 4.0, 5.0]):
-        starts.restore({NAME: np.array(numbers)})
-        preferred.append(starts.prefers_moved)
+    preferred = [
+        StartStatistics.restored({NAME: np.array(numbers)}).prefers_moved
+        for numbers in ([3.0, 2.0, 5.0], [3.0, 4.0, 5.0])
+    ]
     assert preferred == [False, True]

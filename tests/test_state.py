@@ -10,8 +10,7 @@ from marching import begun, marched
 from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain
 from parcontact.march.failure import StepError
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
 from parcontact.storage.provenance import Link, Provenance

@@ -12,10 +12,9 @@ from restarting import ELASTIC, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, rows, s
 
 from parcontact.history.timeline import Timeline
 from parcontact.march import rest
-from parcontact.march.loop import run
-from parcontact.march.rest import SHARE, remaining, steps_to_make
-from parcontact.march.step import March
-from parcontact.physics.body import ZenerBody
+from parcontact.march.loop import March, run
+from parcontact.march.rest import SHARE, remaining
+from parcontact.physics.body import ZenerBody, surface_of
 from parcontact.storage.row import Row
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
@@ -127,9 +126,10 @@ def test_what_remains_is_bounded(boundary: str, surface: Any, material: Any, con
         body = now.scene.material
         assert isinstance(body, ZenerBody)
         if now.row.time > 1e-3:
-            scale = min(float(np.abs(body.u).max()), height) if now.state.pressure.any() else height
-            predicted.append(scale * remaining(now, body, 0.051 - now.row.time))
-            seen.append(body.u.copy())
+            u = surface_of(now.state.body)
+            scale = min(float(np.abs(u).max()), height) if now.state.pressure.any() else height
+            predicted.append(scale * remaining(now.scene, now.state, body, 0.051 - now.row.time))
+            seen.append(u.copy())
 
     run(march, [look], Timeline.of(march.scene.job))
     largest = np.abs(seen[-1]).max()
@@ -223,7 +223,7 @@ def test_steps_are_decided_on_one_by_one() -> None:
     """When the last one was made. One that stands for others takes all their time; nothing is extrapolated to it."""
     march = begun(job(DWELL, material=ELASTIC))
     timeline = Timeline.of(march.scene.job)
-    steps = steps_to_make(march, timeline)
+    steps = march.steps(timeline)
     first = next(steps)
     assert first == timeline[1]
     march.advance(first)
@@ -249,9 +249,9 @@ def test_what_remains_is_the_same_whether_a_checkpoint_was_written() -> None:
     march, _ = marched(job({**DWELL, "duration": 3e-3, "time_step": 1e-3}))
     body = march.scene.material
     assert isinstance(body, ZenerBody)
-    before = remaining(march, body, 1e-3)
+    before = remaining(march.scene, march.state, body, 1e-3)
     march.entries()
-    assert remaining(march, body, 1e-3) == before
+    assert remaining(march.scene, march.state, body, 1e-3) == before
     assert begun_again(march) == before
 
 
@@ -261,6 +261,8 @@ def begun_again(march: March) -> float:
     assert isinstance(march.scene.material, ZenerBody)
     assert isinstance(other.scene.material, ZenerBody)
     units = march.scene.units
-    other.scene.material.restore({name: np.asarray(e.value) for name, e in march.scene.material.entries(units).items()})
+    entries = march.scene.material.entries(march.state.body, units)
+    for name, entry in other.scene.material.entries(other.state.body, units).items():
+        np.asarray(entry.value)[...] = entries[name].value
     other.state.pressure[...] = march.state.pressure
-    return remaining(other, other.scene.material, 1e-3)
+    return remaining(other.scene, other.state, other.scene.material, 1e-3)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from marching import begun, column, example, marched
 
+from parcontact.history.chosen import MadeStep
 from parcontact.history.timeline import Step
 from parcontact.job import Job
 from parcontact.march.choosing import LEAST_WAY, cells_per_step
-from parcontact.march.rest import steps_to_make
 
 POINTS = 32
 CELL = 1e-3 / POINTS
@@ -33,18 +33,17 @@ def test_a_step_that_is_made_anew_leaves_nothing() -> None:
     tried, told = begun(sudden), begun(sudden)
     made: list[Step] = []
     rejected = 0
-    for step in itertools.islice(steps_to_make(tried, tried.timeline()), 12):
-        attempts, judge_of_run = [step], step.judge
+    for step in itertools.islice(tried.steps(), 12):
+        attempts = [step]
 
-        def judge(one: Step, error: float) -> Step | None:
-            assert judge_of_run is not None  # noqa: B023  # it is called in this turn only
-            shorter = judge_of_run(one, error)  # noqa: B023
-            if shorter is None:
-                return None
-            attempts.append(shorter)  # noqa: B023
-            return shorter._replace(judge=judge)
+        def judge(error: float) -> Step | MadeStep:
+            verdict = attempts[-1].judge(error)  # type: ignore[misc]  # noqa: B023  # it is called in this turn only
+            if not isinstance(verdict, Step):
+                return verdict
+            attempts.append(verdict)  # noqa: B023
+            return verdict._replace(judge=judge)
 
-        tried.advance(step._replace(judge=judge) if judge_of_run else step)
+        tried.advance(step._replace(judge=judge) if step.judge else step)
         made.append(attempts[-1]._replace(judge=None))
         rejected += len(attempts) - 1
     for step in made:
@@ -59,8 +58,8 @@ def test_steps_double_at_most() -> None:
     """After a jump, until they are whole cells: but for the part that leads to a multiple of a new length."""
     for accuracy in (3e-3, 1e-2, 2e-2):
         march, _ = marched(data(accuracy))
-        assert march.chosen is not None
-        ends = np.array([0.0, *march.chosen.ends[0]]) / CELL
+        assert march.state.chosen is not None
+        ends = np.array([0.0, *march.state.chosen.ends[0]]) / CELL
         steps = np.diff(ends)
         assert (steps[1:] <= (1.0 + LEAST_WAY) * 2.0 * steps[:-1]).all()
         for end in range(1, 7):

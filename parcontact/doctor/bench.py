@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..history.timeline import Step, Timeline
 from ..job import Job
-from ..march.step import March
+from ..march.loop import March
 from ..parallel.slab import Array, Slab
 from ..steady_sliding import start
 from ..storage.row import Row

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..job import Job
 from ..job.checks.limits import one_cell
@@ -129,6 +129,15 @@ class ChosenEnds:
         return self.elapsed(index) / self.stops[0]
 
 
+class MadeStep(NamedTuple):
+    """A step that a stage has chosen, and whose error will do: its stage, its end [s after the start of the stage] and
+    how long the next one is meant to be [s]."""
+
+    stage: int
+    end: float
+    next: float
+
+
 @dataclass
 class ChosenSteps:
     """The steps that the stages of a history have chosen so far: their `ends` [s after the start of their stage] by the
@@ -149,6 +158,11 @@ class ChosenSteps:
                 found.ends[int(stage)] = list(islice(ends, int(count)))
             found.next = float(saved["clock/next"])
         return found
+
+    def add(self, step: "MadeStep") -> None:
+        """Note a step that has been made."""
+        self.ends.setdefault(step.stage, []).append(step.end)
+        self.next = step.next
 
     @property
     def count(self) -> int:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ..job import Job
 from ..job.sections.settings import Grid
 from ..job.sections.stages import GeometricStep, Ramp, Stage
-from .chosen import ChosenEnds, ChosenSteps, reached
+from .chosen import ChosenEnds, ChosenSteps, MadeStep, reached
 from .given import GivenEnds, divide
 
 ROUNDINGS = 4.0  # accuracy: of an instant, between two that are the same
@@ -25,7 +25,7 @@ class Step(NamedTuple):
     `dt` = 0 is a jump, at an instant, of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is
     dt over the dt of the step before, 0 where that was a jump: how far to extrapolate what changes smoothly. `passed`
     is the number of steps that this one stands for besides its own. `judge`, of a step that may be too long, is told
-    the error of the step when it has been tried: it returns the shorter one to make instead, or None.
+    the error of the step when it has been tried: it returns the shorter one to make instead, or how it is noted.
     """
 
     number: int
@@ -38,7 +38,7 @@ class Step(NamedTuple):
     load: float
     growth: float
     passed: int = 0
-    judge: Callable[["Step", float], "Step | None"] | None = None
+    judge: Callable[[float], "Step | MadeStep"] | None = None
 
     @property
     def jump(self) -> bool:

@@ -20,14 +20,13 @@ steps of two fifths, too (`starts`).
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
-from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, reached
+from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step
 from ..job.checks.limits import one_cell
-from ..physics.body import ZenerBody
 from ..physics.time_error import TIME_ORDER
 from ..scene import Scene
-from .starts import Starts
 
 TIME_SHARE = 0.8  # of numerics.accuracy, for the error of a step
 SAFETY = 0.98
@@ -54,61 +53,54 @@ def cells_per_step(most: float, whole_soon: bool = True) -> float:
     return 1.0 / (math.ceil(count / unit) * unit)
 
 
-@dataclass
+@dataclass(frozen=True)
 class StepChooser:
-    """Proposes the steps of stages that choose their own, and judges them when they have been tried.
+    """Proposes the next step of a stage that chooses its own, and judges it when it has been tried.
 
-    `allowed` is the error of a step; `order` p; `starts` knows whether pressures of whole cells ago are good ones;
-    `shortest` is the shortest relaxation time that is resolved [s].
+    `chosen` are the steps made so far; `at_whole_cells` says whether pressures of whole cells ago are good starts.
     """
 
     scene: Scene
     chosen: ChosenSteps
-    starts: Starts
-
-    def __post_init__(self) -> None:
-        numerics, material = self.scene.job.numerics, self.scene.material
-        self.allowed = TIME_SHARE * numerics.accuracy
-        self.order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
-        self.shortest = math.inf
-        if isinstance(material, ZenerBody) and material.kept:
-            self.shortest = float(material.prony.relaxation_times[material.kept].min())
-        self._rejected = False
+    at_whole_cells: bool
 
     def propose(self, span: Span, number: int, is_relaxed: bool) -> Step:
-        """The next step of a stage; it has this number. Where the body is relaxed, it ends the stage."""
-        if number == span.before + span.jumps + 1:
-            self.chosen.next = self._first(span)
+        """Return the next step of a stage; it has this number. Where the body is relaxed, it ends the stage."""
+        wanted = self.chosen.next
         if is_relaxed:
-            self.chosen.next = self._bounds(span).most
-        self._rejected = False
-        return self._step(span, number, self.chosen.next)
+            wanted = self._bounds(span).most
+        elif number == span.before + span.jumps + 1:
+            wanted = self._first(span)
+        return self._step(span, number, wanted)
 
-    def judge(self, span: Span, step: Step, error: float) -> Step | None:
-        """The shorter step to make instead of one with such an error, or None: then it counts as made."""
-        ratio = error / self.allowed
-        wanted = SAFETY * ratio ** (-1.0 / self.order) if ratio > 0.0 else MOST_GROWTH
+    def judge(self, span: Span, step: Step, end: float, rejected: bool, error: float) -> Step | MadeStep:
+        """Return the shorter step to make instead of one with such an error, or how the step is noted as made.
+
+        It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before.
+        """
+        numerics = self.scene.job.numerics
+        order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
+        ratio = error / (TIME_SHARE * numerics.accuracy)
+        wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
         if ratio > REJECTED:
-            share = max((REJECTED / ratio) ** (1.0 / self.order), MOST_SHRINK)
+            share = max((REJECTED / ratio) ** (1.0 / order), MOST_SHRINK)
             if shorter := self._shorter(span, step, share):
-                self._rejected = True
                 return shorter
-        most = 1.0 if self._rejected else MOST_GROWTH
-        self.chosen.next = self._level(span, step.dt * min(max(wanted, 1.0), most))
-        self.chosen.ends.setdefault(span.index, []).append(self._end)
-        return None
+            rejected = True
+        most = 1.0 if rejected else MOST_GROWTH
+        return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
 
     def _shorter(self, span: Span, step: Step, share: float) -> Step | None:
-        """A step that is at most that share of one, None if that one is the shortest."""
+        """Return a step that is at most that share of one, None if that one is the shortest."""
         least, dt = self._bounds(span).least, share * step.dt
         while True:
-            self.chosen.next = self._level(span, dt)
-            shorter = self._step(span, step.number, self.chosen.next)
+            wanted = self._level(span, dt)
+            shorter = self._step(span, step.number, wanted, rejected=True)
             if shorter.dt < step.dt * (1.0 - SAME_LEVEL):
                 return shorter
-            if self.chosen.next <= least:
+            if wanted <= least:
                 return None
-            dt = 0.5 * self.chosen.next
+            dt = 0.5 * wanted
 
     # -- parts --------------------------------------------------------------------------------------------------------
 
@@ -123,7 +115,7 @@ class StepChooser:
             return min(max(dt, limits.least), limits.most)
         if span.stage.speed:
             cell = one_cell(span.stage, self.scene.job.grid)
-            return min(cell * cells_per_step(dt / cell, self.starts.prefers_moved), limits.most)
+            return min(cell * cells_per_step(dt / cell, self.at_whole_cells), limits.most)
         power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
         return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
 
@@ -134,7 +126,7 @@ class StepChooser:
             return self._level(span, self.chosen.next)
         if span.stage.speed:
             return min(limits.most, one_cell(span.stage, self.scene.job.grid))
-        return self._level(span, RELAXING * self.shortest)
+        return self._level(span, RELAXING * self.scene.material.shortest_time)
 
     def _goes_on(self, span: Span) -> bool:
         """Whether nothing has changed since the stage before, which chose its steps too."""
@@ -143,8 +135,8 @@ class StepChooser:
         before = self.scene.job.history[span.index - 1]
         return before.chooses and before.velocity == span.stage.velocity
 
-    def _step(self, span: Span, number: int, dt: float) -> Step:
-        """The step that is about so long: it ends at a multiple of its length, or with the stage."""
+    def _step(self, span: Span, number: int, dt: float, rejected: bool = False) -> Step:
+        """Return the step that is about so long: it ends at a multiple of its length, or with the stage."""
         ends = span.ends
         assert isinstance(ends, ChosenEnds)
         now = ends.made[-1] if ends.made else 0.0
@@ -154,10 +146,8 @@ class StepChooser:
         elif STRETCH * dt < stop - now < 2.0 * dt:
             dt = 0.5 * (stop - now)
         if stop - now <= (STRETCH if not span.stage.speed else 1.0 + SAME_LEVEL) * dt:
-            dt, self._end = stop - now, stop
-        else:
-            self._end = now + dt
-        return self._made(span, number, dt)
+            return self._ending(span, number, stop - now, stop, rejected)
+        return self._ending(span, number, dt, now + dt, rejected)
 
     def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
         """How long until the surface is at a multiple of the way of such a step: LEAST_WAY of it, or longer.
@@ -173,19 +163,19 @@ class StepChooser:
         way = (math.ceil(at / size + LEAST_WAY) * size - at) * cell
         return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
 
-    def _made(self, span: Span, number: int, dt: float) -> Step:
-        stage, seconds = span.stage, span.stage.seconds
-        (x, y), (along_x, along_y) = span.origin, stage.velocity
+    def _ending(self, span: Span, number: int, dt: float, end: float, rejected: bool) -> Step:
+        """Return the step that is so long and ends so long after the start of the stage."""
+        (x, y), (along_x, along_y) = span.origin, span.stage.velocity
         made = self.chosen.ends.get(span.index, [])
         last = made[-1] - (made[-2] if len(made) > 1 else 0.0) if made else 0.0
-        return Step(
+        step = Step(
             number,
             span.index,
-            span.start + self._end,
+            span.start + end,
             dt,
-            (x + along_x * self._end, y + along_y * self._end),
+            (x + along_x * end, y + along_y * end),
             *span.facts,
-            span.load.at(min(self._end / seconds, 1.0)),
+            span.load.at(min(end / span.stage.seconds, 1.0)),
             dt / last if last > 0.0 else 0.0,
-            judge=lambda step, error: self.judge(span, step, error),
         )
+        return step._replace(judge=partial(self.judge, span, step, end, rejected))

@@ -5,7 +5,7 @@ then each is looked at in every few of them only.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Any
 
@@ -13,10 +13,10 @@ import numpy as np
 
 from ..history.timeline import Step
 from ..job import Cylinder, Flat, Rough, Wave
-from ..physics.body import Trial, ZenerBody
+from ..physics.body import BodyMemory, Trial, surface_of
 from ..physics.budget import ErrorBudget, estimate
 from ..physics.embedded import Embedded, Look
-from ..physics.entries import Entry
+from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.seen import Known, Seen
@@ -27,7 +27,7 @@ from ..solve.contact import Contact
 
 PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
 NO_LOOK = Look(0.0, 0.0)
-ALIKE_STEPS = 4  # of one stage and one length, to which one look at the embedded pair applies at most
+ALIKE_STEPS = 4  # of one stage and one length, to which one look at the embedded pair applies at most; tuning
 ALIKE_VIEWS = 5  # the same of the two views of friction; odd, as steps may be quarters of a cell
 
 
@@ -40,124 +40,137 @@ class LastLook:
     so_far: float = 0.0
     seen: tuple[float, ...] = ()
 
-    def stands_for(self, step: Step, most: int) -> bool:
-        """Return whether what it has shown applies to one more step, of so many at most."""
-        return (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < most
+    def once_more(self, step: Step, most: int) -> "LastLook | None":
+        """Return it with one more step for which it stands, of so many at most; None if it does not apply to one."""
+        applies = (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < most
+        return replace(self, so_far=self.so_far + 1.0) if applies else None
 
-    def once_more(self) -> "LastLook":
-        """Return it with one more step for which it stands."""
-        return replace(self, so_far=self.so_far + 1.0)
+    @classmethod
+    def of(cls, step: Step, *seen: float) -> "LastLook":
+        """Return what was seen in a step."""
+        return cls(float(step.stage), step.dt, 1.0, seen)
 
     @property
     def numbers(self) -> list[float]:
-        """As a checkpoint has them."""
+        """What a checkpoint has of it."""
         return [self.stage, self.dt, self.so_far, *self.seen]
 
     @classmethod
-    def of(cls, numbers: list[float]) -> "LastLook":
+    def of_numbers(cls, numbers: list[float]) -> "LastLook":
         """Return the one of a checkpoint."""
         stage, dt, so_far, *seen = numbers
         return cls(stage, dt, so_far, tuple(seen))
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """How wrong a step is: its budget, None where nothing touches, and the error of its length alone, by which steps
-    that are chosen are judged."""
+class Looks:
+    """Memory of the last looks at the embedded pair and at the two views of friction."""
 
-    budget: ErrorBudget | None
-    step: float = 0.0
-
-
-class Errors:
-    """Estimates of the steps of one scene; allocates nothing, remembers the last looks."""
-
-    def __init__(self, scene: Scene) -> None:
-        grid, material, self.slab = scene.job.grid, scene.material, scene.slab
-        exponential = scene.job.numerics.integrator == "exponential"
-        prony = material.prony if isinstance(material, ZenerBody) else None
-        self.known = known_of(scene.setup, scene.folded.bound, exponential, prony)
-        self._slope_unit = scene.units.height / scene.units.length
-        self._pressure_unit = scene.units.pressure
-        self._cell = grid.dx, grid.dy
-        cell = grid.dx / scene.units.length
-        self._pair = Embedded(self.slab, material, cell) if isinstance(material, ZenerBody) else None
-        self._material, self._height, self._cyclic = material, scene.units.height, grid.boundary == "periodic"
-        self._last = self._before = (LastLook(), LastLook())
-
-    def of(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Estimate:
-        """That of a step just committed; collective."""
-        self._before = self._last
-        look, apart = self._look(step, trial, contact, measures), self._views_apart(step, contact, measures)
-        if measures.contact_area == 0.0:
-            if step.judge is not None and self._pair is not None:
-                look = self._pair.look_without_load(step.dt, trial)
-            still = Seen(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
-            return Estimate(None, time_error(self.known, still, self.slab.points))
-        seen = Seen(
-            contact.certificate.complementarity,
-            look.difference,
-            look.order,
-            look.slope * self._slope_unit,
-            measures.friction,
-            measures.contact_area,
-            measures.contact_area_corrected,
-            math.hypot(step.velocity[0] / self._cell[0], step.velocity[1] / self._cell[1]) * step.dt,
-            step.dt,
-            max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
-            look.angle,
-            apart,
-        )
-        points = self.slab.points
-        return Estimate(estimate(self.known, seen, points), time_error(self.known, seen, points))
-
-    def take_back(self) -> None:
-        """Forget the looks at a step that is made anew."""
-        self._last = self._before
+    pair: LastLook = LastLook()
+    views: LastLook = LastLook()
 
     def entries(self) -> dict[str, Entry]:
-        """The last looks, for a checkpoint; none of a body without a memory."""
-        if self._pair is None:
-            return {}
-        return {name: Entry(np.array(last.numbers)) for name, last in zip((PAIR, VIEWS), self._last, strict=True)}
+        """Return the entries of both; a checkpoint may lack them."""
+        looks = {PAIR: self.pair, VIEWS: self.views}
+        return {name: Entry(np.array(look.numbers), optional=True) for name, look in looks.items()}
 
-    def restore(self, numbers: Mapping[str, Any]) -> None:
-        """Go on from the arrays of a checkpoint; one that has no look is followed by a new one."""
-        pair, views = (LastLook.of(numbers[name].tolist()) if name in numbers else LastLook() for name in (PAIR, VIEWS))
-        self._last = pair, views
+    @classmethod
+    def restored(cls, saved: Saved) -> "Looks":
+        """Return the looks of a checkpoint; one that it does not have is followed by a new one."""
+        pair, views = (
+            LastLook.of_numbers(saved[name].tolist()) if name in saved else LastLook() for name in (PAIR, VIEWS)
+        )
+        return cls(pair, views)
 
-    def _look(self, step: Step, trial: Trial, contact: Contact, measures: Measures) -> Look:
-        """What the pair shows of a step, or of the one like it that was looked at last; collective."""
-        last, views = self._last
-        if self._pair is None or measures.contact_area == 0.0:
-            self._last = LastLook(), views
-            return NO_LOOK
-        if last.stands_for(step, ALIKE_STEPS):
-            last = last.once_more()
-        else:
-            load = measures.pressure * self.slab.points / (trial.alpha * self._pressure_unit)
-            look = self._pair.look(step.dt, trial, contact.p, contact.u, load, measures.contact_area)
-            last = LastLook(float(step.stage), step.dt, 1.0, astuple(look))
-        self._last = last, views
-        return Look(*last.seen)
 
-    def _views_apart(self, step: Step, contact: Contact, measures: Measures) -> float:
-        """By how much friction by the slopes of the rigid surface and of the body differ; collective.
+@dataclass(frozen=True)
+class Estimate:
+    """How wrong a step is: its budget, None where nothing touches, and the error of its length alone, by which steps
+    that are chosen are judged; with the looks after it."""
 
-        Of an elastic body the latter is 0.
-        """
-        own = measures.friction - measures.friction_interface
-        if not isinstance(self._material, ZenerBody) or measures.friction == 0.0:
-            return max(own, 0.0)
-        pair, last = self._last
-        if last.stands_for(step, ALIKE_VIEWS):
-            last = last.once_more()
-        else:
-            direction, own = _viscous(step.velocity, measures)
-            other = friction_by_energy(self.slab, contact.p, self._material.u, self._cell, direction, self._cyclic)
-            last = LastLook(float(step.stage), step.dt, 1.0, (abs(other * self._height - own),))
-        self._last = pair, last
-        return last.seen[0]
+    budget: ErrorBudget | None
+    step: float
+    looks: Looks
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A step that has been solved: its contact, what it measures and the memory of the body after it.
+
+    `remark` says what was unusual about it; `moved_start` whether its start was a pressure of whole cells ago, None
+    where there was no choice.
+    """
+
+    step: Step
+    trial: Trial
+    contact: Contact
+    measures: Measures
+    body: BodyMemory
+    remark: str = ""
+    moved_start: bool | None = None
+
+
+def estimate_errors(scene: Scene, looks: Looks, solved: Solved) -> Estimate:
+    """Return how wrong a step is; collective."""
+    step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
+    points, branches, grid = scene.slab.points, scene.material.branched, scene.job.grid
+    prony = None if branches is None else branches.prony
+    known = known_of(scene.setup, scene.folded.bound, scene.job.numerics.integrator == "exponential", prony)
+    looks, look = _look(scene, looks, solved)
+    looks, apart = _compare_views(scene, looks, solved)
+    if measures.contact_area == 0.0:
+        still = Seen(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
+        return Estimate(None, time_error(known, still, points), looks)
+    seen = Seen(
+        certificate.complementarity,
+        look.difference,
+        look.order,
+        look.slope * (scene.units.height / scene.units.length),
+        measures.friction,
+        measures.contact_area,
+        measures.contact_area_corrected,
+        math.hypot(step.velocity[0] / grid.dx, step.velocity[1] / grid.dy) * step.dt,
+        step.dt,
+        max(certificate.members / measures.contact_area - 1.0, 0.0),
+        look.angle,
+        apart,
+    )
+    return Estimate(estimate(known, seen, points), time_error(known, seen, points), looks)
+
+
+def _look(scene: Scene, looks: Looks, solved: Solved) -> tuple[Looks, Look]:
+    """Return what the pair shows of a step, or of the one like it that was looked at last; collective."""
+    step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
+    branches = scene.material.branched
+    if branches is None:
+        return looks, NO_LOOK
+    pair = Embedded(scene.slab, branches, scene.job.grid.dx / scene.units.length)
+    if measures.contact_area == 0.0:
+        free = pair.look_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_LOOK
+        return replace(looks, pair=LastLook()), free
+    last = looks.pair.once_more(step, ALIKE_STEPS)
+    if last is None:
+        load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
+        look = pair.look(step.dt, trial, solved.body, contact.p, contact.u, load, measures.contact_area)
+        last = LastLook.of(step, *astuple(look))
+    return replace(looks, pair=last), Look(*last.seen)
+
+
+def _compare_views(scene: Scene, looks: Looks, solved: Solved) -> tuple[Looks, float]:
+    """Return by how much friction by the slopes of the rigid surface and of the body differ; collective.
+
+    Of an elastic body the latter is 0.
+    """
+    step, measures, grid = solved.step, solved.measures, scene.job.grid
+    if scene.material.branched is None or measures.friction == 0.0:
+        return looks, max(measures.friction - measures.friction_interface, 0.0)
+    last = looks.views.once_more(step, ALIKE_VIEWS)
+    if last is None:
+        direction, own = _viscous(step.velocity, measures)
+        maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.boundary == "periodic"
+        other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
+        last = LastLook.of(step, abs(other * scene.units.height - own))
+    return replace(looks, views=last), last.seen[0]
 
 
 def known_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> Known:

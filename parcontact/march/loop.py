@@ -1,25 +1,124 @@
-"""The loop over the steps of a timeline: after every step, the tasks that a caller has."""
+"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks that a caller has."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
 
-from ..history.timeline import Step
-from .rest import steps_to_make
-from .step import March
+import numpy as np
+
+from ..history.timeline import Step, Timeline
+from ..parallel.slab import Array
+from ..physics.budget import ErrorSums
+from ..physics.entries import Entry
+from ..scene import Scene
+from ..storage.checkpoint import Contents, Facts
+from ..storage.row import Row
+from .rest import next_step
+from .state import State, entries, first_state, restored, save
+from .step import make_step
+
+
+class March:
+    """A scene at an instant; it advances step by step.
+
+    `compare`, if there is one, returns a row with errors that are known better than from the step alone.
+    """
+
+    def __init__(self, scene: Scene, state: State | None = None) -> None:
+        self.scene = scene
+        self.compare: Callable[[Row], Row] = lambda row: row
+        self.state = self._weighed(first_state(scene) if state is None else state)
+
+    @property
+    def row(self) -> Row:
+        """What the last step is recorded as."""
+        return self.state.row
+
+    def timeline(self, until: float = 0.0) -> Timeline:
+        """Return all steps of the history, as `Timeline.of` has them, with those that have been chosen so far."""
+        return Timeline.of(self.scene.job, until, self.state.chosen)
+
+    def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
+        """Yield the steps after the last one made, each decided on when it is asked for; collective.
+
+        A step that stands for several does not pass the first that reaches `until` [s].
+        """
+        timeline = self.timeline() if timeline is None else timeline
+        stop = len(timeline) if until is None else timeline.first_reaching(until)
+        while self.row.step < len(timeline):
+            yield next_step(self.scene, self.state, timeline, stop)
+
+    def advance(self, step: Step) -> Row:
+        """Make the next state; collective. Raises StepError, and stays where it is, when that cannot be."""
+        self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
+        return self.row
+
+    def _weighed(self, state: State, since: Row | None = None) -> State:
+        """Return the state with its errors as they are known best, and added to the sums; a first state begins them."""
+        row = self.compare(state.row)
+        if row.errors is None:
+            return state
+        friction = row.measures.friction if row.distance > 0.0 else 0.0
+        if since is None:
+            return replace(state, row=row, errors=ErrorSums().plus(row.errors, friction, 0.0))
+        seconds, slid = row.time - since.time, row.distance - since.distance
+        return replace(state, row=row, errors=state.errors.plus(row.errors, friction, seconds, slid))
+
+    def compare_with(self, compare: Callable[[Row], Row]) -> None:
+        """Know errors better from now on, those of a first state included."""
+        self.compare = compare
+        if self.row.step == 0:
+            self.state = self._weighed(self.state)
+
+    def restore(self, contents: Contents) -> None:
+        """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
+        self.state = restored(self.scene, self.state, contents)
+
+    def entries(self) -> dict[str, Entry]:
+        """Return everything that is remembered, by its names in a checkpoint; maps are the run's own, not copies."""
+        return entries(self.scene, self.state)
+
+    def save(self, path: Path, facts: Facts) -> None:
+        """Write a checkpoint; collective. Raises RunError."""
+        save(path, self.scene, self.state, facts)
+
+    def field(self, name: str) -> Array:
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], a new array; collective.
+
+        `height` is that of the rigid surface where it is now, so that `gap = displacement - height - approach`.
+        """
+        scene, state, units = self.scene, self.state, self.scene.units
+        if name == "pressure":
+            return state.pressure * (state.alpha * units.pressure)
+        if name == "displacement":
+            return self._displacement() * units.height
+        base, offset = scene.motion.at(state.position).parts
+        heights = np.roll(base, offset, axis=1)
+        if name == "height":
+            return heights * units.height + scene.setup.surface.datum
+        return (self._displacement() - heights - state.approach) * units.height
+
+    def _displacement(self) -> Array:
+        """Return the displacement of the body, from the pressure where it is not at hand; collective."""
+        scene, state = self.scene, self.state
+        image, apply = scene.solver.workspace.displacement, scene.operators.operator.apply
+        return scene.material.displacement(state.body, lambda: apply(state.pressure, image), state.alpha)
+
 
 Task = Callable[[March], bool | None]
 
 
-def run(march: March, tasks: Sequence[Task], timeline: Iterable[Step] | None = None) -> bool:
-    """Advance through a timeline, after every step doing the tasks in order, until it ends or a task says True.
+def run(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None) -> bool:
+    """Advance, after every step doing the tasks in order, until the steps end or a task says True.
 
-    Without a timeline it is all of the job's, and the tasks are done for the initial state too. Returns whether a task
-    has ended the march.
+    Without steps they are all of the job's, and the tasks are done for the state of now too. Returns whether a task has
+    ended the march.
     """
-    if timeline is None:
+    if steps is None:
         if run_tasks(march, tasks):
             return True
-        timeline = steps_to_make(march, march.timeline())
-    for step in timeline:
+        steps = march.steps()
+    for step in steps:
         march.advance(step)
         if run_tasks(march, tasks):
             return True

@@ -1,153 +1,219 @@
-"""All that one step of a run hands to the next, and checkpoints of it: what goes into them, and how a run goes on."""
+"""The state of a run: all that one step hands to the next, and the one list of what a checkpoint has of it."""
 
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.effect import values_of
 from ..errors import InputError
+from ..history.chosen import SYMBOLS, ChosenSteps
 from ..parallel.slab import Array
-from ..physics.entries import Entry, MapCount, Saved
+from ..physics.body import BodyMemory
+from ..physics.budget import ErrorSums
+from ..physics.energy import EnergyMemory
+from ..physics.entries import Entry, MapCount, Saved, part_of, prefixed
+from ..physics.measures import Measures
 from ..physics.units import Units
 from ..scene import Scene
-from ..storage.checkpoint import Contents, read
+from ..storage import checkpoint, wisdom
+from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
+from .errors import Looks
+from .starts import Past, StartStatistics
 
 FURTHER = 2  # pressures before the earlier one that are kept for starts, of three and of four steps ago
 MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these
 
 
-class Past(NamedTuple):
-    """The pressure after a step: a map of p with the pressure `alpha p`, and where the surface was [m]; with an alpha
-    of 0 none is known."""
-
-    pressure: Array
-    alpha: float = 0.0
-    position: tuple[float, float] = (0.0, 0.0)
-
-
 @dataclass(frozen=True)
 class State:
-    """A run after a step, but for what the parts of its scene remember themselves (`Scene.parts`).
+    """A run after a step. `make_step` returns another one and leaves this one as it was.
 
-    `pressure` is a map of p with the pressure `alpha p`, `earlier` the one before it (no history of single solves keeps
-    one), `alpha` and `alpha_old` the moduli of the two steps; `approach` d of the body, all in the run's units.
-    `position` [m] is by how much the surface has moved, `position_old` by how much it had with the earlier pressure;
-    `further` are those before that, the newest first, where they are kept.
+    `row` is what the step is recorded as. `pasts` are the last pressures, the newest first: a history of single solves
+    keeps one, others two or more. `approach` is the d of the body, `body` and `energy` are their memories; `starts` and
+    `looks` are what was learnt of starts and of the embedded pair, `errors` the sums of the error budget, `chosen` the
+    record of the steps that stages have chosen, which grows. The next pressure will be in the map `spare`. Effects that
+    follow the steps keep what they remember themselves, as they are told only of steps that were made.
+
+    Two states share most maps, and the oldest ones of a state are spare in the next: a state can be used until a step
+    begins from the one after it. Maps are in the run's units.
     """
 
     row: Row
-    pressure: Array
-    earlier: Array | None
-    alpha: float = 0.0
-    alpha_old: float = 0.0
+    pasts: tuple[Past, ...]
+    spare: Array
+    body: BodyMemory
+    energy: EnergyMemory | None
     approach: float = 0.0
-    position: tuple[float, float] = (0.0, 0.0)
-    position_old: tuple[float, float] = (0.0, 0.0)
-    further: tuple[Past, ...] = ()
+    starts: StartStatistics = field(default_factory=StartStatistics)
+    looks: Looks = field(default_factory=Looks)
+    errors: ErrorSums = field(default_factory=ErrorSums)
+    chosen: ChosenSteps | None = None
 
     @staticmethod
     def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
-        """Of the states before and after a step, which share the earlier pressures; there is one if stages last."""
+        """Count the maps of pressures and the spare one; there is an earlier pressure if stages last."""
         earlier = lasts + FURTHER * keeps_further
         return MapCount(held=2 + earlier, saved=1 + earlier)
 
     @property
-    def pasts(self) -> tuple[Past, ...]:
-        """All pressures, the newest first."""
-        last = Past(self.pressure, self.alpha, self.position)
-        if self.earlier is None:
-            return (last,)
-        return last, Past(self.earlier, self.alpha_old, self.position_old), *self.further
+    def pressure(self) -> Array:
+        """The map of p, whose pressure is `alpha p`."""
+        return self.pasts[0].pressure
 
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """What a checkpoint has of it; step and time it says itself."""
-        strain = units.height / units.length
-        earlier = (
-            {}
-            if self.earlier is None
-            else {
-                "contact/earlier pressure": Entry(self.earlier, strain, optional=True),
-                "clock/earlier position": Entry(np.array(self.position_old), 1.0, "m", optional=True),
-            }
-        )
-        return {
-            "clock/distance": Entry(self.row.distance, 1.0, "m"),
-            "clock/position": Entry(np.array(self.position), 1.0, "m"),
-            "contact/pressure": Entry(self.pressure, strain),
-            "contact/modulus": Entry(self.alpha, units.modulus, "Pa"),
-            "contact/earlier modulus": Entry(self.alpha_old, units.modulus, "Pa"),
-            "contact/approach": Entry(self.approach, units.height, "m"),
-            **earlier,
-            **self._further_entries(units),
-        }
+    @property
+    def alpha(self) -> float:
+        """The modulus of the last step, 0 before the first one."""
+        return self.pasts[0].alpha
 
-    def _further_entries(self, units: Units) -> dict[str, Entry]:
-        """Those of the further pressures."""
-        if not self.further:
-            return {}
-        maps = {
-            _name(k): Entry(p.pressure, units.height / units.length, optional=True) for k, p in enumerate(self.further)
-        }
-        return {
-            **maps,
-            MODULI: Entry(np.array([past.alpha for past in self.further]), units.modulus, "Pa", optional=True),
-            POSITIONS: Entry(np.array([past.position for past in self.further]).ravel(), 1.0, "m", optional=True),
-        }
-
-    def _further_restored(self, saved: Saved) -> tuple[Past, ...]:
-        """The further pressures of a checkpoint, none of them known where it has none."""
-        if MODULI not in saved:
-            return tuple(Past(past.pressure) for past in self.further)
-        places = np.reshape(saved[POSITIONS], (-1, 2)).tolist()
-        known = zip(self.further, saved[MODULI].tolist(), places, strict=True)
-        return tuple(Past(past.pressure, alpha, (x, y)) for past, alpha, (x, y) in known)
-
-    def restored(self, saved: Saved, row: Row) -> "State":
-        """The state that a checkpoint has, whose maps have been read into those of this one."""
-        if self.earlier is not None and "contact/earlier pressure" not in saved:
-            self.earlier.fill(0.0)
-        names = ("contact/modulus", "contact/earlier modulus", "contact/approach", "clock/distance")
-        alpha, alpha_old, approach, distance = (float(saved[name]) for name in names)
-        x, y = saved["clock/position"].tolist()
-        old_x, old_y = saved.get("clock/earlier position", saved["clock/position"]).tolist()
-        row = replace(row, distance=distance)
-        further = self._further_restored(saved)
-        return State(row, self.pressure, self.earlier, alpha, alpha_old, approach, (x, y), (old_x, old_y), further)
+    @property
+    def position(self) -> tuple[float, float]:
+        """By how much the surface has moved [m]."""
+        return self.pasts[0].position
 
 
-def _name(index: int) -> str:
-    """In a checkpoint, of a further pressure."""
-    return f"contact/pressure {index + 3} steps ago"
+def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
+    """Return the state before the first step, in new maps: at no load the surface just touches the body."""
+    setup, slab = scene.setup, scene.slab
+    highest = setup.heights.highest
+    touching = Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
+    further = FURTHER * scene.choices.further_starts.on
+    pasts = tuple(Past(slab.zeros()) for _ in range(1 + scene.choices.extrapolated_starts.on + further))
+    chosen = ChosenSteps.of(scene.job) if scene.job.remembers and any(s.chooses for s in scene.job.history) else None
+    state = State(
+        Row(measures=touching),
+        pasts,
+        slab.zeros(),
+        scene.material.at_rest() if body is None else body,
+        scene.energy.at_rest() if scene.energy is not None else None,
+        -highest / setup.units.height,
+        chosen=chosen,
+    )
+    return completed(scene, state)
+
+
+def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approach: float) -> State:
+    """Return a first state under a pressure, which is copied into its maps, and that had been there before."""
+    for past in state.pasts[:2]:
+        past.pressure[...] = pressure
+    pasts = (*(past._replace(alpha=1.0) for past in state.pasts[:2]), *state.pasts[2:])
+    return completed(scene, replace(state, row=row, pasts=pasts, approach=approach))
+
+
+def completed(scene: Scene, state: State) -> State:
+    """Return the state with the energies [J] and the columns of effects in its row."""
+    row = replace(state.row, added=values_of(scene.followers))
+    if scene.energy is not None and state.energy is not None:
+        unit, memory = scene.energy.unit, state.energy
+        lost = tuple(float(value) * unit for value in memory.dissipated)
+        work, stored = memory.work * unit, memory.stored * unit
+        row = replace(row, work=work, stored=stored, dissipated=math.fsum(lost), branch_dissipation=lost)
+    return replace(state, row=row)
+
+
+# -- checkpoints ------------------------------------------------------------------------------------------------------
 
 
 def entries(scene: Scene, state: State) -> dict[str, Entry]:
-    """Everything that a run remembers, by names `part/name`; maps are the run's own, not copies."""
-    units = scene.units
-    parts = ((f"{part}/{name}", e) for part, owner in scene.parts.items() for name, e in owner.entries(units).items())
-    return {**state.entries(units), **dict(parts)}
+    """Return everything that a run remembers, by the names `part/name` that checkpoints have; maps are no copies."""
+    found = _contact_entries(state, scene.units) | prefixed("material", scene.material.entries(state.body, scene.units))
+    if scene.energy is not None and state.energy is not None:
+        found |= scene.energy.entries(state.energy, scene.units)
+    for name, effect in scene.followers.items():
+        found |= prefixed(name, effect.entries(scene.units))
+    if state.chosen is not None:
+        numbers = state.chosen.numbers()
+        found |= {name: Entry(np.array(value), 1.0, SYMBOLS[name], optional=True) for name, value in numbers.items()}
+    if scene.material.branched is not None:
+        found |= state.looks.entries()
+    if scene.choices.further_starts.on:
+        found |= state.starts.entries()
+    return found | state.errors.entries()
 
 
-def restore(scene: Scene, state: State, contents: Contents) -> State:
-    """Put the parts of a scene into the state of a checkpoint; the run's own, in the maps of `state`, is returned.
+def save(path: Path, scene: Scene, state: State, facts: Facts) -> None:
+    """Write a checkpoint of a state, with the plans of its transforms; collective. Raises RunError."""
+    everything = {**entries(scene, state), "plans/all": Entry(wisdom.gather(scene.slab))}
+    checkpoint.write(path, scene.slab, replace(facts, step=state.row.step, time=state.row.time), everything)
 
-    Collective. Raises InputError for a checkpoint that lacks something, or is of another body.
+
+def restored(scene: Scene, state: State, contents: Contents) -> State:
+    """Return the state of a checkpoint, in the maps of another one; collective.
+
+    Raises InputError for a checkpoint that lacks something, or is of another body.
     """
     _refuse_lost_branches(scene, contents)
     declared = entries(scene, state)
     wanted = {name: entry for name, entry in declared.items() if not entry.optional or name in contents.units}
     _compare(contents, wanted)
-    read(contents, scene.slab, wanted)
+    checkpoint.read(contents, scene.slab, wanted)
     saved = {name: _value(name, entry, contents) for name, entry in wanted.items()}
-    for part, owner in scene.parts.items():
-        head = f"{part}/"
-        owner.restore({name.removeprefix(head): value for name, value in saved.items() if name.startswith(head)})
-    return state.restored(saved, Row(contents.step, contents.time))
+    energy = state.energy
+    if scene.energy is not None and energy is not None:
+        energy = scene.energy.restored(energy, saved)
+    for name, effect in scene.followers.items():
+        effect.restore(part_of(name, saved))
+    found = State(
+        Row(contents.step, contents.time, float(saved["clock/distance"])),
+        _restored_pasts(state.pasts, saved),
+        state.spare,
+        scene.material.restored(state.body, part_of("material", saved)),
+        energy,
+        float(saved["contact/approach"]),
+        StartStatistics.restored(saved),
+        Looks.restored(saved),
+        ErrorSums.restored(saved),
+        None if state.chosen is None else ChosenSteps.of(scene.job, saved),
+    )
+    return completed(scene, found)
+
+
+def _contact_entries(state: State, units: Units) -> dict[str, Entry]:
+    """Return the pressures and where the surface was; step and time a checkpoint says itself."""
+    strain = units.height / units.length
+    last, *older = state.pasts
+    found = {
+        "clock/distance": Entry(state.row.distance, 1.0, "m"),
+        "clock/position": Entry(np.array(last.position), 1.0, "m"),
+        "contact/pressure": Entry(last.pressure, strain),
+        "contact/modulus": Entry(last.alpha, units.modulus, "Pa"),
+        "contact/earlier modulus": Entry(older[0].alpha if older else 0.0, units.modulus, "Pa"),
+        "contact/approach": Entry(state.approach, units.height, "m"),
+    }
+    if older:
+        found["contact/earlier pressure"] = Entry(older[0].pressure, strain, optional=True)
+        found["clock/earlier position"] = Entry(np.array(older[0].position), 1.0, "m", optional=True)
+    if further := older[1:]:
+        found |= {_name(k): Entry(past.pressure, strain, optional=True) for k, past in enumerate(further)}
+        found[MODULI] = Entry(np.array([past.alpha for past in further]), units.modulus, "Pa", optional=True)
+        found[POSITIONS] = Entry(np.array([past.position for past in further]).ravel(), 1.0, "m", optional=True)
+    return found
+
+
+def _name(index: int) -> str:
+    """Return the name of a further pressure in a checkpoint."""
+    return f"contact/pressure {index + 3} steps ago"
+
+
+def _restored_pasts(pasts: tuple[Past, ...], saved: Saved) -> tuple[Past, ...]:
+    """Return the pressures of a checkpoint, whose maps have been read; those that it lacks are not known."""
+    numbers = [(float(saved["contact/modulus"]), saved["clock/position"])]
+    if "contact/earlier pressure" in saved:
+        place = saved.get("clock/earlier position", saved["clock/position"])
+        numbers.append((float(saved["contact/earlier modulus"]), place))
+        if MODULI in saved:
+            numbers += zip(saved[MODULI].tolist(), np.reshape(saved[POSITIONS], (-1, 2)), strict=True)
+    known = zip(pasts, numbers, strict=False)
+    found = [Past(past.pressure, alpha, (float(x), float(y))) for past, (alpha, (x, y)) in known]
+    return (*found, *(Past(past.pressure) for past in pasts[len(found) :]))
 
 
 def _value(name: str, entry: Entry, contents: Contents) -> NDArray[Any]:
-    """A map, which has been read in place, or numbers in the run's units."""
+    """Return a map, which has been read in place, or numbers in the run's units."""
     if entry.is_map:
         return np.asarray(entry.value)
     return np.asarray(contents.numbers[name] * (contents.units[name] / entry.unit))

@@ -34,12 +34,13 @@ per wave make of marches is then added in full.
 
 import math
 from collections.abc import Collection
-from dataclasses import asdict, astuple, dataclass, fields, replace
+from dataclasses import asdict, astuple, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .entries import Entry, Saved
 from .seen import Known, Seen, count_spots, spot_radius
 from .time_error import share_of_area, time_error
 
@@ -75,7 +76,8 @@ class Parts:
         return self.solver + self.time + self.folded + self.mesh
 
 
-NAMES = tuple(field.name for field in fields(Parts))
+NAMES = tuple(part.name for part in fields(Parts))
+SUMS = "budget/sums"  # in a checkpoint
 REMEDIES = {
     "solver": "a smaller numerics.tolerance",
     "time": "shorter time steps",
@@ -171,27 +173,33 @@ def weight_of(slid: float, seconds: float) -> float:
     return slid or seconds * AT_REST or AT_ONCE
 
 
-class Summary:
+@dataclass(frozen=True)
+class ErrorSums:
     """Budgets of many steps, each for as far as the surface slid in it; friction also in proportion to it.
 
     Where nothing slides they count for as long as they last, and steps that last no time only where none does: a long
-    rest does not dilute what a slide says. `numbers` are its sums, shape (10,), from which another begins.
+    rest does not dilute what a slide says. `sums` are, of friction and of area, the weight, and the weighted sum of
+    each part.
     """
 
-    def __init__(self, numbers: NDArray[np.float64] | None = None) -> None:
-        self._sums = np.zeros((2, 1 + len(NAMES))) if numbers is None else numbers.reshape(2, 1 + len(NAMES)).copy()
+    sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
 
-    @property
-    def numbers(self) -> NDArray[np.float64]:
-        """The weight, and the weighted sum of each part, of friction and then of area."""
-        return self._sums.ravel()
-
-    def add(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> None:
-        """One step of so many seconds, in which the surface slid so far [m]."""
-        far = weight_of(slid, seconds)
-        for sums, parts, weight in zip(self._sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
+    def plus(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> "ErrorSums":
+        """Return the sums with one step of so many seconds, in which the surface slid so far [m]."""
+        far, sums = weight_of(slid, seconds), self.sums.copy()
+        for row, parts, weight in zip(sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
-                sums += weight * far * np.array([1.0, *astuple(parts)])
+                row += weight * far * np.array([1.0, *astuple(parts)])
+        return ErrorSums(sums)
+
+    def entries(self) -> dict[str, Entry]:
+        """Return its entry; a checkpoint may lack it."""
+        return {SUMS: Entry(self.sums.ravel(), optional=True)}
+
+    @classmethod
+    def restored(cls, saved: Saved) -> "ErrorSums":
+        """Return the sums of a checkpoint."""
+        return cls(np.reshape(saved[SUMS], (2, -1))) if SUMS in saved else cls()
 
     @property
     def friction(self) -> Parts | None:
@@ -201,7 +209,7 @@ class Summary:
     @property
     def friction_within(self) -> float:
         """Friction is known to so much, in the mean over the way: an error of its coefficient, not of a share of it."""
-        return float(self._sums[0, 1:].sum() / self._sums[1, 0]) if self._sums[1, 0] > 0.0 else math.nan
+        return float(self.sums[0, 1:].sum() / self.sums[1, 0]) if self.sums[1, 0] > 0.0 else math.nan
 
     @property
     def area(self) -> Parts | None:
@@ -209,7 +217,7 @@ class Summary:
         return self._mean(1)
 
     def _mean(self, index: int) -> Parts | None:
-        weight, *sums = self._sums[index].tolist()
+        weight, *sums = self.sums[index].tolist()
         return Parts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: float) -> dict[str, Any]:
@@ -222,7 +230,7 @@ class Summary:
         """Sentences for run.log, with what to change where more is wrong than `accuracy` allows; it has `chosen` the
         settings behind these parts."""
         found = (("friction", self.friction), ("contact area, corrected", self.area))
-        way = "the distance slid" if self._sums[1, 0] > LEAST_WAY else "time"
+        way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
             f"estimated error of {name}: {describe(parts)}, mean over {way}{advice(parts, accuracy, chosen)}"
             for name, parts in found

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .body import Trial, ZenerBody, coefficients
+from .body import BodyMemory, Trial, ZenerBody, coefficients, surface_of
 
 SAMPLED_ROWS = 8  # at least, of a map with as many: the difference is then within some 5 % of that on all rows
 LEAST_VARIANCE = 1e-6  # of heights, over their mean square: less is rounding
@@ -45,12 +45,21 @@ class Embedded:
         self.slab, self.material, self.dx = slab, material, dx
         self._apart: tuple[float, Array, float, float] | None = None
 
-    def look(self, dt: float, trial: Trial, pressure: Array, displacement: Array, load: float, share: float) -> Look:
-        """At a step just committed: the solver's pressure, whose sum over all ranks is `load`, on a `share` of the
-        points, and displacement, `A p/alpha`; one message, or two; collective."""
-        seen, *sums = self._add(dt, trial, pressure, displacement, self.stride(share))
+    def look(
+        self,
+        dt: float,
+        trial: Trial,
+        memory: BodyMemory,
+        pressure: Array,
+        displacement: Array,
+        load: float,
+        share: float,
+    ) -> Look:
+        """Look at a step, with the `memory` of the body after it: the solver's pressure, whose sum over all ranks is
+        `load`, on a `share` of the points, and displacement, `A p/alpha`; one message, or two; collective."""
+        seen, *sums = self._add(dt, trial, memory, pressure, displacement, self.stride(share))
         if abs(self.stride(share) * seen - load) > MISSED * load:
-            seen, *sums = self._add(dt, trial, pressure, displacement, 1)
+            seen, *sums = self._add(dt, trial, memory, pressure, displacement, 1)
         if seen <= 0.0:
             return Look(0.0, 0.0)
         apart, size, rise, height, square, turned = sums
@@ -60,22 +69,23 @@ class Embedded:
         order = self._difference(dt, trial.alpha)[2]
         return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, angle)
 
-    def look_without_load(self, dt: float, trial: Trial) -> Look:
-        """At a step just committed in which nothing presses: the difference over the displacement, both as rms;
-        collective."""
-        u = self.material.u
-        _, apart, size, *_ = self._add(dt, trial, np.ones_like(u), u, self.stride(1.0))
+    def look_without_load(self, dt: float, trial: Trial, memory: BodyMemory) -> Look:
+        """Look at a step in which nothing presses, with the `memory` of the body after it: the difference over the
+        displacement, both as rms; collective."""
+        u = surface_of(memory)
+        _, apart, size, *_ = self._add(dt, trial, memory, np.ones_like(u), u, self.stride(1.0))
         return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._difference(dt, trial.alpha)[2])
 
     def stride(self, share: float) -> int:
         """From one sampled row to the next, where that share of the points is in contact."""
         return max(1, int(self.slab.ny * math.sqrt(share) / SAMPLED_ROWS))
 
-    def _add(self, dt: float, trial: Trial, pressure: Array, displacement: Array, stride: int) -> list[float]:
-        """The sums of `loops.embedded` over all ranks."""
-        material = self.material
+    def _add(
+        self, dt: float, trial: Trial, memory: BodyMemory, pressure: Array, displacement: Array, stride: int
+    ) -> list[float]:
+        """Return the sums of `loops.embedded` over all ranks."""
         decay, gain, _ = self._difference(dt, trial.alpha)
-        maps = (material.branches, decay, material.increment, gain, pressure, displacement)
+        maps = (memory.branches, decay, memory.increment, gain, pressure, displacement)
         return self.slab.sum(*loops.embedded(*maps, *trial.heights.parts, -self.slab.rows.start % stride, stride))
 
     def _difference(self, dt: float, alpha: float) -> tuple[Array, float, float]:

@@ -19,21 +19,28 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .body import Heights, ZenerBody
-from .entries import Entry, MapCount, Saved
+from .body import BodyMemory, Heights, ZenerBody, surface_of
+from .entries import Entry, MapCount, Saved, part_of, prefixed
 from .prony import Prony
 from .units import Units
 
 SMALL = 1e-2  # z below which differences of exponentials are summed as series, here to ten digits
 
 
-@dataclass
-class EnergyBalance:
-    """Sums since the start, in the run's units; `dissipated` has one entry per branch."""
+@dataclass(frozen=True)
+class EnergyMemory:
+    """Memory of the energies of a body: sums since the start, in the unit of the scene, `dissipated` by branch.
+
+    A body with branches goes on from `spring`, `<u, A^-1 u>`, and `branches`, `<h_k, A^-1 h_k>`; `elastic` is the
+    memory of `ElasticPressure` where there is one.
+    """
 
     work: float = 0.0
     stored: float = 0.0
     dissipated: Array = field(default_factory=lambda: np.zeros(0))
+    spring: float = 0.0
+    branches: Array = field(default_factory=lambda: np.zeros(0))
+    elastic: BodyMemory | None = None
 
 
 class Pressed(NamedTuple):
@@ -80,30 +87,47 @@ class ElasticEnergy:
 
     def __init__(self, slab: Slab, unit: float = 1.0) -> None:
         self.slab, self.unit = slab, unit
-        self.balance = EnergyBalance()
 
-    def advance(self, dt: float, now: Pressed, before: Pressed, u: Array) -> None:
-        """After a solve for a pressure and the displacement u; one reduction; collective."""
-        self.balance.work = self.balance.stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
+    def at_rest(self) -> EnergyMemory:
+        """Return the energies of a body into which nothing has been pressed."""
+        return EnergyMemory()
 
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """What is stored, and the work; it follows anew from each contact, so that a run can go on without."""
-        return {"stored": Entry(self.balance.stored, self.unit, "J", optional=True)}
+    def advance(
+        self, memory: EnergyMemory, dt: float, now: Pressed, before: Pressed, u: Array, body: BodyMemory
+    ) -> EnergyMemory:
+        """Return the energies after a solve for a pressure and the displacement u; one reduction; collective."""
+        stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
+        return EnergyMemory(work=stored, stored=stored)
 
-    def restore(self, saved: Saved) -> None:
-        """What is stored, and the work."""
-        self.balance.work = self.balance.stored = float(saved.get("stored", 0.0))
+    def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
+        """Return what is stored; it follows anew from each contact, so that a run can go on without."""
+        return {"energy/stored": Entry(memory.stored, self.unit, "J", optional=True)}
+
+    def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
+        """Return what is stored in a checkpoint, which is the work."""
+        stored = float(saved.get("energy/stored", 0.0))
+        return EnergyMemory(work=stored, stored=stored)
 
 
 class AppliedInverse:
-    """`A^-1 du` by an operator K that is the inverse of A; `scratch()` lends a map until the next solve."""
+    """`A^-1 du` by an operator K that is the inverse of A; `scratch()` is a map that is free until the next solve."""
 
     def __init__(self, inverse: Inverse, scratch: Callable[[], Array]) -> None:
         self._inverse, self._scratch = inverse, scratch
 
-    def advance(self, dt: float, p: Array, du: Array) -> Array:
-        """`A^-1 du`; collective."""
-        return self._inverse.apply(du, self._scratch())
+    def at_rest(self) -> None:
+        """Return no memory."""
+
+    def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array) -> tuple[Array, None]:
+        """Return `A^-1 du`, and no memory; collective."""
+        return self._inverse.apply(du, self._scratch()), None
+
+    def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
+        """Return no entry."""
+        return {}
+
+    def restored(self, memory: BodyMemory | None, saved: Saved) -> None:
+        """Return no memory."""
 
 
 class ElasticPressure:
@@ -122,74 +146,91 @@ class ElasticPressure:
 
     @staticmethod
     def count_maps(branches: int) -> MapCount:
-        """Of a body with so many branches, each of which has a map; in double precision."""
+        """Count the maps of a body with so many branches, each of which has one; in double precision."""
         return ZenerBody.count_maps(branches)
 
-    def advance(self, dt: float, p: Array, du: Array) -> Array:
-        """What v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`; local to this rank."""
-        self.body.commit(self.body.begin(dt, Heights(self.body.u)), p)
-        return self.body.increment
+    def at_rest(self) -> BodyMemory:
+        """Return the memory of that body."""
+        return self.body.at_rest()
 
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """As of a body, for strains in place of displacements."""
+    def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array) -> tuple[Array, BodyMemory]:
+        """Return what v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after it,
+        in the maps of the one before; local to this rank."""
+        assert memory is not None
+        v = surface_of(memory)
+        now = self.body.commit(memory, self.body.begin(memory, dt, Heights(v)), p, v)
+        return now.increment, now
+
+    def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
+        """Return the entries of a body with strains in place of displacements."""
+        assert memory is not None
         strain = units.height / units.length
-        return self.body.memory(strain, "1", units.modulus * strain, "Pa")
+        return self.body.memory_entries(memory, strain, "1", units.modulus * strain, "Pa")
 
-    def restore(self, saved: Saved) -> None:
-        self.body.restore(saved)
+    def restored(self, memory: BodyMemory | None, saved: Saved) -> BodyMemory:
+        """Return the memory that a checkpoint has, whose maps have been read into those of this one."""
+        assert memory is not None
+        return self.body.restored(memory, saved)
 
 
 class ZenerEnergy:
-    """Energies of a `ZenerBody`, advanced after each committed step; `unit` [J] is that of all energies here."""
+    """Energies of a `ZenerBody`; `unit` [J] is that of all energies here."""
 
     def __init__(
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
     ) -> None:
         self.slab, self.material, self.inverse, self.unit = slab, material, inverse, unit
-        count = len(material.prony.moduli)
-        self.balance = EnergyBalance(dissipated=np.zeros(count))
-        self._spring, self._branches = 0.0, np.zeros(count)  # <u, A^-1 u> and <h_k, A^-1 h_k>
 
-    def advance(self, dt: float, now: Pressed, before: Pressed, u: Array) -> None:
-        """After a step to the pressure `now` from `before`; one reduction; collective."""
-        material, balance = self.material, self.balance
-        moduli, du = material.prony.moduli, material.increment
-        w = self.inverse.advance(dt, now.p, du)
-        sums = [loops.dot(branch, w) for branch in material.branches]
+    def at_rest(self) -> EnergyMemory:
+        """Return the energies of a body into which nothing has been pressed."""
+        count = len(self.material.prony.moduli)
+        return EnergyMemory(dissipated=np.zeros(count), branches=np.zeros(count), elastic=self.inverse.at_rest())
+
+    def advance(
+        self, memory: EnergyMemory, dt: float, now: Pressed, before: Pressed, u: Array, body: BodyMemory
+    ) -> EnergyMemory:
+        """Return the energies after a step to the pressure `now` from `before`, with the memory of the body after it;
+        one reduction; collective. The maps of an `elastic` memory are those of the one before."""
+        material, du, moduli = self.material, body.increment, self.material.prony.moduli
+        w, elastic = self.inverse.advance(memory.elastic, dt, now.p, du)
+        sums = [loops.dot(branch, w) for branch in body.branches]
         work = loops.work(*now, *before, du)
-        *products, own, total, work = self.slab.sum(*sums, loops.dot(du, w), loops.dot(material.u, w), work)
-        crossed, past = np.array(products), self._branches
+        *products, own, total, work = self.slab.sum(*sums, loops.dot(du, w), loops.dot(surface_of(body), w), work)
+        crossed, past = np.array(products), memory.branches
         decay, gain = material.coefficients(dt)
-        self._branches = decay**2 * past + 2 * decay * gain * crossed + gain**2 * own
-        self._spring += 2 * total - own
-        stored = 0.5 * (material.prony.modulus_inf * self._spring + float(np.sum(self._branches / moduli)))
-        z = material.elapsed(dt)
+        branches = decay**2 * past + 2 * decay * gain * crossed + gain**2 * own
+        spring = memory.spring + (2 * total - own)
+        stored = 0.5 * (material.prony.modulus_inf * spring + float(np.sum(branches / moduli)))
+        z, dissipated = material.elapsed(dt), memory.dissipated
         if dt == 0.0:  # a jump is elastic: nothing is lost in it
-            balance.work += stored - balance.stored
+            work = stored - memory.stored
         elif material.integrator == "exponential":
-            balance.work += work + float(np.sum(_weighted(bend_weights(z), crossed, moduli * own)))
-            balance.dissipated += _weighted(dissipation_weights(z), past / moduli, crossed, moduli * own)
+            work = work + float(np.sum(_weighted(bend_weights(z), crossed, moduli * own)))
+            dissipated = dissipated + _weighted(dissipation_weights(z), past / moduli, crossed, moduli * own)
         else:
-            balance.work += work
-            balance.dissipated += z * self._branches / moduli
-        balance.stored = stored
+            dissipated = dissipated + z * branches / moduli
+        return EnergyMemory(memory.work + work, stored, dissipated, spring, branches, elastic)
 
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """The balance, and the sums over the maps that it goes on from."""
-        balance, spring = self.balance, units.height**2 / units.length
+    def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
+        """Return the energies, the sums over maps that they go on from, and the memory of `ElasticPressure`."""
+        spring = units.height**2 / units.length
         return {
-            "work": Entry(balance.work, self.unit, "J"),
-            "stored": Entry(balance.stored, self.unit, "J"),
-            "dissipated": Entry(balance.dissipated, self.unit, "J"),
-            "spring": Entry(self._spring, spring, "m"),
-            "branches": Entry(self._branches, units.modulus**2 * spring, "Pa^2 m"),
+            "energy/work": Entry(memory.work, self.unit, "J"),
+            "energy/stored": Entry(memory.stored, self.unit, "J"),
+            "energy/dissipated": Entry(memory.dissipated, self.unit, "J"),
+            "energy/spring": Entry(memory.spring, spring, "m"),
+            "energy/branches": Entry(memory.branches, units.modulus**2 * spring, "Pa^2 m"),
+            **prefixed("memory", self.inverse.entries(memory.elastic, units)),
         }
 
-    def restore(self, saved: Saved) -> None:
-        """The balance and the sums."""
-        work, stored, spring = (float(saved[name]) for name in ("work", "stored", "spring"))
-        self.balance = EnergyBalance(work, stored, np.array(saved["dissipated"], dtype=np.float64))
-        self._spring, self._branches = spring, np.array(saved["branches"], dtype=np.float64)
+    def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
+        """Return the energies of a checkpoint, whose maps have been read into those of this memory."""
+        work, stored, spring = (float(saved[f"energy/{name}"]) for name in ("work", "stored", "spring"))
+        dissipated, branches = (
+            np.array(saved[f"energy/{name}"], dtype=np.float64) for name in ("dissipated", "branches")
+        )
+        elastic = self.inverse.restored(memory.elastic, part_of("memory", saved))
+        return EnergyMemory(work, stored, dissipated, spring, branches, elastic)
 
 
 def _weighted(weights: tuple[Array, ...], *terms: Array) -> Array:

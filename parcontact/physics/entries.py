@@ -1,7 +1,7 @@
-"""What a part of a run remembers from one step to the next: entries with units, which checkpoints are made of.
+"""Entries: what a part of a run remembers from one step to the next, with units, as checkpoints have it.
 
-Whatever has a memory, the body, the energies or an effect that follows the steps, declares it here and nowhere else: a
-checkpoint has its `entries`, and `restore` goes on from them, on any number of ranks.
+Each part names its entries and how it goes on from them where its memory is defined, for any number of ranks;
+`march.state` has the one list of all parts.
 """
 
 from collections.abc import Mapping
@@ -46,8 +46,19 @@ class Entry:
         return np.asarray(self.value).nbytes
 
 
+def prefixed(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:
+    """Return the entries of a part by the names that they have in a checkpoint."""
+    return {f"{part}/{name}": entry for name, entry in entries.items()}
+
+
+def part_of(part: str, saved: Saved) -> Saved:
+    """Return what a checkpoint has of a part, by the part's own names."""
+    head = f"{part}/"
+    return {name.removeprefix(head): value for name, value in saved.items() if name.startswith(head)}
+
+
 class Remembers(Protocol):
-    """A part of a run that has a memory."""
+    """An object that has a memory of its own, as effects that follow the steps have."""
 
     def entries(self, units: Units) -> dict[str, Entry]:
         """What is remembered after the last step, by name; maps are the part's own, not copies. Local to this rank."""

@@ -57,8 +57,11 @@ def _advance_four(a, b, c, d, decay, gain, weight, change, effective):
 
 
 @loop
-def commit(displacement, buffer, u, heights, offset):
-    """`u_new = displacement - buffer + heights(i - offset)`: put `u_new - u` into `buffer` and `u_new` into `u`."""
+def commit(displacement, buffer, u, heights, offset, out):
+    """`u_new = displacement - buffer + heights(i - offset)`: put `u_new - u` into `buffer`, `u_new` into `out`.
+
+    The latter may be `u`.
+    """
     nx = u.shape[1]
     start = offset % nx
     for j in range(u.shape[0]):
@@ -66,7 +69,7 @@ def commit(displacement, buffer, u, heights, offset):
             source = i - start if i >= start else i - start + nx
             new = displacement[j, i] - buffer[j, i] + heights[j, source]
             buffer[j, i] = new - u[j, i]
-            u[j, i] = new
+            out[j, i] = new
 
 
 @loop

@@ -18,8 +18,7 @@ from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Step, Timeline
 from ..job import Job
-from ..march.rest import steps_to_make
-from ..march.step import March
+from ..march.loop import March
 from ..parallel.slab import Slab, deal
 from ..physics.budget import ErrorBudget, weight_of
 from ..steady_sliding import start
@@ -127,7 +126,7 @@ def _warm_up(job: Job, slab: Slab) -> None:
             SteadySliding(scene.set_up(small, own)).solve((wanted.points[0][0], 0.0), wanted.points[0][1])
             return
         march = start.first(small, own)
-        for step in islice(steps_to_make(march, Timeline.of(small)), FIRST):
+        for step in islice(march.steps(), FIRST):
             march.advance(step)
 
 
@@ -178,7 +177,7 @@ def _try(march: March, seconds: float) -> list[StageCost]:
     slab, began, timeline = march.scene.slab, time.perf_counter(), march.timeline()
     stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
     per_call = float("inf")
-    as_run = steps_to_make(march, timeline)
+    as_run = march.steps(timeline)
     for step in islice(as_run, FIRST):
         cost = _make_as_run(march, step, stages)
         per_call = min(per_call, cost["seconds"] / max(cost["operator"], 1.0))

@@ -15,15 +15,12 @@ from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job, identity
 from ..job.text.yamltext import parse
-from ..march.rest import steps_to_make
-from ..march.step import March
+from ..march.loop import March
 from ..parallel.meeting import meet
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from ..physics.entries import Entry
 from ..run import restart, runner
-from ..run.errors_so_far import ErrorsSoFar
 from ..scene import choices
 from ..steady_sliding import start
 from ..storage import checkpoint, heights, measures, wisdom
@@ -52,7 +49,6 @@ class Simulation:
         self._slab = Slab(self.comm, *self.job.grid.points)
         self._saved: Contents | None = None
         self._march_made: March | None = None
-        self._errors: ErrorsSoFar | None = None
         self._began = False  # whether the row of the initial state has been handed out
 
     # -- running ------------------------------------------------------------------------------------------------------
@@ -64,19 +60,17 @@ class Simulation:
         is then that before it. All ranks make each step: one that leaves the loop, by `break` or an exception of its
         own, makes the others raise RunError.
         """
-        march, errors = self._march, self._errors_so_far
+        march = self._march
         timeline = march.timeline()
         if not self._began:
             self._began = True
-            errors.weigh(march.row, timeline)
             yield self.row
-        steps = steps_to_make(march, timeline)
+        steps = march.steps(timeline)
         while True:
             self._meet(f"makes step {march.row.step + 1}")
             if (step := next(steps, None)) is None:
                 return
             march.advance(step)
-            errors.weigh(march.row, timeline)
             yield self.row
 
     def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
@@ -100,7 +94,6 @@ class Simulation:
         if ended.march is None and ended.contents is None:
             raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
         self._march_made, self._saved, self._began = ended.march, ended.contents, True
-        self._errors = ended.errors
         return self.row
 
     @property
@@ -162,10 +155,8 @@ class Simulation:
         plain = on_root(self.comm, lambda: identity.plain_job(self.job))
         last = ",".join(measures.texts(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
-        facts = Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last))
-        entries = {**march.entries(), **self._errors_so_far.entries(), "plans/all": Entry(wisdom.gather(slab))}
         heights.store(self.job.surface, file.parent, slab)
-        checkpoint.write(file, slab, facts, entries)
+        march.save(file, Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last)))
 
     @classmethod
     def restore(
@@ -204,13 +195,6 @@ class Simulation:
             self._march_made = start.first(self.job, self._slab, saved=saved)
             warn_of(self.job, self._march_made.scene.setup)
         return self._march_made
-
-    @property
-    def _errors_so_far(self) -> ErrorsSoFar:
-        """The error budget of all steps made, made when it is first asked for."""
-        if self._errors is None:
-            self._errors = ErrorsSoFar(self._march.row, self._saved.numbers if self._saved else None)
-        return self._errors
 
     def _meet(self, what: str) -> None:
         """Wait for all ranks to do `what`; collective. Raises RunError if one does something else or has ended."""

@@ -1,47 +1,7 @@
-"""The error budget of a run from its first step on, also where it goes on from a checkpoint."""
+"""The parts of the error budget that `numerics.accuracy` governs."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
-
-from numpy.typing import NDArray
-
-from ..history.timeline import Timeline
 from ..job import Job
 from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
-from ..physics.budget import Summary
-from ..physics.entries import Entry
-from ..storage.row import Row
-from .half_mesh import HalfMesh, place_of
-
-NAME = "budget/sums"  # in a checkpoint
-
-
-class ErrorsSoFar:
-    """Means over all steps that were recorded, over the distance slid once something slides.
-
-    `saved` are the numbers of the checkpoint after the step `last`, from which it goes on; `half` is what was measured
-    on half the mesh, if it was.
-    """
-
-    def __init__(self, last: Row, saved: Mapping[str, NDArray[Any]] | None, half: HalfMesh | None = None) -> None:
-        self.summary = Summary(saved[NAME] if saved and NAME in saved else None)
-        self._last, self._half = last, half
-
-    def weigh(self, row: Row, timeline: Timeline) -> Row:
-        """Add a step; the row with all that is known of its errors."""
-        if self._half is not None:
-            row = replace(row, errors=self._half.judge(row, place_of(timeline, row.step)))
-        if row.errors is not None:
-            friction = row.measures.friction if row.distance > 0.0 else 0.0
-            seconds, slid = row.time - self._last.time, row.distance - self._last.distance
-            self.summary.add(row.errors, friction, seconds, slid)
-        self._last = row
-        return row
-
-    def entries(self) -> dict[str, Entry]:
-        """What a checkpoint has of it."""
-        return {NAME: Entry(self.summary.numbers)}
 
 
 def chosen_by_accuracy(job: Job) -> set[str]:

@@ -13,7 +13,7 @@ then every row of the run can be compared with it at its instant.
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +70,10 @@ class HalfMesh:
         times, friction, area, errors = slab.agree([found.get(name, []) for name in COLUMNS])
         waves = any(isinstance(shape, Rough) for shape in job.surface)
         return cls(times, friction, area, waves, errors if Timeline.of(job).chooses else ())
+
+    def known_better(self, row: Row, timeline: Timeline) -> Row:
+        """Return a row of the run with errors that are judged by this one."""
+        return replace(row, errors=self.judge(row, place_of(timeline, row.step)))
 
     def judge(self, row: Row, place: int) -> ErrorBudget | None:
         """The error budget of a row of the run; it is the row number `place` of those at its time, from 0."""

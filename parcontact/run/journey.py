@@ -12,17 +12,15 @@ from ..history.timeline import Timeline
 from ..job.checks.sample import describe_sample
 from ..march import loop
 from ..march.failure import StepError
-from ..march.rest import steps_to_make
-from ..march.step import March
-from ..physics.entries import Entry
+from ..march.loop import March
 from ..scene import sanity
-from ..storage import checkpoint, measures, wisdom
+from ..storage import measures
 from ..storage.checkpoint import Facts
 from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
 from ..summary import slide
-from .errors_so_far import ErrorsSoFar, chosen_by_accuracy
+from .errors_so_far import chosen_by_accuracy
 from .restart import Origin
 from .watch import Watch
 
@@ -41,7 +39,6 @@ class Journey:
         watching: Watch,
         facts: Facts,
         until: float | None,
-        errors: ErrorsSoFar,
         contacts: sanity.ContactWatch,
         shows: Callable[[str], bool] = always,
     ) -> None:
@@ -51,7 +48,7 @@ class Journey:
         self.console = recorder.console
         self.first, self.saved, self.failed = marching.row.step, -1, False
         self.watch.state_bytes = sum(entry.nbytes for entry in marching.entries().values()) * self.slab.comm.size
-        self.errors, self.contacts, self.shows = errors, contacts, shows
+        self.contacts, self.shows = contacts, shows
         self.stop = ""
         self.began, self.saving = time.monotonic(), 0.0
 
@@ -85,14 +82,13 @@ class Journey:
 
     def _bring_up_to_date(self) -> None:
         """What was recorded is on the disk then, with the error budget so far."""
-        budget = self.errors.summary.facts(self.job.numerics.accuracy)
+        budget = self.march.state.errors.facts(self.job.numerics.accuracy)
         self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
         self.recorder.sync(self.facts.provenance)
 
     def _march(self) -> None:
-        steps = steps_to_make(self.march, self.timeline, self.until)
         try:
-            loop.run(self.march, [self.record, self.decide], steps)
+            loop.run(self.march, [self.record, self.decide], self.march.steps(self.timeline, self.until))
         except StepError as error:
             text = f"{error}{self._left()}"
             self._log_counts()
@@ -112,7 +108,7 @@ class Journey:
         if marching.row.remark:
             self.console.say(marching.row.remark)
         total = len(self.timeline) if self.timeline.chooses else 0
-        self.recorder.write(self.errors.weigh(marching.row, self.timeline), marching.field, total)
+        self.recorder.write(marching.row, marching.field, total)
         try:
             doubts = self.contacts.judge(marching.row.step, marching.row.measures)
         except RunError as error:
@@ -155,10 +151,8 @@ class Journey:
         began, row = time.monotonic(), self.march.row
         path = self.directory.checkpoint(row.step)
         self._bring_up_to_date()
-        facts = replace(self.facts, step=row.step, time=row.time, table=self.recorder.table)
-        entries = {**self.march.entries(), **self.errors.entries(), "plans/all": Entry(wisdom.gather(self.slab))}
         try:
-            checkpoint.write(path, self.slab, facts, entries)
+            self.march.save(path, replace(self.facts, table=self.recorder.table))
         except RunError as error:
             if last or self.failed:
                 raise RunError(f"{error}{self._newest()}") from error
@@ -199,9 +193,9 @@ class Journey:
     def _farewell(self) -> int:
         row, console = self.march.row, self.console
         self._log_counts()
-        for line in self.errors.summary.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
+        for line in self.march.state.errors.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
             console.say(line)
-        if self.errors.summary.area is not None and (text := describe_sample(self.job, self._slides)):
+        if self.march.state.errors.area is not None and (text := describe_sample(self.job, self._slides)):
             console.say(text)
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from ..effects.effect import columns_of
@@ -9,10 +10,10 @@ from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
 from ..job import Job, Rough, RoughSpectrum, identity
-from ..march.step import March
+from ..march.loop import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..scene import Scene, choices, sanity
+from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, row, wisdom
 from ..storage.checkpoint import Contents, Facts
@@ -23,7 +24,6 @@ from ..storage.provenance import Link, Provenance, extended
 from ..storage.recorder import Recorder, Recording
 from ..storage.stopfile import StopFile
 from . import half_mesh, restart, watch
-from .errors_so_far import ErrorsSoFar
 from .half_mesh import HalfMesh
 from .journey import DONE, Journey
 from .restart import Origin
@@ -51,13 +51,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run has ended: its exit code, and where it was left with which errors; or the checkpoint at which there was
-    nothing to do."""
+    """How a run has ended: its exit code, and where it was left; or the checkpoint at which there was nothing to do."""
 
     code: int
     march: March | None
     contents: Contents | None = None
-    errors: ErrorsSoFar | None = None
 
 
 def run(job: Job, slab: Slab, options: Options) -> int:
@@ -90,7 +88,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         wisdom.keep(choices(job).transforms, slab)
         provenance = provenance_of(job, slab, origin.contents if origin else None, doubts)
         claim = restart.claim(plain, origin)
-        recorder = _begin(marching.scene, directory, claim, provenance, origin, timeline, options.quiet)
+        recorder = _begin(marching, directory, claim, provenance, origin, timeline, options.quiet)
         try:
             for text in header.lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
@@ -106,13 +104,13 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 code, half = _half_mesh(job, slab, options, recorder.console, stop_file)
                 if code != DONE:
                     return Ended(code, marching)
-                saved = origin.contents.numbers if origin else None
-                errors = ErrorsSoFar(marching.row, saved, half)
+                if half is not None:
+                    marching.compare_with(partial(half.known_better, timeline=timeline))
                 told = set(sanity.ODD_CONTACTS if options.beside else ())
                 contacts = sanity.ContactWatch(job.numerics.strict, timeline, told)
                 parts = marching, timeline, directory, recorder, watching, facts
-                journey = Journey(*parts, options.until, errors, contacts, options.shows)
-                return Ended(journey.go(origin), marching, errors=errors)
+                journey = Journey(*parts, options.until, contacts, options.shows)
+                return Ended(journey.go(origin), marching)
         finally:
             recorder.close()
 
@@ -172,7 +170,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
 
 
 def _begin(
-    built: Scene,
+    marching: March,
     directory: Directory,
     claim: Claim,
     provenance: Provenance,
@@ -181,6 +179,7 @@ def _begin(
     quiet: bool,
 ) -> Recorder:
     """Make the output directory ready, and its files; collective."""
+    built = marching.scene
     job, added = built.job, columns_of(built.followers)
     row.columns(0, added)  # refuses names that are taken
     directory.make(job.path, job.resolved(), claim)
@@ -192,7 +191,7 @@ def _begin(
     split = built.choices.branch_dissipation.on
     recording = Recording(
         total=len(timeline),
-        branches=len(built.energy.balance.dissipated) if split and built.energy else 0,
+        branches=len(marching.row.branch_dissipation) if split else 0,
         added=added,
         maps=job.output.fields,
         size=job.grid.size,

@@ -18,7 +18,6 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics.body import ElasticBody, ZenerBody
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
-from ..physics.entries import Remembers
 from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
 from ..physics.ledger import Ledger
@@ -107,16 +106,6 @@ class Scene:
     followers: dict[str, Effect] = field(default_factory=dict)
 
     @property
-    def parts(self) -> dict[str, Remembers]:
-        """What has a memory, by the names that checkpoints know them by."""
-        parts: dict[str, Remembers] = {"material": self.material}
-        if self.energy is not None:
-            parts["energy"] = self.energy
-            if isinstance(self.energy, ZenerEnergy) and isinstance(self.energy.inverse, ElasticPressure):
-                parts["memory"] = self.energy.inverse
-        return parts | self.followers
-
-    @property
     def choices(self) -> Choices:
         return self.setup.choices
 
@@ -160,7 +149,7 @@ def build_on(setup: Setup) -> Scene:
     """Make the scene of a setup; collective."""
     chosen, folded = setup.choices, setup.slab.agree(setup.choices.folded)
     solver, operators = _solver(setup, chosen.numerics.tolerance, chosen.operator_type)
-    inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.pressure)
+    inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
     material, energy = _body_and_energy(setup, folded, inverse)
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.ledger(), energy)
     scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}

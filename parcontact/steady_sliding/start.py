@@ -4,10 +4,9 @@ from dataclasses import replace
 
 from ..errors import InputError
 from ..job import Job
-from ..march.state import State
-from ..march.step import March
+from ..march.loop import March
+from ..march.state import first_state, pressed_state
 from ..parallel.slab import Slab
-from ..physics.body import ZenerBody
 from ..scene import Setup, build_on, set_up
 from ..solve.nonsymmetric.steady import SteadyContact
 from ..storage.checkpoint import Contents
@@ -39,16 +38,15 @@ def _from_steady_sliding(setup: Setup) -> March:
         raise InputError("output.energy: energies count from a body at rest, so they need initial: {state: virgin}")
     point, contact = _solve(setup)
     scene = build_on(setup)
-    workspace = scene.solver.workspace
-    if isinstance(scene.material, ZenerBody):
-        velocity, spare = setup.job.initial.velocity, workspace.other_displacement
-        scene.material.begin_with(contact.u, branch_maps(setup, contact, velocity, spare))
+    workspace, body = scene.solver.workspace, scene.material.at_rest()
+    branches = branch_maps(setup, contact, setup.job.initial.velocity, workspace.other_displacement)
+    scene.material.start_from(body, contact.u, branches)
     workspace.pressure[...] = contact.p
     iterations, approach = contact.steps, contact.d
     del contact
-    march = March(scene)
+    state = first_state(scene, body)
     row = replace(
-        march.row,
+        state.row,
         measures=point.measures,
         iterations=iterations,
         certificate=point.certificate,
@@ -56,8 +54,7 @@ def _from_steady_sliding(setup: Setup) -> March:
         operator_calls=round(point.operator_calls),
         seconds=point.seconds,
     )
-    march.begin_with(State(row, workspace.pressure, None, 1.0, 1.0, approach))
-    return march
+    return March(scene, pressed_state(scene, state, row, workspace.pressure, approach))
 
 
 def _solve(setup: Setup) -> tuple[Point, SteadyContact]:

@@ -16,7 +16,7 @@ from typing import Any
 from .. import scene
 from ..job import AUTO, Job
 from ..march import loop
-from ..march.step import March
+from ..march.loop import March
 from ..parallel.slab import Slab
 from ..parallel.tally import Tally
 from ..steady_sliding import start

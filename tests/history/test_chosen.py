@@ -14,7 +14,6 @@ from mpi4py import MPI
 from parcontact.history.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
-from parcontact.march.rest import steps_to_make
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
 
@@ -118,7 +117,7 @@ def test_error_falls_with_what_is_asked_for() -> None:
 def test_an_elastic_body_needs_no_choice() -> None:
     """A cell per step in sliding, one step at rest, some on a ramp; nothing is remembered of it."""
     march, rows = marched(data(PRESS, SLIDE, LIFT, material={"model": "elastic", "shear_modulus": 1e6}))
-    assert march.chosen is None
+    assert march.state.chosen is None
     assert [span.count for span in march.timeline().spans] == [1, 7, 3]
     assert not [name for name in march.entries() if name in ChosenSteps().numbers()]
     assert len(rows) == 1 + 1 + 11
@@ -129,8 +128,8 @@ def test_an_elastic_body_needs_no_choice() -> None:
 def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
     """No entry, no record, no judge, and no map beside those of the fixed steps."""
     fixed = begun(job({**SLIDE, "cells_per_step": 1}))
-    assert fixed.chosen is None
-    for step in steps_to_make(fixed, fixed.timeline()):
+    assert fixed.state.chosen is None
+    for step in fixed.steps():
         assert step.judge is None
         fixed.advance(step)
     assert not any(name in fixed.entries() for name in ChosenSteps().numbers())

@@ -6,7 +6,7 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
-from parcontact.physics.budget import ErrorBudget, Summary, estimate, estimate_steady
+from parcontact.physics.budget import ErrorBudget, ErrorSums, estimate, estimate_steady
 from parcontact.physics.measures import SIDE
 from parcontact.physics.prony import Prony
 from parcontact.physics.seen import Known, Seen, count_spots, spot_radius
@@ -182,10 +182,10 @@ def test_nearly_full_contact_has_edges_and_waves() -> None:
 
 def test_summary() -> None:
     """Without a slide means over time, of friction in proportion to it; in sentences."""
-    summary = Summary()
-    summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
-    summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
-    summary.add(estimate(KNOWN, Seen(5e-3, 0.0, 2.0, 0.02, 0.0, 0.1, 0.1), 10_000), 0.0, 1.0)
+    summary = ErrorSums()
+    summary = summary.plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
+    summary = summary.plus(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
+    summary = summary.plus(estimate(KNOWN, Seen(5e-3, 0.0, 2.0, 0.02, 0.0, 0.1, 0.1), 10_000), 0.0, 1.0)
     assert summary.friction is not None
     assert summary.area is not None
     one = 1.1e-3 / spots(SEEN, 10_000) ** 0.25
@@ -197,18 +197,18 @@ def test_summary() -> None:
     assert "try" not in friction
     assert area.startswith("estimated error of contact area, corrected: ")
     assert area.endswith("; more than numerics.accuracy = 0.012 asks for: try a finer grid")
-    assert Summary().lines(0.012) == []
+    assert ErrorSums().lines(0.012) == []
     assert ", mean over time; more than" in area
     assert summary.lines(0.012, ["mesh"])[1].endswith(": try a smaller numerics.accuracy")
 
 
 def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
     """A slide of 1 mm, then an hour at rest under other errors: the slide's, but for nothing."""
-    summary, slide = Summary(), estimate(KNOWN, SEEN, 10_000)
+    summary, slide = ErrorSums(), estimate(KNOWN, SEEN, 10_000)
     rest = estimate(KNOWN, Seen(5e-2, 0.1, 2.0, 0.02, 0.01, 0.1, 0.05), 10_000)
-    summary.add(rest, 0.0, 1e-3)
-    summary.add(slide, 0.02, 1e-2, slid=1e-3)
-    summary.add(rest, 0.01, 3600.0)
+    summary = summary.plus(rest, 0.0, 1e-3)
+    summary = summary.plus(slide, 0.02, 1e-2, slid=1e-3)
+    summary = summary.plus(rest, 0.01, 3600.0)
     assert summary.friction is not None
     assert summary.area is not None
     assert slide.friction is not None
@@ -225,8 +225,8 @@ def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
     budget = estimate(KNOWN, seen, 10_000).friction
     assert budget is not None
     assert budget.solver * friction == pytest.approx(0.4 * 2e-5 / spots(seen, 10_000) ** 0.5)
-    summary = Summary()
-    summary.add(ErrorBudget(budget, budget), friction, 1.0, slid=1e-3)
+    summary = ErrorSums()
+    summary = summary.plus(ErrorBudget(budget, budget), friction, 1.0, slid=1e-3)
     assert summary.friction_within == pytest.approx(budget.total * friction)
     assert summary.lines(0.01)[-1].startswith(f"friction is 0 +- {budget.total * friction:.2g}: ")
 
@@ -272,26 +272,24 @@ def test_steady_friction_is_by_energy() -> None:
 
 
 def test_summary_goes_on() -> None:
-    """From the sums of another, as if there had been one; as plain data it has parts that add up."""
-    one, other = Summary(), Summary()
-    for summary in (one, other):
-        summary.add(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
-    on = Summary(other.numbers)
-    for summary in (one, on):
-        summary.add(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0, 2e-4)
-    assert on.facts(0.01) == one.facts(0.01)
+    """From the entries of another, as if there had been one; as plain data it has parts that add up."""
+    other = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
+    on = ErrorSums.restored({name: np.asarray(entry.value) for name, entry in other.entries().items()})
+    step = estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0, 2e-4
+    assert on.plus(*step).facts(0.01) == other.plus(*step).facts(0.01)
     friction = on.facts(0.01)["friction"]
     assert friction.pop("total") == pytest.approx(sum(friction.values()))
-    assert other.numbers[0] == pytest.approx(0.02 * 3e-4)  # not changed by the one that went on from them
+    assert on.sums[0, 0] == pytest.approx(0.02 * 3e-4)  # not changed by what was added to it
 
 
 def test_steps_that_last_no_time_count_where_none_does() -> None:
     """Three loads without duration: their mean; beside a step that lasts they are nothing."""
-    summary = Summary()
+    summary = ErrorSums()
     for complementarity in (1e-3, 2e-3, 6e-3):
-        summary.add(estimate(KNOWN, Seen(complementarity, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0)
+        summary = summary.plus(estimate(KNOWN, Seen(complementarity, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0)
     assert summary.friction is None
     assert summary.area is not None
     assert summary.area.solver == pytest.approx(0.1 * (1e-3**0.7 + 2e-3**0.7 + 6e-3**0.7) / 3)
-    summary.add(estimate(KNOWN, Seen(8e-3, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9)
-    assert summary.area.solver == pytest.approx(0.1 * 8e-3**0.7)
+    area = summary.plus(estimate(KNOWN, Seen(8e-3, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9).area
+    assert area is not None
+    assert area.solver == pytest.approx(0.1 * 8e-3**0.7)

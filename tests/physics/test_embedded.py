@@ -10,6 +10,8 @@ from parcontact.physics.body import Heights, ZenerBody
 from parcontact.physics.embedded import SAMPLED_ROWS, Embedded
 from parcontact.physics.prony import Prony
 
+from .held import HeldBody
+
 PRONY = Prony(0.5, np.array([2.0, 1.0, 4.0]), np.array([1e-3, 1e-1, 3.0]))
 DX = 0.25
 
@@ -17,16 +19,16 @@ DX = 0.25
 def march(comm: MPI.Intracomm, name: str, nx: int, ny: int, dt: float) -> tuple[Embedded, list[np.ndarray], float]:
     """Two steps of a body under displacements that are given; the look at the second, and its maps on all rows."""
     slab = Slab(comm, nx, ny)
-    body = ZenerBody(slab, PRONY, name)
+    body = HeldBody(ZenerBody(slab, PRONY, name))
     dice = np.random.default_rng(3)
     heights, first, second, p = (dice.normal(size=(ny, nx))[slab.rows] for _ in range(4))
-    pair = Embedded(slab, body, DX)
+    pair = Embedded(slab, body.body, DX)
     for u, step in ((first, 2e-3), (second, dt)):
         trial = body.begin(step, Heights(heights, 2))
         displacement = u + trial.effective - np.roll(heights, 2, axis=1)  # so that u is the new displacement
         body.commit(trial, displacement)
     pressure = np.maximum(p, 0.0)
-    look = pair.look(dt, trial, pressure, displacement, slab.sum(float(pressure.sum()))[0], 1.0)
+    look = pair.look(dt, trial, body.memory, pressure, displacement, slab.sum(float(pressure.sum()))[0], 1.0)
     found = [body.u.copy(), pressure, displacement * trial.alpha, np.roll(heights, 2, axis=1)]
     return pair, [*found, np.array([look.difference, look.slope, look.angle])], trial.alpha
 
@@ -89,8 +91,8 @@ def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
 def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None:
     """Pressure on a single row of 200: all ranks see what is on it, and find the same as if that was all the map."""
     slab = Slab(comm, 8, 200)
-    body = ZenerBody(slab, PRONY, "exponential")
-    pair = Embedded(slab, body, DX)
+    body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
+    pair = Embedded(slab, body.body, DX)
     pressure = slab.zeros()
     if row in range(*slab.rows.indices(200)):
         pressure[row - slab.rows.start] = 1.0
@@ -99,25 +101,27 @@ def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None
     displacement[...] = 1.0
     body.commit(trial, displacement)
     line = Slab(MPI.COMM_SELF, 8, 1)
-    alone = ZenerBody(line, PRONY, "exponential")
+    alone = HeldBody(ZenerBody(line, PRONY, "exponential"))
     one = alone.begin(1e-2, Heights(np.zeros((1, 8))))
     alone.commit(one, np.ones((1, 8)))
-    expected = Embedded(line, alone, DX).look(1e-2, one, np.ones((1, 8)), np.ones((1, 8)), 8.0, 1.0)
+    expected = Embedded(line, alone.body, DX).look(1e-2, one, alone.memory, np.ones((1, 8)), np.ones((1, 8)), 8.0, 1.0)
     assert expected.difference > 0.0
     assert_allclose(
-        pair.look(1e-2, trial, pressure, displacement, 8.0, 1.0).difference, expected.difference, rtol=1e-12
+        pair.look(1e-2, trial, body.memory, pressure, displacement, 8.0, 1.0).difference,
+        expected.difference,
+        rtol=1e-12,
     )
 
 
 def test_nothing_pressed_and_jumps() -> None:
     """No pressure: no difference. A jump relaxes nothing, in either integrator."""
     slab = Slab(MPI.COMM_SELF, 4, 4)
-    body = ZenerBody(slab, PRONY, "exponential")
-    pair = Embedded(slab, body, DX)
+    body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
+    pair = Embedded(slab, body.body, DX)
     trial = body.begin(0.0, Heights(slab.zeros()))
     body.commit(trial, np.ones((4, 4)))
-    assert pair.look(0.0, trial, np.ones((4, 4)), np.ones((4, 4)), 16.0, 1.0).difference == 0.0
-    assert pair.look(1.0, trial, np.zeros((4, 4)), np.ones((4, 4)), 0.0, 0.0).difference == 0.0
+    assert pair.look(0.0, trial, body.memory, np.ones((4, 4)), np.ones((4, 4)), 16.0, 1.0).difference == 0.0
+    assert pair.look(1.0, trial, body.memory, np.zeros((4, 4)), np.ones((4, 4)), 0.0, 0.0).difference == 0.0
 
 
 def test_second_order_of_a_step() -> None:
@@ -125,12 +129,12 @@ def test_second_order_of_a_step() -> None:
     slab = Slab(MPI.COMM_SELF, 4, 1)
     found = []
     for count in (64, 128):
-        body = ZenerBody(slab, PRONY, "exponential")
-        pair, dt = Embedded(slab, body, DX), 1e-3 / count
+        body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
+        pair, dt = Embedded(slab, body.body, DX), 1e-3 / count
         for step in range(1, count + 1):
             trial = body.begin(dt, Heights(slab.zeros()))
             body.commit(trial, np.sin(3e3 * step * dt) + trial.effective)
-        found.append(pair.look(dt, trial, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0).difference)
+        found.append(pair.look(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0).difference)
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
 
 
@@ -142,8 +146,8 @@ def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: flo
     """Two where the branch is slow, to z = dt/tau; one where there are as many branches of every time, to the share of
     those beyond the ends. A jump, and a body of no branch, have none: two is what is told."""
     slab, prony = Slab(MPI.COMM_SELF, 4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
-    body = ZenerBody(slab, prony, "exponential")
+    body = HeldBody(ZenerBody(slab, prony, "exponential"))
     trial = body.begin(dt, Heights(slab.zeros()))
     body.commit(trial, np.ones((1, 4)))
-    look = Embedded(slab, body, DX).look(dt, trial, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
+    look = Embedded(slab, body.body, DX).look(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
     assert look.order == pytest.approx(order, rel=1e-5)

@@ -15,6 +15,8 @@ from parcontact.physics.folding import Band, FoldedBranches, Phase, fold_branche
 from parcontact.physics.prony import Integrator, Prony, creep, normal_form
 from parcontact.theory import full_contact
 
+from .held import HeldBody
+
 Array = NDArray[np.float64]
 
 POINT = Slab(MPI.COMM_SELF, 1, 1)
@@ -77,9 +79,9 @@ def test_creep_with_frozen_branches() -> None:
 # -- memoryless branches against all branches --------------------------------------------------------------------------
 
 
-def stresses(body: ZenerBody, moments: list[tuple[float, float]]) -> Array:
+def stresses(material: ZenerBody, moments: list[tuple[float, float]]) -> Array:
     """The pressure of a point whose displacement is prescribed, a (dt, u) per step."""
-    found = []
+    body, found = HeldBody(material), []
     for dt, u in moments:
         heights = Heights(np.full((1, 1), u))
         trial = body.begin(dt, heights)
@@ -144,7 +146,8 @@ def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
     whole, fewer = (stresses(ZenerBody(POINT, DECADES, "exponential", memoryless=fast), held) for fast in ([], [0]))
     assert whole[0] == fewer[0]
     wrong = (
-        np.abs(fewer - whole)[1:] / ZenerBody(POINT, DECADES, "exponential").begin(dt, Heights(np.zeros((1, 1)))).alpha
+        np.abs(fewer - whole)[1:]
+        / HeldBody(ZenerBody(POINT, DECADES, "exponential")).begin(dt, Heights(np.zeros((1, 1)))).alpha
     )
     assert_allclose(wrong[0], errors.memoryless_errors[0], rtol=1e-6)
     assert wrong[1] < 1e-3 * wrong[0]
@@ -156,7 +159,7 @@ def test_steps_that_outgrow_stiffer_branches() -> None:
     prony, steps = normal_form(1e3, [1e9, 1e6], [1.0, 1e6]), 10.0 ** np.arange(0, 8)
     whole, fewer = (ZenerBody(POINT, prony, "exponential", memoryless=fast) for fast in ([], [1]))
     moments = [(dt, float(time)) for dt, time in zip(steps, np.cumsum(steps), strict=True)]
-    moduli = [whole.begin(dt, Heights(np.zeros((1, 1)))).alpha for dt in steps]
+    moduli = [HeldBody(whole).begin(dt, Heights(np.zeros((1, 1)))).alpha for dt in steps]
     wrong = np.abs(stresses(fewer, moments) - stresses(whole, moments)) / moduli / np.cumsum(steps)
     found = fold_branches(prony, [Phase(moments[-1][1], 1.0, 1e7, (0.0, 0.0), jump=False)], [WAVE], "exponential", 0.5)
     assert 0.05 < wrong.max() <= found.memoryless_errors[1]

@@ -45,16 +45,18 @@ def test_commit(offset: int) -> None:
     displacement, work, u, heights = maps(4)
     expected = displacement - work + roll(heights, offset)
     increment = expected - u
-    loops.commit(displacement, work, u, heights, offset)
-    assert_allclose(u, expected, rtol=1e-14, atol=1e-14)
+    new = np.empty_like(u)
+    loops.commit(displacement, work, u, heights, offset, new)
+    assert_allclose(u, maps(4)[2], rtol=0)
+    assert_allclose(new, expected, rtol=1e-14, atol=1e-14)
     assert_allclose(work, increment, rtol=1e-14, atol=1e-14)
 
 
 def test_commit_on_its_own_map() -> None:
-    """Heights may be the displacement itself."""
+    """Heights, and the new displacement, may be in the map of the displacement itself."""
     displacement, work, u = maps(3)
     expected = displacement - work + u
-    loops.commit(displacement, work, u, u, 0)
+    loops.commit(displacement, work, u, u, 0, u)
     assert_allclose(u, expected, rtol=1e-14, atol=1e-14)
     assert_allclose(work, displacement - maps(3)[1], rtol=1e-14, atol=1e-14)
 

@@ -15,7 +15,7 @@ from parcontact.job import Job
 from parcontact.job.checks.advice import cells_per_wave
 from parcontact.job.sections.listing import plain
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import SPOTS_ORDER, Summary
+from parcontact.physics.budget import SPOTS_ORDER, ErrorSums
 from parcontact.physics.time_error import TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.costs import Costs, costs_of
@@ -144,10 +144,10 @@ def test_what_is_offered_keeps_its_promise(accuracy: float) -> None:
     found = price.offer(costs_of(planned, seen, 1e30), accuracy)
     stage = {**{k: v for k, v in SLIDE.items() if k != "cells_per_step"}, "time_step": 0.01 / (found.sample.steps - 1)}
     _, rows = marched(Job.model_validate({**plain(found.job), "history": [stage]}))
-    budget, calls = Summary(), sum(row.operator_calls for row in rows)
+    budget, calls = ErrorSums(), sum(row.operator_calls for row in rows)
     for before, row in pairwise(rows):
         assert row.errors is not None
-        budget.add(row.errors, row.measures.friction, row.time - before.time)
+        budget = budget.plus(row.errors, row.measures.friction, row.time - before.time)
     assert budget.friction is not None
     assert len(rows) == 1 + found.sample.steps  # the initial state, and the jump of the load among the steps
     assert budget.friction.total <= accuracy
@@ -163,10 +163,10 @@ def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
     short = {**SLIDE, "distance": 2.5e-4}
     planned = job(history=[{**short, "velocity": 0.01}, {**short, "velocity": 0.5}])
     seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
-    budget, (_, rows) = Summary(), marched(planned)
+    budget, (_, rows) = ErrorSums(), marched(planned)
     for before, row in pairwise(rows):
         assert row.errors is not None
-        budget.add(row.errors, row.measures.friction, row.time - before.time, row.distance - before.distance)
+        budget = budget.plus(row.errors, row.measures.friction, row.time - before.time, row.distance - before.distance)
     for name, parts in (("friction", budget.friction), ("area", budget.area)):
         assert parts is not None
         assert price.mesh_error(seen, name) == pytest.approx(parts.mesh, rel=1e-6)

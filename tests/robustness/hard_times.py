@@ -20,7 +20,7 @@ from parcontact.doctor.jobs import (
     wave,
     zener,
 )
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.physics import prony as viscoelastic
 
 STIFF = 2 * K * HEIGHT  # pressure amplitude of the wave in full contact over the modulus

@@ -11,8 +11,7 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.job import Job
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import ZenerBody
 from parcontact.storage.row import Row
@@ -60,11 +59,11 @@ class Periods:
 
     def __call__(self, march: March) -> None:
         if march.row.step > 1 and (march.row.step - 1) % PERIOD == 0:
-            material = march.scene.material
+            material, memory = march.scene.material, march.state.body
             assert isinstance(material, ZenerBody)
-            material.settle()
+            material.settle(memory)
             units = march.scene.units
-            maps = [march.field("displacement"), *(units.modulus * units.height * value for value in material.branches)]
+            maps = [march.field("displacement"), *(units.modulus * units.height * value for value in memory.branches)]
             self.states.append(np.array(maps))
             self.rows.append(march.row)
 

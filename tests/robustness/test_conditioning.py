@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from parcontact.march.failure import StepError
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.solve import kernels
 from parcontact.storage.row import Row

@@ -35,7 +35,7 @@ def driven(u: Any, decay: Any, gain: Any, count: int) -> Any:
         heights[0, 0] = u[n % u.size]
         begin(branches, pending, added, work, decay, 0.0, last, heights, 0)
         if n <= count:
-            commit(work.copy(), work, last, heights, 0)
+            commit(work.copy(), work, last, heights, 0, last)
             pending, added = decay, gain
     return branches[:, 0, 0]
 

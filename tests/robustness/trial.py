@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 
 from . import scenes, twins

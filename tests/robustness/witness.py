@@ -9,8 +9,7 @@ import numpy as np
 from parcontact.errors import RunError
 from parcontact.history import timeline as clock
 from parcontact.history.timeline import Step, Timeline
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Array
 from parcontact.storage.row import Row
 
@@ -156,7 +155,7 @@ class Witness:
         if step.control == "approach":
             return False
         mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
-        alpha = scene.material.begin(step.dt, scene.motion.at(step.position)).alpha
+        alpha = scene.material.begin(self.march.state.body, step.dt, scene.motion.at(step.position)).alpha
         strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
         allowed = scene.job.numerics.tolerance * SHALLOW * scene.setup.height
         return DIGITS * EPS * strain * max(grid.lx, grid.ly) > allowed

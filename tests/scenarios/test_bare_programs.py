@@ -47,13 +47,13 @@ def lasting(planned: Job) -> Counter[str]:
     path = WholeCells(base.surface)
     memory = base.prony.moduli.size > 0
     body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
-    solver, operators = bare_solver(base)
+    held, (solver, operators) = body.at_rest(), bare_solver(base)
     ledger = Ledger(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
     moduli, cells, dt = [0.0, 0.0], 0, -1.0
     for step in Timeline.of(planned):
         heights = path.at(step.position)
-        trial = body.begin(step.dt, heights)
+        trial = body.begin(held, step.dt, heights)
         alpha = trial.alpha
         now, before = (1.0 + step.growth) * moduli[1] / alpha, step.growth * moduli[0] / alpha
         loops.travel(last, earlier, now, before, heights.offset - cells, 0.0, np.inf, p)
@@ -61,12 +61,12 @@ def lasting(planned: Job) -> Counter[str]:
         load_of_step = MeanPressure(step.load / (alpha * base.units.pressure))
         contact = solver.solve(Problem(*operators, trial.effective, NonNegative(), load_of_step), p)
         found = ledger.measures(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
-        body.commit(trial, contact.u)
+        held = body.commit(held, trial, contact.u, p if held.displacement is None else held.displacement)
         if isinstance(body, ZenerBody) and step.dt != dt:
             # The error budget looks at what the other integrator would have done, once for some steps that are alike.
             load, dt = found.pressure * slab.points / (alpha * base.units.pressure), step.dt
             pair = Embedded(slab, body, base.job.grid.dx / base.units.length)
-            pair.look(step.dt, trial, contact.p, contact.u, load, found.contact_area)
+            pair.look(step.dt, trial, held, contact.p, contact.u, load, found.contact_area)
             friction_by_energy(slab, contact.p, contact.u, (1.0, 1.0), (1.0, 0.0), True)  # as often
         earlier, last, p = last, p, earlier
     return slab.tally.copy()

@@ -9,8 +9,7 @@ from marching import begun, column, marched
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from parcontact.march.loop import run
-from parcontact.march.step import March
+from parcontact.march.loop import March, run
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "rms_slope": 0.02, "seed": 1}
 RUBBER = {"model": "elastic", "shear_modulus": 1e6}

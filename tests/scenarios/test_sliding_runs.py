@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from sliding import FAST, PRESS, WAVELENGTH, Json, rough, slide, wave
 
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.physics.prony import Integrator
 from parcontact.storage.row import Row
 

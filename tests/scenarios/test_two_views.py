@@ -9,7 +9,7 @@ from marching import marched
 
 import parcontact as pc
 from parcontact.job import Job
-from parcontact.physics.budget import Summary
+from parcontact.physics.budget import ErrorSums
 from parcontact.python.curves import Curve
 
 Json = dict[str, Any]
@@ -77,10 +77,10 @@ def test_friction_of_an_elastic_slide_is_0_within_its_error(velocity: Any) -> No
     """Friction by slopes is an error of the mesh, and its budget says so: all of it is wrong."""
     slide = {"pressure": 1e5, "velocity": velocity, "distance": 2.5e-4, "cells_per_step": 1}
     _, rows = marched(Job.model_validate(scene(8, ELASTIC, history=[slide], numerics={"tolerance": 1e-9})))
-    summary = Summary()
+    summary = ErrorSums()
     for row in rows:
         if row.errors is not None:
-            summary.add(row.errors, row.measures.friction, 1.0, 1.0)
+            summary = summary.plus(row.errors, row.measures.friction, 1.0, 1.0)
             assert row.errors.friction is not None
             assert row.errors.friction.mesh >= 1.0
     mean = np.mean([row.measures.friction for row in rows if row.errors])

@@ -8,7 +8,7 @@ import pytest
 from marching import PRONY, SLS, column, example, marched
 from numpy.testing import assert_allclose
 
-from parcontact.march.step import March
+from parcontact.march.loop import March
 from parcontact.storage.row import Row
 from parcontact.theory import lee_radok, westergaard
 

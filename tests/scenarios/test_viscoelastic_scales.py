@@ -7,8 +7,8 @@ import pytest
 from marching import BRANCHES, SLS, begun, column, marched
 from numpy.testing import assert_allclose
 
-from parcontact.march.step import March
-from parcontact.physics.body import ZenerBody
+from parcontact.march.loop import March
+from parcontact.physics.body import BodyMemory, ZenerBody, surface_of
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
 
 Json = dict[str, Any]
@@ -132,18 +132,17 @@ def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
 
     def check(march: March) -> None:
         energy, body = march.scene.energy, march.scene.material
+        assert march.state.energy is not None
         assert isinstance(energy, ZenerEnergy)
         assert isinstance(body, ZenerBody)
-        body.settle()
+        maps = maps_of(body, march.state.body)
         if isinstance(energy.inverse, ElasticPressure):
-            memory = energy.inverse.body
-            memory.settle()
-            assert_allclose(applied(march, memory.u), body.u, rtol=0, atol=1e-12 * np.abs(body.u).max())
-        maps = [body.u, *body.branches]
+            inner = maps_of(energy.inverse.body, march.state.energy.elastic)[0]
+            assert_allclose(applied(march, inner), maps[0], rtol=0, atol=1e-12 * np.abs(maps[0]).max())
         inverses = [inverse(march, index) for index in range(len(maps))]
         weights = [body.prony.modulus_inf, *(1.0 / body.prony.moduli)]
         direct = 0.5 * sum(w * np.sum(a * b) for w, a, b in zip(weights, maps, inverses, strict=True))
-        assert energy.balance.stored == pytest.approx(direct, rel=1e-9, abs=1e-30)
+        assert march.state.energy.stored == pytest.approx(direct, rel=1e-9, abs=1e-30)
         checked.append(direct)
 
     _, rows = marched(data, [check])
@@ -151,6 +150,13 @@ def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
     for row in rows:
         assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-11, abs=1e-30)
         assert row.dissipated == pytest.approx(sum(row.branch_dissipation), rel=1e-12)
+
+
+def maps_of(body: ZenerBody, memory: BodyMemory | None) -> list[np.ndarray]:
+    """The displacement and the branch maps."""
+    assert memory is not None
+    body.settle(memory)
+    return [surface_of(memory), *memory.branches]
 
 
 def applied(march: March, field: np.ndarray) -> np.ndarray:
@@ -162,12 +168,12 @@ def inverse(march: March, index: int) -> np.ndarray:
     """A^-1 of the displacement (0) or of a branch map (1, 2, ...)."""
     scene = march.scene
     body, energy = scene.material, scene.energy
+    assert march.state.energy is not None
     assert isinstance(energy, ZenerEnergy)
     assert isinstance(body, ZenerBody)
     if isinstance(energy.inverse, ElasticPressure):
-        memory = energy.inverse.body
-        return [memory.u, *memory.branches][index]
-    field = [body.u, *body.branches][index]
+        return maps_of(energy.inverse.body, march.state.energy.elastic)[index]
+    field = maps_of(body, march.state.body)[index]
     return scene.operators.preconditioner.apply(field, np.empty_like(field))
 
 

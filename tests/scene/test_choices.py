@@ -32,6 +32,7 @@ from marching import begun, marched
 from parcontact import scene
 from parcontact.history.timeline import Timeline
 from parcontact.march import step
+from parcontact.march.starts import NAME
 from parcontact.solve import contact as contact_solver
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.problem import Approach, Problem
@@ -182,7 +183,7 @@ def test_isolated_contact() -> None:
 def test_extrapolated_starts() -> None:
     """Off: no earlier pressure is kept; the same solves otherwise."""
     single, lasts = job(history=[STAND, {"pressure": 4e3}]), job(history=[STAND, {**PRESS, "time_step": 1e-3}])
-    assert begun(single).state.earlier is None
+    assert len(begun(single).state.pasts) == 1
     assert extra(lasts, single) == {"map bytes": MAP}
     assert [row(planned, "extrapolated starts").on for planned in (single, lasts)] == [False, True]
 
@@ -193,8 +194,8 @@ def test_starts_from_whole_cells_ago() -> None:
     off, on = (job(history=[stage], material=RUBBER) for stage in (SLIDE, chosen))
     elastic = job(history=[chosen], material=ELASTIC)
     assert [row(planned, "starts from whole cells ago").on for planned in (off, on, elastic)] == [False, True, False]
-    assert [len(begun(planned).state.further) for planned in (off, on, elastic)] == [0, 2, 0]
-    assert [len(begun(planned).starts.entries()) for planned in (off, on, elastic)] == [0, 1, 0]
+    assert [len(begun(planned).state.pasts) for planned in (off, on, elastic)] == [2, 4, 2]
+    assert [NAME in begun(planned).entries() for planned in (off, on, elastic)] == [False, True, False]
 
 
 def test_rest_cut_short() -> None:
@@ -212,7 +213,7 @@ def test_chosen_time_steps() -> None:
     elastic = job(history=[chosen], material=ELASTIC)
     assert [row(planned, "chosen time steps").on for planned in (off, on, elastic)] == [False, True, False]
     marches = [marched(planned)[0] for planned in (off, on)]
-    assert [march.chosen is None for march in marches] == [True, False]
+    assert [march.state.chosen is None for march in marches] == [True, False]
     assert len({march.scene.slab.tally["map bytes"] for march in marches}) == 1
 
 

@@ -34,7 +34,7 @@ def peers() -> ModuleType:
         (kernels.turn, {"working": 1, "z": 1, "t": 2}),  # t <- z + beta t
         (kernels.scale, {"p": 2}),
         (loops.travel, {"p": 1, "p_old": 1, "out": 1}),
-        (loops.commit, {"displacement": 1, "buffer": 2, "u": 2, "heights": 1}),
+        (loops.commit, {"displacement": 1, "buffer": 2, "u": 1, "heights": 1, "out": 1}),
         (extension._add_up_back, {"cells": 1, "beside": 1, "points": 2}),  # rows of maps, picked by a function
         (extension._interpolate_back, {"known": 1, "known_beside": 1, "points": 1, "beside": 1, "cells": 1}),
     ],

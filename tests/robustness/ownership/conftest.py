@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from parcontact import __main__
-from parcontact.march.step import March
+from parcontact.march.loop import March
 
 from .jobs import Main, write_job
 
