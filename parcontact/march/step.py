@@ -46,6 +46,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         step = verdict
     contact, slid = solved.contact, math.dist(step.position, state.position)
     _tell_effects(scene, solved, slid)
+    energy = _advance_energy(scene, state, solved)
     row = Row(
         step.number,
         step.time,
@@ -62,7 +63,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         (Past(contact.p, solved.trial.alpha, step.position), *state.pasts[:-1]),
         state.pasts[-1].pressure,
         solved.body,
-        _advance_energy(scene, state, solved),
+        energy,
         contact.d,
         state.starts.after(solved.moved_start, contact.iterations),
         errors.looks,
