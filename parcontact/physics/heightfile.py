@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import npyfile
+from .. import datafiles
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
@@ -46,7 +46,7 @@ def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
     """This rank's rows, and what is wrong with them."""
     try:
         rows = _rows(path, dataset, slab)
-        npyfile.refuse_no_numbers(path, rows.dtype)
+        datafiles.refuse_no_numbers(path, rows.dtype)
     except InputError as error:
         return np.empty(0), str(error)
     except Exception as error:  # numpy reads a header as Python; every rank must learn of it, whatever it is
@@ -58,7 +58,7 @@ def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
 
 def _rows(path: Path, dataset: str, slab: Slab) -> Values:
     if path.suffix == ".npy":
-        whole = npyfile.open_numbers(path)
+        whole = datafiles.open_numbers(path)
         _check(path, whole.shape, slab)
         return whole[slab.rows]
     if path.suffix == ".h5":

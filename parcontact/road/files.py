@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import npyfile
+from .. import datafiles
 from ..errors import InputError
 from ..parallel.slab import Array
 
@@ -73,7 +73,7 @@ def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Ma
         return _positions(path, np.loadtxt(path, ndmin=2, dtype=np.float64), UNITS[unit])
     if size is None:
         raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
-    values = npyfile.open_numbers(path) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
+    values = datafiles.open_numbers(path) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
     masked = np.ma.masked_invalid(np.asarray(values, dtype=np.float64))
     if masked.ndim != 2:
         raise InputError(f"{path} has {masked.ndim} dimensions; a map of two was expected")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..datafiles import read_lines
 from ..errors import InputError
 from ..job import RoughSpectrum
 from ..parallel.slab import Array
@@ -23,7 +24,6 @@ from ..parallel.slab import Array
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
 FEWEST = 3  # rows of numbers
-LARGEST_FILE = 50_000_000  # bytes
 ABEL_NODES = 12  # of Gauss' rule, in each piece of Abel's integral
 ABEL_DECADES = 4.0  # beyond the last point, where C1D' has fallen by more than 8
 EDGE = 1e-9  # relative: wavelengths that differ by this are the same
@@ -69,19 +69,8 @@ def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
 
 def _read(path: Path) -> tuple[Array, Array, int]:
     """Wavenumbers [rad/m], the spectrum in SI units, and the power of m in its unit."""
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{path} has more than {LARGEST_FILE / 1e6:g} MB; a table of a spectrum was expected")
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read as text: {error}") from error
-    lines = [
-        (number, re.split(r"[,;\s]+", line.strip()))
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise InputError(f"{path} is empty; {FORMS} were expected")
+    said = read_lines(path, f"a table with {FORMS}")
+    lines = [(number, re.split(r"[,;\s]+", line.strip())) for number, line in said]
     factors, power = _header(path, *lines[0])
     rows = np.array([_numbers(path, number, cells) for number, cells in lines[1:]])
     if len(rows) < FEWEST:
@@ -134,14 +123,11 @@ def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tu
 def _abel(k: float, edges: Array, logs: Array, slopes: Array) -> float:
     """-1/(2 pi) int C1D'(k cosh t) dt from k on, for power laws between the edges (of log q); Gauss' rule in each."""
     nodes, weights = np.polynomial.legendre.leggauss(ABEL_NODES)
-    total = 0.0
     t = np.arccosh(np.exp(np.maximum(edges - np.log(k), 0.0)))
-    for piece in range(len(slopes)):
-        parts = max(1, int(np.ceil(t[piece + 1] - t[piece])))
-        ends = np.linspace(t[piece], t[piece + 1], parts + 1)
+    total = 0.0
+    for start, end, edge, log, slope in zip(t, t[1:], edges, logs, slopes, strict=False):
+        ends = np.linspace(start, end, max(1, int(np.ceil(end - start))) + 1)
         half = np.diff(ends)[:, None] / 2
-        at = (ends[:-1, None] + half * (1 + nodes)).ravel()
-        log = np.log(k) + np.log(np.cosh(at))
-        derivative = slopes[piece] * np.exp(logs[piece] + slopes[piece] * (log - edges[piece]) - log)
-        total += float((half * weights).ravel() @ derivative)
+        log_q = np.log(k) + np.log(np.cosh(ends[:-1, None] + half * (1 + nodes)))
+        total += float(np.sum(half * weights * slope * np.exp(log + slope * (log_q - edge) - log_q)))
     return -total / (2 * np.pi)

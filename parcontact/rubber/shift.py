@@ -6,13 +6,13 @@ Arrhenius   log10 a_T = E/(R ln 10) (1/T - 1/T_ref)           temperatures in K
 table       log10 a_T given at some temperatures, linear between them and nowhere beyond
 """
 
-import csv
 import math
 from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from ..datafiles import read_lines
 from ..errors import InputError
 
 GAS = 8.314462618  # J/(mol K)
@@ -113,20 +113,17 @@ def _within(text: str, value: float, low: float, high: float) -> float:
 
 
 def _table(path: Path, reference: float | None) -> Factors:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file, skipinitialspace=True) if row and not row[0].startswith("#")]
-    except OSError as error:
-        raise InputError(
-            f"--shift must be wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file: {error}"
-        ) from error
-    head = [[name.strip() for name in row] for row in rows[:2]]
-    units = 2 if head[:1] == [["T", "log_aT"]] and head[1:] in ([["C", "-"]], [["°C", "-"]]) else 1  # as pyvisco's
+    if not path.is_file():
+        laws = "wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file"
+        raise InputError(f"--shift must be {laws}: there is no file {path}")
+    lines = read_lines(path, "a table of T[C],log_aT")
+    rows = [[cell.strip() for cell in line.split(",")] for _, line in lines]
+    units = 2 if rows[0] == ["T", "log_aT"] and rows[1:2] in ([["C", "-"]], [["°C", "-"]]) else 1  # as pyvisco's
     try:
         pairs = sorted((float(temperature), float(log)) for temperature, log in rows[units:])
     except ValueError:
         raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of a_T") from None
-    if (units == 1 and head[:1] != [["T[C]", "log_aT"]]) or len(pairs) < 2:
+    if (units == 1 and rows[0] != ["T[C]", "log_aT"]) or len(pairs) < 2:
         raise InputError(f"{path}: a table of T[C],log_aT with at least two rows was expected")
     temperatures, logs = zip(*pairs, strict=True)
     if len(set(temperatures)) < len(temperatures):

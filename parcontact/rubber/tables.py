@@ -22,12 +22,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..datafiles import read_lines
 from ..errors import InputError
 from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
 Kind = Literal["frequency", "time"]
-LARGEST_FILE = 50_000_000  # bytes
 LEAST_ROWS = 3  # of a set: fewer say nothing about a spectrum
 NEAR = 1.5  # degrees: measured temperatures of one set vary by less
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
@@ -80,29 +80,18 @@ class _Column(NamedTuple):
 
 def read(path: Path, poisson: float = 0.5) -> Measurement:
     """Read a table; Young's moduli become those of shear, `G = E/(2 (1 + nu))`. Raises InputError."""
-    lines = list(_lines(path))
-    if not lines:
-        raise InputError(f"{path} is empty; a table of moduli was expected")
+    lines = read_lines(path, "a table of moduli")
     columns, first = _columns(path, lines)
     rows = np.array([_numbers(path, number, text, columns) for number, text in lines[first:]])
     if len(rows) < LEAST_ROWS:
         raise InputError(f"{path} has {len(rows)} rows of numbers; at least {LEAST_ROWS} were expected")
-    return _measurement(path, columns, rows, [number for number, _ in lines[first:]], poisson)
-
-
-def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """The lines that say something, with their numbers."""
-    try:
-        if not path.is_file():
-            raise InputError(f"{path} is not a file; a table of moduli was expected")
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{path} has more than {LARGEST_FILE / 1e6:g} MB; a table of moduli was expected")
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read as text: {error}") from error
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip(" \t,;") and not line.lstrip().startswith("#"):
-            yield number, line
+    names = [column.name for column in columns]
+    for name in names:
+        if names.count(name) > 1 or (name in RATES_OF and len(RATES_OF & set(names)) > 1):
+            raise InputError(f"{path}: two columns mean the same: {name} is given twice; remove one")
+    values = {name: rows[:, k] for k, name in enumerate(names)}
+    units = {column.name: column.unit for column in columns}
+    return _Table(path, values, units, [number for number, _ in lines[first:]]).measurement(poisson)
 
 
 def _split(line: str) -> list[str]:
@@ -126,7 +115,7 @@ def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column
     names = [_name(name) for name in _split(head)]
     units = _split(lines[1][1]) if len(lines) > 1 else []
     units += [""] * (len(names) - len(units))
-    if _is_number(names[0]) or _is_number(units[0]):
+    if not (math.isnan(_number(names[0])) and math.isnan(_number(units[0]))):
         raise InputError(
             f"{path}:{number}: names and units of the columns were expected, such as f[Hz] E'[MPa] E''[MPa], or two "
             "rows with names and units"
@@ -154,12 +143,12 @@ def _name(text: str) -> str:
     return WORDS.get(re.sub(r"\s+", " ", text.lower()), text)
 
 
-def _is_number(text: str) -> bool:
+def _number(text: str) -> float:
+    """The number that a text is; nan for another text."""
     try:
-        float(text)
+        return float(text)
     except ValueError:
-        return False
-    return True
+        return math.nan
 
 
 def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> list[float]:
@@ -167,78 +156,82 @@ def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> 
     if len(parts) != len(columns):
         raise InputError(f"{path}:{number}: {len(parts)} values where {len(columns)} columns are named")
     for part, column in zip(parts, columns, strict=True):
-        if not _is_number(part) or not math.isfinite(float(part)):
+        if not math.isfinite(_number(part)):
             raise InputError(f"{path}:{number}: {column.name} must be a finite number, got {part!r}")
     return [float(part) for part in parts]
 
 
-def _measurement(
-    path: Path, columns: Sequence[_Column], rows: Array, numbers: Sequence[int], poisson: float
-) -> Measurement:
-    names = [column.name for column in columns]
-    for name in names:
-        if names.count(name) > 1 or (name in RATES_OF and len(RATES_OF & set(names)) > 1):
-            raise InputError(f"{path}: two columns mean the same: {name} is given twice; remove one")
-    values = {column.name: rows[:, k] for k, column in enumerate(columns)}
-    units = {column.name: column.unit for column in columns}
-    derived = _complete(path, values, units, numbers)
-    modulus = _modulus(path, values)
-    kind: Kind = "time" if f"{modulus}_relax" in values else "frequency"
-    factor = 1.0 / (2.0 * (1.0 + poisson)) if modulus == "E" else 1.0
-    if kind == "time":
-        at = _positive(path, "t", values, numbers) * _unit(path, "t", units, {"s": 1.0})
-        names = [f"{modulus}_relax"]
-    else:
-        rate = "omega" if "omega" in values else "f"
-        at = _positive(path, rate, values, numbers) * _unit(path, rate, units, RATES)
-        names = [f"{modulus}_stor", f"{modulus}_loss"]
-    moduli = [_positive(path, n, values, numbers) * _unit(path, n, units, PRESSURES) * factor for n in names]
-    temperatures = values["T"] + _unit(path, "T", units, TEMPERATURES) if "T" in values else None
-    refuse_odd(path, kind, at, moduli[0], temperatures)
-    sets = tuple(_sets(path, at, moduli, temperatures))
-    if kind == "time":
-        refuse_rising(path, [each.storage for each in sets])
-    return Measurement(path, kind, sets, modulus == "E", derived)
+@dataclass
+class _Table:
+    """The columns of a file by name, their units, and the number of each row's line."""
 
+    path: Path
+    values: dict[str, Array]
+    units: dict[str, str]
+    lines: Sequence[int]
 
-def _complete(path: Path, values: dict[str, Array], units: dict[str, str], numbers: Sequence[int]) -> str:
-    """Add the storage or loss modulus that follows from the other one and tan delta; returns which, if one does."""
-    derived = ""
-    for modulus in ("E", "G") if "tan_del" in values else ():
-        storage, loss = f"{modulus}_stor", f"{modulus}_loss"
-        if (storage in values) != (loss in values):
-            known, missing = (storage, loss) if storage in values else (loss, storage)
-            tangent = _positive(path, "tan_del", values, numbers)
-            values[missing] = values[known] * tangent if missing == loss else values[known] / tangent
-            units[missing], derived = units[known], missing.removeprefix(f"{modulus}_")
-    return derived
+    def measurement(self, poisson: float) -> Measurement:
+        """What the columns say, in SI units."""
+        derived = self._complete()
+        modulus = self._name_modulus()
+        kind: Kind = "time" if f"{modulus}_relax" in self.values else "frequency"
+        factor = 1.0 / (2.0 * (1.0 + poisson)) if modulus == "E" else 1.0
+        if kind == "time":
+            at, names = self._column("t", {"s": 1.0}), [f"{modulus}_relax"]
+        else:
+            at = self._column("omega" if "omega" in self.values else "f", RATES)
+            names = [f"{modulus}_stor", f"{modulus}_loss"]
+        moduli = [self._column(name, PRESSURES) * factor for name in names]
+        degrees = self.values["T"] + self._unit("T", TEMPERATURES) if "T" in self.values else None
+        refuse_odd(self.path, kind, at, moduli[0], degrees)
+        sets = tuple(_sets(self.path, at, moduli, degrees))
+        if kind == "time":
+            refuse_rising(self.path, [each.storage for each in sets])
+        return Measurement(self.path, kind, sets, modulus == "E", derived)
 
+    def _complete(self) -> str:
+        """Add the storage or loss modulus that follows from the other one and tan delta; returns which, if one does."""
+        for modulus in ("E", "G") if "tan_del" in self.values else ():
+            storage, loss = f"{modulus}_stor", f"{modulus}_loss"
+            if (storage in self.values) != (loss in self.values):
+                known, missing = (storage, loss) if storage in self.values else (loss, storage)
+                tangent = self._positive("tan_del")
+                given = self.values[known]
+                self.values[missing] = given * tangent if missing == loss else given / tangent
+                self.units[missing] = self.units[known]
+                return missing.removeprefix(f"{modulus}_")
+        return ""
 
-def _modulus(path: Path, values: dict[str, Array]) -> str:
-    """E or G, whichever the columns name, and completely."""
-    for modulus in ("E", "G"):
-        if f"{modulus}_relax" in values or {f"{modulus}_stor", f"{modulus}_loss"} <= values.keys():
-            return modulus
-    raise InputError(
-        f"{path} has the columns {', '.join(values)}; it needs f or omega with E_stor and E_loss (or G_stor and "
-        "G_loss), or t with E_relax (or G_relax)"
-    )
+    def _name_modulus(self) -> str:
+        """E or G, whichever the columns name, and completely."""
+        for modulus in ("E", "G"):
+            if f"{modulus}_relax" in self.values or {f"{modulus}_stor", f"{modulus}_loss"} <= self.values.keys():
+                return modulus
+        raise InputError(
+            f"{self.path} has the columns {', '.join(self.values)}; it needs f or omega with E_stor and E_loss (or "
+            "G_stor and G_loss), or t with E_relax (or G_relax)"
+        )
 
+    def _column(self, name: str, units: dict[str, float]) -> Array:
+        """A column of positive numbers in SI units."""
+        return self._positive(name) * self._unit(name, units)
 
-def _positive(path: Path, name: str, values: dict[str, Array], numbers: Sequence[int]) -> Array:
-    if name not in values:
-        raise InputError(f"{path} has no column {name}; it has {', '.join(values)}")
-    wrong = np.flatnonzero(values[name] <= 0.0)
-    if wrong.size:
-        at = wrong[0]
-        raise InputError(f"{path}:{numbers[at]}: {name} must be positive, got {values[name][at]:g}")
-    return values[name]
+    def _positive(self, name: str) -> Array:
+        if name not in self.values:
+            raise InputError(f"{self.path} has no column {name}; it has {', '.join(self.values)}")
+        wrong = np.flatnonzero(self.values[name] <= 0.0)
+        if wrong.size:
+            line, value = self.lines[wrong[0]], self.values[name][wrong[0]]
+            raise InputError(f"{self.path}:{line}: {name} must be positive, got {value:g}")
+        return self.values[name]
 
-
-def _unit(path: Path, name: str, units: dict[str, str], known: dict[str, float]) -> float:
-    if units[name] not in known:
-        raise InputError(f"{path}: the unit of {name} must be one of {', '.join(known)}, got {units[name] or 'none'!r}")
-    return known[units[name]]
+    def _unit(self, name: str, known: dict[str, float]) -> float:
+        unit = self.units[name]
+        if unit not in known:
+            raise InputError(
+                f"{self.path}: the unit of {name} must be one of {', '.join(known)}, got {unit or 'none'!r}"
+            )
+        return known[unit]
 
 
 def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:

@@ -10,8 +10,8 @@ from mpi4py import MPI
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
+from parcontact.datafiles import open_numbers
 from parcontact.errors import InputError
-from parcontact.npyfile import open_numbers
 from parcontact.parallel.slab import Slab
 from parcontact.physics import heightfile
 

@@ -1,0 +1,56 @@
+"""Numbers in files of others: .npy files, opened without reading what a damaged header claims, and lines of text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+HEADER_BYTES = 1_000_000
+LARGEST_TEXT = 50_000_000  # bytes
+
+
+def open_numbers(path: Path) -> NDArray[Any]:
+    """A file's array, mapped into memory. Raises InputError for what holds no real numbers, and what numpy raises."""
+    import numpy as np  # slow, for those who read text only
+
+    with path.open("rb") as file:
+        start = file.read(12)
+    if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:  # numpy would read them
+        raise InputError(f"{path} cannot be read: its header claims to be larger than {HEADER_BYTES / 1e6:g} MB")
+    try:
+        values = np.lib.format.open_memmap(path, mode="r")
+    except ValueError as error:
+        if "mmap length" not in str(error):
+            raise
+        raise InputError(f"{path} cannot be read: it ends before the last of its values") from error
+    refuse_no_numbers(path, values.dtype)
+    return values
+
+
+def refuse_no_numbers(path: Path, kind: np.dtype[Any]) -> None:
+    """Raise InputError for values that are no real numbers."""
+    if kind.kind not in "iuf":
+        raise InputError(f"{path} holds values of type {kind}, which are no heights")
+
+
+def read_lines(path: Path, expected: str) -> list[tuple[int, str]]:
+    """The lines of a text file that say something, with their numbers. Raises InputError, also where there are none."""
+    try:
+        if not path.is_file():
+            raise InputError(f"{path} is not a file; {expected} was expected")
+        if path.stat().st_size > LARGEST_TEXT:
+            raise InputError(f"{path} has more than {LARGEST_TEXT / 1e6:g} MB; {expected} was expected")
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as text: {error}") from error
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if not lines:
+        raise InputError(f"{path} is empty; {expected} was expected")
+    return lines
