@@ -1,0 +1,1 @@
+"""What leaks through the gap of a contact."""

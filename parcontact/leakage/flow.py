@@ -1,0 +1,106 @@
+"""Flow of a fluid through the gap of a contact.
+
+The Reynolds equation for a fluid of viscosity eta between two bodies that touch where the gap g is zero,
+
+    div(g^3 grad p) = 0,      flow per width  Q = -(K / 12 eta) grad p,
+
+is solved by finite volumes: each point of the map is a cell, and the conductance of the face between two cells is the
+harmonic mean of their g^3. The pressure is given on two opposite ends of the map. The other two sides are periodic, or
+closed. Contact is impermeable. Only cells that lie on a path from end to end matter; the matrix of these is factorized
+directly, since g^3 spans many decades and iterations stall.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from .paths import connected_from_end_to_end, critical_constriction
+
+Map = NDArray[np.float64]
+LEAST_GAP = 1e-3  # accuracy: of the largest gap; cells of a smaller one are closed, which costs some 1e-5 of the flow
+LEAST_OF_CONSTRICTION = 0.1  # accuracy: of the critical constriction, for maps where all paths are that narrow
+MOST_OF_CONSTRICTION = 1e3  # accuracy: wider cells are taken to be that wide; what they resist is 1e-9 of the whole
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Flow along one direction: `conductivity` is K [m^3], 0 where no path leads from end to end.
+
+    `constriction` [m] is the smallest gap on the widest path and `position` its row and column; `imbalance` is the
+    difference of the flows at both ends over the flow, which rounding makes; `pressure` is the map of the fluid's
+    pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
+    """
+
+    conductivity: float
+    constriction: float
+    position: tuple[int, int] | None
+    imbalance: float
+    pressure: Map
+
+    @property
+    def percolates(self) -> bool:
+        return self.constriction > 0.0
+
+
+def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
+    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`."""
+    if axis == "x":
+        flow = solve_flow(gap.T, size[::-1], "y", periodic_sides)
+        position = None if flow.position is None else (flow.position[1], flow.position[0])
+        return Flow(flow.conductivity, flow.constriction, position, flow.imbalance, flow.pressure.T)
+    pressure = np.full(gap.shape, np.nan)
+    constriction, position = critical_constriction(gap, periodic_sides)
+    if position is None:
+        return Flow(0.0, 0.0, None, 0.0, pressure)
+    least = min(LEAST_GAP * float(gap.max()), LEAST_OF_CONSTRICTION * constriction)
+    wet = connected_from_end_to_end(gap >= least, periodic_sides)
+    cubes = np.where(wet, np.minimum(gap, MOST_OF_CONSTRICTION * constriction) / constriction, 0.0) ** 3
+    length, width = size[1], size[0]
+    aspect = (width / gap.shape[1]) / (length / gap.shape[0])  # of a cell: across over along the flow
+    matrix, first, last = _balance(cubes, wet, aspect, periodic_sides)
+    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    # The drop from the first end and the pressure above the last end: each is exact where it is small.
+    drop, above = factors.solve(np.stack([last, first], axis=1)).T
+    inflow, outflow = float(first @ drop), float(last @ above)
+    flow = 0.5 * (inflow + outflow)
+    pressure[wet] = above
+    conductivity = constriction**3 * flow * length / width
+    return Flow(conductivity, constriction, position, abs(inflow - outflow) / flow, pressure)
+
+
+def _balance(cubes: Map, wet: NDArray[np.bool_], aspect: float, periodic: bool) -> tuple[sparse.csc_matrix, Map, Map]:
+    """Return the matrix of the flows between wet cells, and the conductances to the first and to the last end."""
+    number = np.full(wet.shape, -1, dtype=np.int32)
+    number[wet] = np.arange(np.count_nonzero(wet), dtype=np.int32)
+    beside = slice(None) if periodic else slice(None, -1)
+    pairs = [
+        (number[:-1], number[1:], aspect * _harmonic(cubes[:-1], cubes[1:])),
+        (
+            number[:, beside],
+            np.roll(number, -1, axis=1)[:, beside],
+            _harmonic(cubes, np.roll(cubes, -1, axis=1))[:, beside] / aspect,
+        ),
+    ]
+    faces = [_faces(*pair) for pair in pairs]
+    a, b, c = (np.concatenate(parts) for parts in zip(*faces, strict=True))
+    first, last = np.zeros_like(cubes), np.zeros_like(cubes)
+    first[0], last[-1] = 2.0 * aspect * cubes[0], 2.0 * aspect * cubes[-1]  # half a cell to the end
+    count = int(number.max()) + 1
+    diagonal = first[wet] + last[wet] + np.bincount(a, c, count) + np.bincount(b, c, count)
+    every = np.arange(count, dtype=np.int32)
+    rows, columns = np.concatenate([a, b, every]), np.concatenate([b, a, every])
+    matrix = sparse.csc_matrix((np.concatenate([-c, -c, diagonal]), (rows, columns)), shape=(count, count))
+    return matrix, first[wet], last[wet]
+
+
+def _faces(a: NDArray[np.int32], b: NDArray[np.int32], c: Map) -> tuple[NDArray[np.int32], NDArray[np.int32], Map]:
+    """Return the faces between two wet cells: their numbers and the conductance."""
+    open_ = (a >= 0) & (b >= 0)
+    return a[open_], b[open_], c[open_]
+
+
+def _harmonic(a: Map, b: Map) -> Map:
+    return 2.0 * a * b / np.maximum(a + b, np.finfo(float).tiny)

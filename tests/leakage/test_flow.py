@@ -1,0 +1,100 @@
+"""Flow through gaps: closed forms of waves, mazes and checkerboards, closure, and what rotations and scales do."""
+
+import numpy as np
+import pytest
+
+from parcontact.leakage.flow import Map, solve_flow
+
+
+def wave(points: int, depth: float) -> Map:
+    """Gaps 1 + depth cos(2 pi x), the same along y."""
+    x = (np.arange(points) + 0.5) / points
+    return np.broadcast_to(1.0 + depth * np.cos(2.0 * np.pi * x), (points, points)).copy()
+
+
+def test_flow_along_the_crests_of_a_wave() -> None:
+    """K = h0^3 (1 + 1.5 eps^2): the mean of g^3, which the midpoint rule gives to round-off."""
+    assert solve_flow(wave(64, 0.5), (1.0, 1.0), "y").conductivity == pytest.approx(1.375, rel=1e-12)
+
+
+def test_flow_across_the_crests_of_a_wave() -> None:
+    """K = h0^3 (1 - eps^2)^2.5 / (1 + eps^2 / 2): 1 over the mean of 1/g^3; the error falls faster than any power."""
+    exact = 0.75**2.5 / 1.125
+    assert solve_flow(wave(64, 0.5), (1.0, 1.0), "x").conductivity == pytest.approx(exact, rel=1e-12)
+
+
+def checkerboard(points: int, second: float) -> Map:
+    """Conductivities g^3 of 1 and `second`, in 2 x 2 squares whose middles lie on the ends, lines of one pressure."""
+    side = ((np.arange(points) + points // 4) * 2 // points) % 2
+    return np.cbrt(np.where((side[:, None] + side) % 2 == 0, 1.0, second))
+
+
+def test_checkerboard() -> None:
+    """K = sqrt(s1 s2), at order 2 pi / angle - 1 of the singularities in the corners: 1.5 for conductivities 1 and 2."""
+    errors = [solve_flow(checkerboard(n, 2.0), (1.0, 1.0)).conductivity / np.sqrt(2.0) - 1.0 for n in (32, 64, 128)]
+    assert abs(errors[-1]) < 3e-4
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert (np.abs(orders - 1.5) < 0.1).all()
+
+
+def test_a_maze_with_a_single_path() -> None:
+    """One cell wide from end to end: the sum of 1/g^3 over its cells is the resistance."""
+    gap, generator = np.zeros((7, 5)), np.random.default_rng(1)
+    path = [(0, 1), (1, 1), (1, 2), (1, 3), (2, 3), (3, 3), (3, 2), (3, 1), (4, 1), (5, 1), (6, 1)]
+    for cell in path:
+        gap[cell] = generator.uniform(0.2, 1.0)
+    cubes = np.array([gap[cell] ** 3 for cell in path])
+    flow = solve_flow(gap, (5.0, 7.0), "y", periodic_sides=False)
+    assert flow.conductivity == pytest.approx(7.0 / 5.0 / np.sum(1.0 / cubes), rel=1e-12)
+    assert gap[flow.position or (0, 0)] == flow.constriction == gap[gap > 0.0].min()
+    turned = solve_flow(gap.T, (7.0, 5.0), "x", periodic_sides=False)
+    assert turned.conductivity == pytest.approx(flow.conductivity, rel=1e-12)
+
+
+def test_a_closed_gap_has_no_flow() -> None:
+    gap = wave(16, 0.5)
+    gap[:, 3] = 0.0
+    flow = solve_flow(gap, (1.0, 1.0), "x")
+    assert (flow.conductivity, flow.constriction, flow.position, flow.percolates) == (0.0, 0.0, None, False)
+    assert solve_flow(np.zeros((4, 4)), (1.0, 1.0)).conductivity == 0.0
+    assert solve_flow(gap, (1.0, 1.0), "y").percolates
+
+
+def test_sides_are_periodic_or_closed() -> None:
+    """A channel that leaves on one side and comes back on the other leads through periodic sides only."""
+    gap = np.zeros((4, 6))
+    gap[:2, 0] = gap[2:, 5] = 1.0
+    gap[2, 5] = gap[1, 0] = 1.0
+    gap[1, 5] = 1.0  # beside (1, 0) across the side
+    assert solve_flow(gap, (1.0, 1.0), "y", periodic_sides=True).percolates
+    assert not solve_flow(gap, (1.0, 1.0), "y", periodic_sides=False).percolates
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_scales(axis: str) -> None:
+    """K scales with the cube of the gap, and depends on the shape of the box but not on its size."""
+    gap = np.random.default_rng(2).uniform(0.1, 1.0, (12, 16))
+    first = solve_flow(gap, (4.0, 3.0), axis)
+    assert solve_flow(1e-6 * gap, (4e-3, 3e-3), axis).conductivity == pytest.approx(1e-18 * first.conductivity, 1e-12)
+    assert first.imbalance < 1e-12  # rounding
+
+
+def test_pressure_falls_from_end_to_end() -> None:
+    """The fluid's pressure obeys the maximum principle, and the mirrored map has the mirrored pressure."""
+    gap = np.maximum(np.random.default_rng(3).normal(0.5, 0.4, (24, 24)), 0.0)
+    flow, mirrored = solve_flow(gap, (1.0, 1.0), "y"), solve_flow(gap[::-1], (1.0, 1.0), "y")
+    wet = np.isfinite(flow.pressure)
+    assert (flow.pressure[wet] > 0.0).all()
+    assert (flow.pressure[wet] < 1.0).all()
+    np.testing.assert_allclose(flow.pressure[wet], 1.0 - mirrored.pressure[::-1][wet], atol=1e-9)
+
+
+def test_narrow_gaps_hardly_matter() -> None:
+    """Cells below a thousandth of the largest gap are closed: they could carry a 1e-9 of what others carry."""
+    gap = np.maximum(np.random.default_rng(4).normal(0.5, 0.4, (32, 32)), 0.0)
+    with_narrow = np.where(gap == 0.0, 5e-4 * gap.max(), gap)
+    closed, leaking = (solve_flow(g, (1.0, 1.0)).conductivity for g in (gap, with_narrow))
+    assert closed == leaking
+    all_narrow = np.full((8, 8), 1e-5)
+    all_narrow[3, 3] = 1.0  # where all paths are narrow they are kept
+    assert solve_flow(all_narrow, (1.0, 1.0)).conductivity == pytest.approx(1e-15, rel=0.2)
