@@ -29,6 +29,7 @@ from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
 from .convolution import ALL, Convolution, padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
+from .layer import Layer
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 from .wake import wake
@@ -50,25 +51,35 @@ class HalfSpace:
     poisson: float = 0.5
     kernel: Literal["spectral", "love"] = "spectral"
     free: bool = False
+    layer: Layer | None = None
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 
     def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Displacement over pressure of each wave of a periodic half space, `(1 - nu)/|q|`; a mean moves nothing."""
+        """Displacement over pressure of each wave of a periodic body, `(1 - nu)/|q|`; a mean moves a layer only."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         with np.errstate(divide="ignore"):
             symbol = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
+        if self.layer is not None:
+            symbol *= self.layer.compliance_ratio(q)
+            symbol[q == 0.0] = self.layer.mean_compliance
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Pressure over displacement of each wave, `|q|/(1 - nu)`, whatever the kernel.
 
-        At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
-        acts on mean values only.
+        At q = 0, where a periodic half space and an incompressible layer have no inverse, the value of the smallest
+        wavenumber keeps it positive; it acts on mean values only.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
-        q[q == 0.0] = 2 * np.pi / max(self.size)
-        return np.asarray(q / (1.0 - self.poisson))
+        mean = q == 0.0
+        q[mean] = 2 * np.pi / max(self.size)
+        symbol = np.asarray(q / (1.0 - self.poisson))
+        if self.layer is not None:
+            symbol /= self.layer.compliance_ratio(q)
+            if self.layer.mean_compliance > 0.0:
+                symbol[mean] = 1.0 / self.layer.mean_compliance
+        return symbol
 
     @property
     def largest_compliance(self) -> float:
@@ -88,8 +99,13 @@ class HalfSpace:
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
         padded = _padded(fft, fft.dtype, fft.measured)
-        table = tabulate(padded, self.size, partial(love, poisson=self.poisson))
+        table = tabulate(padded, self.size, self._coefficient)
         return Convolution(padded, lambda rows: table[rows].real, fft.dtype)
+
+    def _coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
+        """Displacement at distance (x, y) under a unit pressure on one cell of a body around which there is nothing."""
+        of_half_space = love(x, y, dx, dy, self.poisson)
+        return of_half_space if self.layer is None else self.layer.coefficients(x, y, dx, dy, of_half_space)
 
     def inverse(self, fft: FFT) -> Convolution:
         """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
