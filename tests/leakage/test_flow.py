@@ -30,7 +30,7 @@ def checkerboard(points: int, second: float) -> Map:
 
 
 def test_checkerboard() -> None:
-    """K = sqrt(s1 s2), at order 2 pi / angle - 1 of the singularities in the corners: 1.5 for conductivities 1 and 2."""
+    """K = sqrt(s1 s2), at order 2 pi / angle - 1 of the singularities in the corners: 1.5 for 1 and 2."""
     errors = [solve_flow(checkerboard(n, 2.0), (1.0, 1.0)).conductivity / np.sqrt(2.0) - 1.0 for n in (32, 64, 128)]
     assert abs(errors[-1]) < 3e-4
     orders = np.log2(np.divide(errors[:-1], errors[1:]))

@@ -13,7 +13,7 @@ BASES: list[Base] = ["bonded", "smooth"]
 
 
 def test_incompressible_bonded_layer() -> None:
-    """S(x) = (sinh 2x - 2x)/(cosh 2x + 1 + 2x^2), to its ten digits here; for small x it is 2/3 x^3 to x^2 of itself."""
+    """S(x) = (sinh 2x - 2x)/(cosh 2x + 1 + 2x^2); for small x it is 2/3 x^3 to x^2 of itself."""
     x = np.array([0.5, 2.0])
     exact = (np.sinh(2 * x) - 2 * x) / (np.cosh(2 * x) + 1 + 2 * x**2)
     np.testing.assert_allclose(Layer(1.0).compliance_ratio(x), exact, rtol=1e-13)
@@ -54,7 +54,7 @@ def test_a_smooth_base_holds_less_than_a_bonded_one(poisson: float) -> None:
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("poisson", [0.2, 0.5])
 def test_isolated_and_periodic_layers_agree_in_a_wide_box(base: Base, poisson: float) -> None:
-    """The neighbours are 16 thicknesses away, where a pressure moves an incompressible bonded layer by 6e-4, others less.
+    """The neighbours are 16 thicknesses away, where a pressure moves an incompressible layer by 6e-4, others less.
 
     Means differ on a smooth base: it lets an isolated layer spread, but not one that repeats for ever.
     """
