@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from mpi4py import MPI
-from test_sweeps import cases_in_groups, table
 
 from parcontact.__main__ import main
 from parcontact.errors import InUseError
@@ -15,6 +14,8 @@ from parcontact.parallel.slab import Slab
 from parcontact.run import sweep
 from parcontact.storage import directory
 from parcontact.summary import sweep_table
+
+from .test_sweep import cases_in_groups, table
 
 
 def test_a_case_that_another_program_runs(

@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 from mpi4py import MPI
-from test_sweeps import JOB, cases_in_groups, table
 
 from parcontact.__main__ import main
 from parcontact.job import Job
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.run import sweep, watch
+
+from .test_sweep import JOB, cases_in_groups, table
 
 
 def test_a_stop_file_ends_the_case_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
