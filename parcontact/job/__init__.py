@@ -3,14 +3,23 @@
 from ..errors import JobError
 from .model import Job, describe
 from .reading import Case, choose, load, load_cases
-from .sections.geometry import Cylinder, Flat, HeightFile, OnOneMesh, Rough, Spectral, Sphere, Wave
+from .sections.geometry import (
+    Cylinder,
+    Flat,
+    HeightFile,
+    OnOneMesh,
+    Rough,
+    RoughSpectrum,
+    Spectral,
+    Sphere,
+    Topography,
+    Wave,
+)
 from .sections.height_arrays import HeightArray
 from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .sections.part import Part
-from .sections.refinements import Study
-from .sections.settings import Checkpoint, Grid, Numerics, Output
+from .sections.settings import Checkpoint, Grid, Numerics, Output, Study
 from .sections.stages import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
-from .sections.topography import RoughSpectrum, Topography
 from .sections.values import Positive, log_range
 
 __all__ = [

@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
+from .sections.geometry import Topography
 from .sections.part import Context
-from .sections.topography import Topography
 from .sections.values import FROM_SURFACE
 from .text.places import UNREADABLE, Source
 from .text.python_data import is_array

@@ -20,8 +20,7 @@ from .sections import height_arrays, listing
 from .sections.geometry import OnOneMesh, Rough, Shape
 from .sections.materials import Dma, Elastic, Material, Zener, heated
 from .sections.part import Context, Part, Rule
-from .sections.refinements import Study
-from .sections.settings import Checkpoint, Grid, Numerics, Output
+from .sections.settings import Checkpoint, Grid, Numerics, Output, Study
 from .sections.stages import Initial, Stage, Steady
 from .text.fault import Fault
 from .text.overrides import Included

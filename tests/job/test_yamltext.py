@@ -141,7 +141,7 @@ def test_a_long_override_is_shortened(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (SMALL.replace("shear_modulus: 1e6", "shear_modulus: 1e300"), "material.shear_modulus must be zero, or from 1e"),
+        (SMALL.replace("shear_modulus: 1e6", "shear_modulus: 1e300"), "material.shear_modulus must be zero"),
         (SMALL.replace("size: 1e-3", "size: [1e-3, 1e-300]"), "grid.size.1 must be zero, or from 1e-40 to"),
         (SMALL.replace("amplitude: 1e-6", "amplitude: 1e300"), "surface.amplitude must be zero, or from 1e-40"),
         (with_stage("{pressure: 1e300}"), "history.0.pressure must be zero, or from 1e-40 to 1e+40"),

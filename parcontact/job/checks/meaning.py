@@ -10,11 +10,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..sections.geometry import OnOneMesh, Rough, Sphere, Wave
+from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.settings import Grid
 from ..sections.stages import Initial, Stage, Steady
-from ..sections.topography import RoughSpectrum, Topography
 
 STEEP = 0.5  # rms slope: some tenths are small
 STEEPEST = 1.0  # radius of a contact over that of its sphere: beyond, slopes are not small

@@ -11,8 +11,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 from ..text.fault import Fault, refuse
 from .height_arrays import HeightArray
 from .part import Part, Rule, chosen, existing_file
-from .topography import RoughSpectrum, Topography
-from .values import Number, Positive, Real, Seed, Whole
+from .values import Flag, Number, Positive, Real, Seed, Whole
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
@@ -39,26 +38,41 @@ class Rough(Part):
     short one and is zero elsewhere. `amplitudes: fixed` puts all randomness into the phases.
     """
 
-    label: ClassVar[str] = "shape rough"
     shape: Literal["rough"] = "rough"
     hurst: Number = Field(gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
     long_wavelength: Wavelength
     rolloff_wavelength: Wavelength = Field(default_factory=lambda data: data["long_wavelength"])  # no plateau
     short_wavelength: Wavelength
-    rms_slope: Annotated[Positive | None, Field(description="a positive rms slope [-]")] = None
-    rms_height: Annotated[Positive | None, Field(description="a positive rms height [m]")] = None
-    psd_constant: Annotated[Positive | None, Field(description="a positive spectral constant [m^4]")] = None
-    seed: Annotated[Seed, Field(description="a whole number of zero or more")] = 0
+    rms_slope: Positive | None = Field(default=None, description="a positive rms slope [-]")
+    rms_height: Positive | None = Field(default=None, description="a positive rms height [m]")
+    psd_constant: Positive | None = Field(default=None, description="a positive spectral constant [m^4]")
+    seed: Seed = 0
     amplitudes: Literal["random", "fixed"] = "random"
 
     one_of = (("rms_slope", "rms_height", "psd_constant"),)
     rules = (_ordered("rolloff_wavelength", "long_wavelength"), _ordered("short_wavelength", "rolloff_wavelength"))
 
 
+class RoughSpectrum(Part):
+    """A random surface with a measured isotropic spectrum, in a table whose columns say which: `q[1/m] C2D[m^4]`, or
+    `q[1/m] C1D[m^3]` of profiles. With `hurst` it goes on beyond its shortest wave as q^(-2 (1 + hurst)).
+
+    Wavelengths are those of the data unless they are given.
+    """
+
+    label: ClassVar[str] = "shape rough with a spectrum"
+    shape: Literal["rough"] = "rough"
+    spectrum: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of a spectrum")]
+    hurst: Number | None = Field(default=None, gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
+    long_wavelength: Wavelength | None = Field(default=None, description="a positive wavelength [m]")
+    short_wavelength: Wavelength | None = Field(default=None, description="a positive wavelength [m]")
+    seed: Seed = 0
+    amplitudes: Literal["random", "fixed"] = "random"
+
+
 class Sphere(Part):
     """A sphere; `paraboloid` is its parabola at the tip, the surface of Hertz's theory."""
 
-    label: ClassVar[str] = "shape sphere"
     shape: Literal["sphere"] = "sphere"
     radius: Radius
     profile: Profile = "paraboloid"
@@ -68,7 +82,6 @@ class Sphere(Part):
 class Cylinder(Part):
     """A cylinder lying along `axis`."""
 
-    label: ClassVar[str] = "shape cylinder"
     shape: Literal["cylinder"] = "cylinder"
     radius: Radius
     axis: Literal["x", "y"] = "y"
@@ -79,7 +92,6 @@ class Cylinder(Part):
 class Wave(Part):
     """`A cos(2 pi (wx x/Lx + wy y/Ly) + phase)`; a product of cosines is the sum of two waves of half its amplitude."""
 
-    label: ClassVar[str] = "shape wave"
     shape: Literal["wave"] = "wave"
     amplitude: Real = Field(description="a finite height [m]")
     waves: tuple[Whole, Whole] = Field(description="two whole numbers of waves in the box, along x and along y")
@@ -96,17 +108,33 @@ def _surface_file(path: Path, info: ValidationInfo) -> Path:
 class HeightFile(Part):
     """Heights read from a file of the grid's shape, times `scale`; `dataset` names them in an HDF5 file."""
 
-    label: ClassVar[str] = "shape file"
     shape: Literal["file"] = "file"
     path: Annotated[Path, AfterValidator(_surface_file), Field(description="the path of a .npy, .h5 or .txt file")]
     scale: Real = Field(default=1.0, description="a finite factor that makes heights [m] of the numbers")
     dataset: str = Field(default="heights", description="the name of a dataset (text)")
 
 
+class Topography(Part):
+    """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .txt and .xyz.
+
+    The middle of the map that is as large as the box is levelled, filled, made periodic and resampled to the grid.
+    """
+
+    shape: Literal["topography"] = "topography"
+    path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a measured map")]
+    unit: Literal["m", "mm", "um", "nm"] | None = None  # of heights; only for formats that have none
+    size: Annotated[
+        tuple[Positive, Positive] | None, Field(description="two positive lengths [m], only for formats that have none")
+    ] = None
+    channel: str | None = Field(default=None, description="the name of a channel of the file (text)")
+    detrend: Literal["none", "mean", "tilt", "curvature"] = "tilt"
+    fill: Flag = Field(default=True, description="true or false: whether missing points are filled")
+    periodic: Literal["smooth", "window", "mirror", "none"] | None = None  # smooth; none in a free scene
+
+
 class Flat(Part):
     """Zero height everywhere."""
 
-    label: ClassVar[str] = "shape flat"
     shape: Literal["flat"] = "flat"
 
 

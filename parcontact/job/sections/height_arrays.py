@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 
@@ -82,7 +82,6 @@ def _heights(given: Any) -> Heights:
 class HeightArray(Part):
     """Heights given in Python, as a numpy array. A job that is stored names a file of them, which lies beside it."""
 
-    label: ClassVar[str] = "shape array"
     shape: Literal["array"] = "array"
     heights: Annotated[Heights, PlainValidator(_heights), WithJsonSchema({"allOf": [False]})] = Field(
         description="a numpy array of heights [m] of shape (ny, nx)"

@@ -85,7 +85,6 @@ Branch = Annotated[ZenerBranch | PronyBranch, PlainValidator(_branch, json_schem
 class Elastic(Part):
     """A linear elastic body."""
 
-    label: ClassVar[str] = "model elastic"
     model: Literal["elastic"] = "elastic"
     poisson: Poisson = 0.5
     shear_modulus: Positive = Field(description="a positive shear modulus [Pa]")
@@ -133,7 +132,6 @@ class Zener(Part):
     those of its reference temperature; at another `temperature` they are a_T times as long.
     """
 
-    label: ClassVar[str] = "model zener"
     model: Literal["zener"] = "zener"
     poisson: Poisson = 0.5
     modulus_inf: Modulus = 0.0
@@ -167,7 +165,6 @@ class Zener(Part):
 class Dma(Part):
     """A compound fitted to a table of measured moduli when the job is read, as `parcontact fit` does."""
 
-    label: ClassVar[str] = "model dma"
     model: Literal["dma"] = "dma"
     path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of measured moduli")]
     poisson: Poisson = 0.5

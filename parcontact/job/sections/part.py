@@ -64,7 +64,7 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
-    label: ClassVar[str] = ""  # what the part is called when a key does not belong to it: "shape sphere"
+    label: ClassVar[str] = ""  # what the part is called, unless its kind says it: "shape sphere"
     one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
     at_most_one: ClassVar[tuple[tuple[str, ...], ...]] = ()
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -133,7 +133,9 @@ class Part(BaseModel):
             return Fault(error["msg"], path, kind == AT_KEY)
         name = str(path[0])
         if kind == "extra_forbidden":
-            what = f"is not a key of {cls.label}" if cls.label else "is not a known key"
+            word = kind_key(cls)
+            label = cls.label or (word and f"{word} {cls.model_fields[word].default}")
+            what = f"is not a key of {label}" if label else "is not a known key"
             advice = did_you_mean(shorten(name), cls.words()) or f"; there are {', '.join(cls.words())}"
             return Fault(what + advice, path, at_key=True)
         field = cls.field(name)

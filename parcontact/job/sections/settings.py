@@ -1,4 +1,4 @@
-"""The `grid`, `numerics`, `output` and `checkpoint` sections."""
+"""The `grid`, `numerics`, `output`, `checkpoint` and `study` sections."""
 
 from __future__ import annotations
 
@@ -11,6 +11,23 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from ..text.fault import Fault
 from .part import Context, Part, Rule
 from .values import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, Whole, both, from_home, listed
+
+Integrator = Literal["exponential", "backward-euler"]
+Kernel = Literal["spectral", "love"]
+Precision = Literal["double", "mixed"]
+FieldName = Literal["pressure", "displacement", "gap", "height"]
+
+
+def _different(name: str) -> Rule:
+    """Return the rule that no value of a list comes twice."""
+
+    def check(values: tuple[Any, ...]) -> Iterator[Fault]:
+        for index, value in enumerate(values):
+            if value is not None and value in values[:index]:
+                shown = value if name == "fields" else repr(value)
+                yield Fault(f"names {shown} a second time", (name, index))
+
+    return Rule((name,), check)
 
 
 class Grid(Part):
@@ -55,7 +72,7 @@ class Grid(Part):
         return self.ly / self.ny
 
 
-TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # of numerics.accuracy
+TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: parts of numerics.accuracy
 
 
 class Numerics(Part):
@@ -63,39 +80,30 @@ class Numerics(Part):
     not given, and says how fine the mesh should be."""
 
     accuracy: Fraction = Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1")
-    integrator: Literal["exponential", "backward-euler"] = "exponential"
+    integrator: Integrator = "exponential"
     tolerance: Fraction = Field(default=5e-3, description="a tolerance [-] above 0 and below 1")
     max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
     branch_error: Number = Field(
         default=1e-3, ge=0, lt=1, description="an error of friction [-] of zero or more and below 1"
     )
-    kernel: Literal["spectral", "love"] = "spectral"  # in a free scene: love
-    precision: Literal["double", "mixed"] = "double"
+    kernel: Kernel = "spectral"  # in a free scene: love
+    precision: Precision = "double"
     slope: Literal["spectral", "finite-difference"] = "spectral"
-    accept_unconverged: Flag = Field(default=False, description="true or false")
-    strict: Flag = Field(default=False, description="true or false")
+    accept_unconverged: Flag = False
+    strict: Flag = False
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
-        """The tolerance and the error of folded branches are shares of the accuracy."""
+        """Fill in the tolerance and the error of folded branches, which are shares of the accuracy."""
         accuracy = data.get("accuracy")
         if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
             return data
         return {"tolerance": TOLERANCE_SHARE * accuracy, "branch_error": BRANCH_SHARE * accuracy, **data}
 
 
-FieldName = Literal["pressure", "displacement", "gap", "height"]
-
-
 def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
     if branch_dissipation and not energy:
         yield Fault("needs energy: true", ("branch_dissipation",))
-
-
-def _no_repeats(fields: tuple[str | None, ...]) -> Iterator[Fault]:
-    for index, name in enumerate(fields):
-        if name is not None and name in fields[:index]:
-            yield Fault(f"names {name} a second time", ("fields", index))
 
 
 class Output(Part):
@@ -108,11 +116,11 @@ class Output(Part):
         default=(), description="a list of fields"
     )
     every: Count = Field(default=1, description="a positive whole number of steps")
-    energy: Flag = Field(default=False, description="true or false")
-    branch_dissipation: Flag = Field(default=False, description="true or false")
-    mesh_check: Flag = Field(default=False, description="true or false")
+    energy: Flag = False
+    branch_dissipation: Flag = False
+    mesh_check: Flag = False
 
-    rules = (Rule(("branch_dissipation", "energy"), _needs_energy), Rule(("fields",), _no_repeats))
+    rules = (Rule(("branch_dissipation", "energy"), _needs_energy), _different("fields"))
 
 
 class Checkpoint(Part):
@@ -126,5 +134,32 @@ class Checkpoint(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
-        """Saves every 10 minutes unless told otherwise."""
+        """Save every 10 minutes unless told otherwise."""
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
+
+
+LADDERS = ("mesh", "cells_per_step", "integrator", "tolerance", "precision", "kernel")
+
+
+def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
+    if not any(ladders):
+        yield Fault(f"needs at least one ladder: {', '.join(LADDERS)}")
+
+
+class Study(Part):
+    """What `parcontact study` refines; a ladder that is left out has the job's own value."""
+
+    mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
+        default=(), description="a list of positive whole numbers of points along x"
+    )
+    cells_per_step: Annotated[tuple[Positive, ...], BeforeValidator(listed)] = Field(
+        default=(), description="a list of positive numbers of cells (fractions are allowed)"
+    )
+    integrator: Annotated[tuple[Integrator, ...], BeforeValidator(listed)] = ()
+    tolerance: Annotated[tuple[Fraction, ...], BeforeValidator(listed)] = Field(
+        default=(), description="a list of tolerances [-] above 0 and below 1"
+    )
+    precision: Annotated[tuple[Precision, ...], BeforeValidator(listed)] = ()
+    kernel: Annotated[tuple[Kernel, ...], BeforeValidator(listed)] = ()
+
+    rules = (*map(_different, LADDERS), Rule(LADDERS, _some_ladder))

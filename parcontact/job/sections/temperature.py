@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, PlainValidator
 
@@ -26,7 +26,6 @@ Celsius = Annotated[
 class WlfShift(Part):
     """`log10 a_T = -C1 (T - reference)/(C2 + T - reference)` (Williams, Landel and Ferry)."""
 
-    label: ClassVar[str] = "law wlf"
     law: Literal["wlf"] = "wlf"
     C1: Positive = Field(description="a positive number, the first constant of Williams, Landel and Ferry [-]")
     C2: Positive = Field(description="a positive number, the second constant of Williams, Landel and Ferry [K]")
@@ -41,7 +40,6 @@ class WlfShift(Part):
 class ArrheniusShift(Part):
     """`log10 a_T = energy/(R ln 10) (1/T - 1/reference)`, temperatures in K."""
 
-    label: ClassVar[str] = "law arrhenius"
     law: Literal["arrhenius"] = "arrhenius"
     energy: Positive = Field(description="a positive energy of activation [J/mol]")
     reference: Celsius
@@ -64,7 +62,6 @@ def _rising(temperatures: tuple[float, ...], logs: tuple[float, ...], reference:
 class FactorsShift(Part):
     """log10 of a_T at given temperatures, linear between them."""
 
-    label: ClassVar[str] = "law factors"
     law: Literal["factors"] = "factors"
     temperatures: tuple[Celsius, ...] = Field(description="a list of rising temperatures [deg C]")
     logs: tuple[Real, ...] = Field(description="a list of numbers, log10 of a_T at each temperature")

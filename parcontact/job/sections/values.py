@@ -108,6 +108,11 @@ NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False), NU
 Fraction = Annotated[float, Field(strict=True, gt=0, lt=1), NUMBER]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(_countable)]
 Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(_countable)]
-Seed = Annotated[int, Field(strict=True, ge=0), BeforeValidator(_whole), AfterValidator(_seed)]
-Flag = Annotated[bool, Field(strict=True)]
+Seed = Annotated[
+    int,
+    Field(strict=True, ge=0, description="a whole number of zero or more"),
+    BeforeValidator(_whole),
+    AfterValidator(_seed),
+]
+Flag = Annotated[bool, Field(strict=True, description="true or false")]
 Vector = Annotated[tuple[Real, Real], BeforeValidator(along_x)]
