@@ -9,13 +9,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
-from ..job import Job
 from ..job.checks.limits import one_cell
 from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
-from ..job.sections.settings import Grid
-from ..job.sections.stages import Stage
+from ..job.sections.settings import Grid, Numerics
+from ..job.sections.stages import Initial, Stage
 
 SAME_TIME = 1e-9  # accuracy: a duration this close, relatively, to a whole number of steps is one
 HALVINGS = 10  # tuning: of a cell, in the shortest step of a surface that slides
@@ -29,6 +28,19 @@ SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/n
 def reached(time: float, until: float) -> bool:
     """Return whether a time is the one asked for, or later."""
     return time >= until * (1.0 - SAME_TIME)
+
+
+class Planned(Protocol):
+    """What the steps of a job follow from: these sections of it, and whether its body has a memory."""
+
+    grid: Grid
+    surface: tuple[Any, ...]
+    history: tuple[Stage, ...]
+    numerics: Numerics
+    initial: Initial
+
+    @property
+    def remembers(self) -> bool: ...
 
 
 @dataclass(frozen=True)
@@ -149,7 +161,7 @@ class ChosenSteps:
     next: float = 0.0
 
     @classmethod
-    def of(cls, job: Job, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
+    def of(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
         """Return those that the stages of a job had chosen when a checkpoint with these arrays was written."""
         found = cls(most_cells(job.grid, job.surface))
         if saved is not None and SYMBOLS.keys() <= saved.keys():
@@ -190,7 +202,7 @@ class ChosenSteps:
         }
 
 
-def describe_steps(job: Job) -> str:
+def describe_steps(job: Planned) -> str:
     """Return which stages choose their own time steps, how, and why; '' if none does."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:

@@ -9,10 +9,9 @@ from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
-from ..job import Job
 from ..job.sections.settings import Grid
 from ..job.sections.stages import GeometricStep, Ramp, Stage
-from .chosen import ChosenEnds, ChosenSteps, MadeStep, reached
+from .chosen import ChosenEnds, ChosenSteps, MadeStep, Planned, reached
 from .given import GivenEnds, divide
 
 ROUNDINGS = 4.0  # accuracy: of an instant, between two that are the same
@@ -146,7 +145,7 @@ class Timeline:
         self._open, self._seen = 0, 0  # the stage that was choosing its steps, and how many had been chosen
 
     @classmethod
-    def of(cls, job: Job, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
+    def of(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
         """Return all steps of a job; its last stage goes on to `until` [s] if that is later than its end.
 
         `chosen` are the steps that stages have chosen so far; those to come are guessed.

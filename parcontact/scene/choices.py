@@ -4,6 +4,7 @@
 off allocates nothing, calls nothing and writes nothing.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -24,13 +25,20 @@ from ..solve.precision import LOOSE, VERY_LOOSE
 
 
 def choices(job: Job, until: float = 0.0) -> "Choices":
-    """Return what a job calls for, if its last stage goes on to `until` [s]; each choice is made when first asked for,
-    and then kept."""
+    """Return what a job calls for, if its last stage goes on to `until` [s]."""
     return Choices(job, job.grid, job.numerics, job.output, until)
 
 
-class decided(cached_property[Decision]):  # noqa: N801 (read as the decorator that it is)
-    """A decision, made when it is first asked for. `parcontact plan` prints all of them in the order of their code."""
+Verdict = tuple[bool, str]  # whether an effect is on, and why
+
+
+class Decided(cached_property[Decision]):
+    """A decision, made when it is first asked for; `parcontact plan` prints all of them in the order of their code."""
+
+
+def decided(name: str) -> Callable[[Callable[[Any], Verdict]], Decided]:
+    """Make a decision with a name out of a method that gives a verdict."""
+    return lambda method: Decided(lambda choices: Decision(name, *method(choices)))
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,7 @@ class Choices:
     @property
     def effects(self) -> list[Decision]:
         """Every effect that there is, on or off, and why."""
-        own = [getattr(self, name) for name, part in vars(Choices).items() if isinstance(part, decided)]
+        own = [getattr(self, name) for name, part in vars(Choices).items() if isinstance(part, Decided)]
         return own + [effect.decide(self.job) for effect in extension.find_effects().values()]
 
     @cached_property
@@ -70,6 +78,11 @@ class Choices:
         """By what factor relaxation times are longer than at the reference temperature, a_T [-]."""
         return time_factor_of(self.job.material)
 
+    @property
+    def hardness(self) -> float | None:
+        """The bound on the pressure [Pa]; None if there is none."""
+        return self.job.material.hardness
+
     @cached_property
     def interface(self) -> InterfaceFriction | None:
         """The friction of the contact area itself; None if the job has no `interface`."""
@@ -80,39 +93,42 @@ class Choices:
         """Which branches of the material need a map (`physics.folding`)."""
         if self.prony.moduli.size == 0:
             return keep_all(self.prony, "the body has no branch")
-        reason, allowed, initial = "", self.numerics.branch_error, self.job.initial
-        if self.energies.on:
-            reason = "output.energy counts the energy of every branch"
-        elif not allowed:
-            reason = "numerics.branch_error is 0"
+        reason = "output.energy counts the energy of every branch" if self.energies.on else ""
+        reason = reason or ("" if self.numerics.branch_error else "numerics.branch_error is 0")
+        allowed = 0.0 if reason else self.numerics.branch_error
         passing = list(phases(Timeline.of(self.job, self.until))), list(bands(self.grid, self.job.surface))
-        start = initial.velocity if initial.state == "steady" else None
-        found = fold_branches(self.prony, *passing, self.numerics.integrator, 0.0 if reason else allowed, start)
-        return replace(found, reason=reason)
+        start = self.job.initial.velocity if self.steady_start.on else None
+        return replace(fold_branches(self.prony, *passing, self.numerics.integrator, allowed, start), reason=reason)
 
-    @decided
-    def viscoelasticity(self) -> Decision:
+    @decided("viscoelasticity")
+    def viscoelasticity(self) -> Verdict:
         """One map per branch that relaxes, and the last displacement."""
         count = self.prony.moduli.size
         what = "a branch relaxes" if count == 1 else f"{count} branches relax"
-        return Decision("viscoelasticity", count > 0, what if count else "the body has one modulus and no memory")
+        return count > 0, what if count else "the body has one modulus and no memory"
 
-    @decided
-    def folded_branches(self) -> Decision:
+    @decided("folded branches")
+    def folded_branches(self) -> Verdict:
         """Branches far faster or slower than all that happens have no map."""
-        name, found = "folded branches", self.folded
+        found = self.folded
         if not found.folded:
-            return Decision(name, False, found.reason or "no branch is far faster or slower than all that happens")
+            return False, found.reason or "no branch is far faster or slower than all that happens"
         kinds = ((found.memoryless, "memoryless"), (found.frozen, "frozen"))
         folded = " and ".join(f"{len(numbers)} {kind}" for numbers, kind in kinds if numbers)
         count = len(found.kept) + found.folded
-        return Decision(name, True, f"{folded} of {count}; error of friction {found.bound:.2g} at most")
+        return True, f"{folded} of {count}; error of friction {found.bound:.2g} at most"
 
-    @decided
-    def isolated(self) -> Decision:
+    @decided("isolated contact")
+    def isolated(self) -> Verdict:
         """Padded transforms, four times as large."""
         free = self.grid.boundary == "free"
-        return Decision("isolated contact", free, f"the boundary is {self.grid.boundary}" + ": padded" * free)
+        return free, f"the boundary is {self.grid.boundary}" + ": padded" * free
+
+    @decided("yielding counterbody")
+    def yielding(self) -> Verdict:
+        """Pressures bounded by the hardness, by another constraint of the solver."""
+        bound = self.hardness
+        return bound is not None, "material.hardness is not set" if bound is None else f"at a pressure of {bound:g} Pa"
 
     # -- the history --------------------------------------------------------------------------------------------------
 
@@ -125,112 +141,100 @@ class Choices:
     def slides_along_x(self) -> bool:
         """Whether the surface slides along x on a periodic box, where whole cells are an index offset."""
         spans = [span for span in self.timeline.spans if span.moves]
-        along = not any(span.stage.velocity[1] for span in spans)
-        return bool(spans) and self.grid.boundary == "periodic" and along
+        return bool(spans) and not self.isolated.on and not any(span.stage.velocity[1] for span in spans)
 
-    @decided
-    def sliding(self) -> Decision:
+    @decided("sliding")
+    def sliding(self) -> Verdict:
         """A surface that moves."""
         moves = self.timeline.moves
-        return Decision("sliding", moves, "the surface moves" if moves else "the surface stands in all stages")
+        return moves, "the surface moves" if moves else "the surface stands in all stages"
 
-    @decided
-    def part_cells(self) -> Decision:
+    @decided("sub-cell or oblique sliding")
+    def part_cells(self) -> Verdict:
         """Heights made anew when the surface has moved, but for whole cells along x on a periodic box."""
-        name = "sub-cell or oblique sliding"
         if not self.sliding.on:
-            return Decision(name, False, "the surface stands")
+            return False, "the surface stands"
         if self.isolated.on:
-            return Decision(name, True, "a free box is not cyclic: the heights are made anew")
+            return True, "a free box is not cyclic: the heights are made anew"
         if self.slides_along_x and self.further_starts.on:
-            return Decision(name, True, "stages that choose their own steps begin with parts of a cell where they must")
+            return True, "stages that choose their own steps begin with parts of a cell where they must"
         step = self.timeline.first_between_cells()
         if step is None:
-            return Decision(name, False, "every step is of whole cells along x")
-        why = "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
-        return Decision(name, True, why)
+            return False, "every step is of whole cells along x"
+        return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
 
-    @decided
-    def extrapolated_starts(self) -> Decision:
+    @decided("extrapolated starts")
+    def extrapolated_starts(self) -> Verdict:
         """The last pressure but one, from which the next one is extrapolated."""
         lasts = self.timeline.lasts
-        return Decision("extrapolated starts", lasts, "stages last" if lasts else "every stage is a single solve")
+        return lasts, "stages last" if lasts else "every stage is a single solve"
 
-    @decided
-    def further_starts(self) -> Decision:
-        """The two pressures before that: with thirds and quarters of a cell the next one starts from a whole cell
-        ago."""
+    @decided("starts from whole cells ago")
+    def further_starts(self) -> Verdict:
+        """The two pressures before that: with thirds and quarters of a cell a step starts from a whole cell ago."""
         on = self.timeline.chooses and any(span.moves and span.stage.chooses for span in self.timeline.spans)
-        why = "the surface slides in steps that are chosen" if on else "the surface slides in no steps that are chosen"
-        return Decision("starts from whole cells ago", on, why)
+        return on, f"the surface slides in {'' if on else 'no '}steps that are chosen"
 
-    @decided
-    def chosen_steps(self) -> Decision:
+    @decided("chosen time steps")
+    def chosen_steps(self) -> Verdict:
         """Time steps that follow the error of the last one (`march.choosing`)."""
         why = describe_steps(self.job)
-        on = bool(why) and self.job.remembers
-        return Decision("chosen time steps", on, why or "every stage says in which steps")
+        return bool(why) and self.job.remembers, why or "every stage says in which steps"
 
-    @decided
-    def short_rest(self) -> Decision:
+    @decided("rest cut short")
+    def short_rest(self) -> Verdict:
         """Once nothing changes any more at rest, one step ends the stage (`march.rest`)."""
-        stage = next((span.stage.name for span in self.timeline.spans if span.rests), None)
-        if stage is None:
-            return Decision("rest cut short", False, "no stage stands under a constant load with growing time steps")
-        return Decision("rest cut short", True, f"stage {stage!r} stands under a constant load")
+        if (span := next((span for span in self.timeline.spans if span.rests), None)) is None:
+            return False, "no stage stands under a constant load with growing time steps"
+        return True, f"stage {span.stage.name!r} stands under a constant load"
 
-    @decided
-    def steady_start(self) -> Decision:
+    @decided("steady start")
+    def steady_start(self) -> Verdict:
         """A steady solve before the first step."""
-        state = self.job.initial.state
-        return Decision("steady start", state == "steady", f"the initial state is {state}")
+        return self.job.initial.state == "steady", f"the initial state is {self.job.initial.state}"
 
-    @decided
-    def approach(self) -> Decision:
-        """Displacement control: the approach is given and the load follows."""
-        stage = next((stage.name for stage in self.job.history if stage.control == "approach"), None)
-        if stage is None:
-            return Decision("displacement control", False, "every stage prescribes its load")
-        return Decision("displacement control", True, f"stage {stage!r} prescribes the approach")
+    @decided("displacement control")
+    def approach(self) -> Verdict:
+        """The approach is given and the load follows."""
+        if (stage := next((stage for stage in self.job.history if stage.control == "approach"), None)) is None:
+            return False, "every stage prescribes its load"
+        return True, f"stage {stage.name!r} prescribes the approach"
 
     # -- the solver ---------------------------------------------------------------------------------------------------
 
-    @decided
-    def mixed_precision(self) -> Decision:
+    @decided("mixed precision")
+    def mixed_precision(self) -> Verdict:
         """A preconditioner in single precision, with transforms of its own, which costs no iteration."""
-        name, numerics = "mixed precision", self.numerics
-        if numerics.precision != "double":
-            return Decision(name, True, f"numerics.precision is {numerics.precision}")
-        if numerics.tolerance < LOOSE:
-            return Decision(name, False, f"numerics.tolerance is below {LOOSE:g}")
+        if self.numerics.precision != "double":
+            return True, f"numerics.precision is {self.numerics.precision}"
+        if self.numerics.tolerance < LOOSE:
+            return False, f"numerics.tolerance is below {LOOSE:g}"
         if self._relaxing_energies and self._inverse_is_known:
-            return Decision(name, False, "energies take the preconditioner for the inverse of the operator")
-        return Decision(name, True, f"a solve to a tolerance of {LOOSE:g} or more takes as many iterations with it")
+            return False, "energies take the preconditioner for the inverse of the operator"
+        return True, f"a solve to a tolerance of {LOOSE:g} or more takes as many iterations with it"
 
-    @decided
-    def single_operator(self) -> Decision:
+    @decided("operator in single precision")
+    def single_operator(self) -> Verdict:
         """The operator in single precision, too, on the transforms of the preconditioner."""
-        name, numerics = "operator in single precision", self.numerics
-        if numerics.precision != "mixed":
-            return Decision(name, False, f"numerics.precision is {numerics.precision}")
-        if numerics.tolerance < VERY_LOOSE:
-            return Decision(name, False, f"numerics.tolerance is below {VERY_LOOSE:g}")
+        if self.numerics.precision != "mixed":
+            return False, f"numerics.precision is {self.numerics.precision}"
+        if self.numerics.tolerance < VERY_LOOSE:
+            return False, f"numerics.tolerance is below {VERY_LOOSE:g}"
         if self.energies.on:
-            return Decision(name, False, "energies are balanced to more digits")
-        return Decision(name, True, f"a solve to a tolerance of {VERY_LOOSE:g} or more does not need more digits")
+            return False, "energies are balanced to more digits"
+        return True, f"a solve to a tolerance of {VERY_LOOSE:g} or more does not need more digits"
 
     @property
     def operator_type(self) -> type[np.floating]:
         """The precision of the operator and of the displacements that it makes."""
         return np.float32 if self.single_operator.on else np.float64
 
-    @decided
-    def spectrum(self) -> Decision:
-        """The waves of the surface: their transform is kept, their moments are taken once, and forces are spectral
-        sums."""
+    @decided("surface spectrum")
+    def spectrum(self) -> Verdict:
+        """The waves of the surface: their transform is kept, moments are taken once, and forces are spectral sums."""
         if any(isinstance(shape, Spectral) for shape in self.job.surface):
-            return Decision("surface spectrum", True, "the surface has waves or heights from a file")
-        return Decision("surface spectrum", False, "all shapes of the surface are in closed form")
+            return True, "the surface has waves or heights from a file"
+        return False, "all shapes of the surface are in closed form"
 
     @property
     def transforms(self) -> list[Any]:
@@ -241,22 +245,20 @@ class Choices:
 
     # -- the output ---------------------------------------------------------------------------------------------------
 
-    @decided
-    def energies(self) -> Decision:
-        """Work, stored and dissipated energy: one reduction per step, in a viscoelastic body one operator
-        application."""
+    @decided("energies")
+    def energies(self) -> Verdict:
+        """Work, stored and dissipated energy: one reduction a step, in a viscoelastic body an operator application."""
         asked = self.output.energy
-        return Decision("energies", asked, "output.energy asks for them" if asked else "output.energy is not set")
+        return asked, "output.energy asks for them" if asked else "output.energy is not set"
 
-    @decided
-    def energy_memory(self) -> Decision:
+    @decided("energy memory")
+    def energy_memory(self) -> Verdict:
         """Branch maps of `A^-1 u`, where the operator's inverse is not at hand."""
-        name = "energy memory"
         if not self._relaxing_energies:
-            return Decision(name, False, "no energies of a viscoelastic body are asked for")
+            return False, "no energies of a viscoelastic body are asked for"
         if self._inverse_is_known and self.numerics.precision == "double":
-            return Decision(name, False, "the preconditioner is the inverse")
-        return Decision(name, True, "the preconditioner is not the inverse")
+            return False, "the preconditioner is the inverse"
+        return True, "the preconditioner is not the inverse"
 
     @property
     def _relaxing_energies(self) -> bool:
@@ -265,34 +267,33 @@ class Choices:
     @property
     def _inverse_is_known(self) -> bool:
         """Whether the preconditioner is the inverse of the operator, but for its precision."""
-        return self.grid.boundary == "periodic" and self.numerics.kernel == "spectral"
+        return not self.isolated.on and self.numerics.kernel == "spectral"
 
-    @decided
-    def branch_dissipation(self) -> Decision:
+    @decided("dissipation per branch")
+    def branch_dissipation(self) -> Verdict:
         """A column of measures.csv per branch."""
-        name, asked = "dissipation per branch", self.output.branch_dissipation
+        asked = self.output.branch_dissipation
         if asked and not self.viscoelasticity.on:
-            return Decision(name, False, "the body has no branch")
-        return Decision(name, asked, f"output.branch_dissipation is {'' if asked else 'not '}set")
+            return False, "the body has no branch"
+        return asked, f"output.branch_dissipation is {'' if asked else 'not '}set"
 
-    @decided
-    def mesh_check(self) -> Decision:
+    @decided("run on half the mesh")
+    def mesh_check(self) -> Verdict:
         """The same run on half the mesh first, from which what the mesh makes wrong is seen."""
-        name = "run on half the mesh"
         if not self.output.mesh_check:
-            return Decision(name, False, "output.mesh_check is not set")
-        return Decision(name, True, "output.mesh_check asks for it, an eighth to a third of the work more")
+            return False, "output.mesh_check is not set"
+        return True, "output.mesh_check asks for it, an eighth to a third of the work more"
 
-    @decided
-    def fields(self) -> Decision:
+    @decided("fields")
+    def fields(self) -> Verdict:
         """Maps in fields.h5."""
         names, every = self.output.fields, self.output.every
         when = "after every step" if every == 1 else f"every {every} steps"
-        return Decision("fields", bool(names), f"{', '.join(names)} {when}" if names else "output.fields names none")
+        return bool(names), f"{', '.join(names)} {when}" if names else "output.fields names none"
 
-    @decided
-    def checkpoints(self) -> Decision:
+    @decided("checkpoints")
+    def checkpoints(self) -> Verdict:
         """Files to go on from; one at the end is always written."""
         rules = self.job.checkpoint
         when = f"every {rules.every} steps" if rules.every is not None else f"every {rules.minutes:g} minutes"
-        return Decision("checkpoints", True, f"{when} and at the end; {rules.keep} are kept")
+        return True, f"{when} and at the end; {rules.keep} are kept"

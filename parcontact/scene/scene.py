@@ -123,7 +123,7 @@ class Scene:
 
     def constraint(self, alpha: float) -> Constraint:
         """Which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
-        hardness = self.job.material.hardness
+        hardness = self.choices.hardness
         return NonNegative() if hardness is None else Bounded(hardness / (alpha * self.units.pressure))
 
 

@@ -227,6 +227,13 @@ def test_steady_start() -> None:
     assert [row(planned, "steady start").on for planned in (off, on)] == [False, True]
 
 
+def test_yielding_counterbody() -> None:
+    """A bound that nothing reaches costs sums over ranks alone: see `solve/test_bounded` for one that is reached."""
+    off, on = job(history=[PRESS]), job(history=[PRESS], material={**ELASTIC, "hardness": 1e9})
+    assert [row(planned, "yielding counterbody").on for planned in (off, on)] == [False, True]
+    assert set(extra(on, off)) == {"allreduce"}
+
+
 def test_displacement_control() -> None:
     """A reduction in each step tells whether the approach can be; off, there is none: see `test_elastic_static`."""
     planned = job(history=[{"approach": -5e-7}])
@@ -256,6 +263,7 @@ TESTED = {
         "displacement control",
         "dissipation per branch",
         "run on half the mesh",
+        "yielding counterbody",
     ),
     *("fields", "checkpoints", "interface"),  # the last in effects/test_interface.py
 }
