@@ -130,10 +130,10 @@ def _tried_counts(sample: Sample, own: Job) -> Iterator[float]:
 
 def time_error(cost: StageCost, sample: Sample) -> float:
     """The part that time steps make, in a stage, or in all where it was not tried."""
-    for total in (lambda name: cost.sums.get(name, 0.0), sample.total):
+    for total in (cost.total, sample.total):
         for name in ("friction", "area"):
             if weight := total(f"{name} weight"):
-                return float(total(f"{name} time error") / weight)
+                return total(f"{name} time error") / weight
     return 0.0
 
 
@@ -159,7 +159,8 @@ def _calls(own: Job, job: Job) -> float:
 
 
 def _with_calls(cost: StageCost, times: float) -> StageCost:
-    return replace(cost, sums={name: value * times for name, value in cost.sums.items()})
+    first, later = ({name: value * times for name, value in sums.items()} for sums in (cost.first, cost.later))
+    return replace(cost, first=first, later=later)
 
 
 # -- text --------------------------------------------------------------------------------------------------------------

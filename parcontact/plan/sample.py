@@ -1,8 +1,7 @@
 """A job tried out: some of its steps are made in memory, the rest are taken to be like them.
 
-Every stage is looked at in blocks, evenly spaced: one long step up to the block, some to settle after it, and then
-some whose cost is taken for all steps of the block's part of the stage. The jump of a stage, and every step of a
-history that is short enough, is made as it is.
+Each stage has an equal share of the time. Its steps are made as a run makes them until that is used up; one long step
+then goes to the end of the stage. The first steps of a stage, where the load may jump, stand for themselves alone.
 """
 
 import resource
@@ -16,10 +15,10 @@ from typing import TypeVar
 
 from .. import scene
 from ..errors import InputError, RunError
-from ..history.timeline import Step, Timeline
+from ..history.timeline import Step
 from ..job import Job
 from ..march.loop import March
-from ..parallel.slab import Slab, deal
+from ..parallel.slab import Slab
 from ..physics.budget import ErrorBudget, weight_of
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
@@ -27,30 +26,36 @@ from ..steady_sliding.sliding import Point, SteadySliding
 from .trial import make_tiny
 
 T = TypeVar("T")
-SETTLING = 4  # steps after a long one until solves take as many iterations as ever
-BLOCK = 8  # steps of a block, these among them
-CALLS = 12  # operator calls expected of a step that starts from the one before
-LONG = 4  # steps that a long step costs, with what settling costs more
-FIRST = 2  # steps that are always made
+FIRST = 2  # tuning: steps of a stage that stand for themselves alone
+FEWEST = 8  # tuning: steps of a stage that are made before a long one ends it
 KILO = 1024  # bytes in what the system counts resident memory in
 UNDISTURBED = 0.9  # of the time a rank has a core, where nothing else is at work
-LATE = 2.0  # times the time given: then no more steps are made
+LATE = 2.0  # tuning: times the time given, after which no more steps are made
 
 
 @dataclass
 class StageCost:
-    """What the steps of a stage cost: their number, how many were tried, sums over all that those stand for."""
+    """What the steps of a stage cost: their number, how many were tried, sums over the FIRST of these and over later
+    ones."""
 
     steps: int
     tried: int = 0
-    weight: float = 0.0
-    sums: dict[str, float] = field(default_factory=dict)
+    first: dict[str, float] = field(default_factory=dict)
+    later: dict[str, float] = field(default_factory=dict)
 
-    def add(self, weight: float, cost: dict[str, float]) -> None:
+    def add(self, cost: dict[str, float]) -> None:
+        """Count a step that was tried."""
+        sums = self.first if self.tried < FIRST else self.later
         self.tried += 1
-        self.weight += weight
         for name, value in cost.items():
-            self.sums[name] = self.sums.get(name, 0.0) + weight * value
+            sums[name] = sums.get(name, 0.0) + value
+
+    def total(self, name: str) -> float:
+        """Sum over all steps; 0 where none was tried."""
+        first, later = min(self.tried, FIRST), max(self.tried - FIRST, 0)
+        sums = self.later if later else self.first
+        each = sums.get(name, 0.0) / max(later or first, 1)
+        return self.first.get(name, 0.0) + (self.steps - first) * each
 
 
 @dataclass(frozen=True)
@@ -86,12 +91,10 @@ class Sample:
         return sum(stage.tried for stage in self.stages)
 
     def total(self, name: str) -> float:
-        """Of all steps: `seconds`, or a count by its name in the tally. A stage not tried is like the others."""
-        weight = sum(stage.weight for stage in self.stages)
-        mean = sum(stage.sums.get(name, 0.0) for stage in self.stages) / max(weight, 1.0)
-        return sum(
-            stage.steps * (stage.sums.get(name, 0.0) / stage.weight if stage.weight else mean) for stage in self.stages
-        )
+        """Sum of `seconds`, or of a count by its name in the tally, over all steps; stages not tried are like others."""
+        tried = [stage for stage in self.stages if stage.tried]
+        steps = sum(stage.steps for stage in tried)
+        return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
 
 
 def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sample:
@@ -154,7 +157,7 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
         if temperature == temperature:
             sliding.heat(temperature)
         point, cost = _cost(slab, partial(_solve, sliding, wanted.velocity(speed), pressure))
-        stage.add(1.0, cost | (dict(_errors(point.errors, 1.0, 1.0)) if point else {}))
+        stage.add(cost | (dict(_errors(point.errors, 1.0, 1.0)) if point else {}))
     return building, [stage]
 
 
@@ -173,52 +176,25 @@ def _spread(count: int) -> list[int]:
 
 
 def _try(march: March, seconds: float) -> list[StageCost]:
-    """The first steps tell how many can be afforded; root's clock decides for all ranks."""
+    """Try all stages; root's clock decides for all ranks."""
     slab, began, timeline = march.scene.slab, time.perf_counter(), march.timeline()
     stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
-    per_call = float("inf")
-    as_run = march.steps(timeline)
-    for step in islice(as_run, FIRST):
-        cost = _make_as_run(march, step, stages)
-        per_call = min(per_call, cost["seconds"] / max(cost["operator"], 1.0))
-    left = max(seconds - (time.perf_counter() - began), 0.0)
-    affordable = slab.agree(left / (CALLS * per_call)) / len(timeline)
-    if affordable >= 1.0:
-        for step in as_run:
-            if slab.agree(_is_late(began, seconds, stages)):
+    for step in march.steps(timeline):
+        stage, span = stages[step.stage], timeline.spans[step.stage]
+        took = slab.agree(time.perf_counter() - began)
+        if took > LATE * seconds and sum(stage.tried for stage in stages) > FIRST:
+            break
+        if took > seconds * (step.stage + 1) / len(stages) and stage.tried >= FEWEST:
+            if step.stage + 1 == len(stages):
                 break
-            _make_as_run(march, step, stages)
-        _count_anew(stages, timeline)
-        return stages
-    _count_anew(stages, timeline)
-    for span, stage in zip(timeline.spans, stages, strict=True):
-        for step, weight in chosen(timeline, range(max(span.before, march.row.step) + 1, span.last + 1), affordable):
-            if slab.agree(_is_late(began, seconds, stages)):
-                return stages
-            cost = _make(march, step)
-            if weight:
-                stage.add(weight, cost)
-    return stages
-
-
-def _count_anew(stages: list[StageCost], timeline: Timeline) -> None:
-    """Stages that choose their steps have those that they have chosen by now, and a guess of those to come."""
+            march.advance(span.leap(step.number, span.last))
+            continue
+        stage.steps -= step.passed
+        stage.add(_make(march, step))
     for stage, span in zip(stages, timeline.spans, strict=True):
-        if timeline.chooses and span.stage.chooses:
+        if timeline.chooses and span.stage.chooses:  # what was chosen by now, and a guess of those to come
             stage.steps = span.jumps + span.count
-
-
-def _is_late(began: float, seconds: float, stages: list[StageCost]) -> bool:
-    """Whether to stop, but not before there is more than the first steps, which start from nothing."""
-    return time.perf_counter() - began > LATE * seconds and sum(stage.tried for stage in stages) > FIRST
-
-
-def _make_as_run(march: March, step: Step, stages: list[StageCost]) -> dict[str, float]:
-    """Make a step of the run, which stands for itself, and for others that the run does not make."""
-    cost = _make(march, step)
-    stages[step.stage].steps -= step.passed
-    stages[step.stage].add(1.0, cost)
-    return cost
+    return stages
 
 
 def _make(march: March, step: Step) -> dict[str, float]:
@@ -244,30 +220,3 @@ def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:
     found = call()
     seconds = time.perf_counter() - began
     return found, {"operator": 0, **slab.tally.since(before), "seconds": seconds}
-
-
-def chosen(timeline: Timeline, numbers: range, share: float) -> Iterator[tuple[Step, float]]:
-    """The steps to make in place of those of a stage, and for how many each stands; about a `share` of them."""
-    if numbers and timeline[numbers[0]].jump:
-        yield timeline[numbers[0]], 1.0
-        numbers = numbers[1:]
-    count = max(1, int(share * len(numbers) / (BLOCK + LONG)))
-    if count * (BLOCK + LONG) >= len(numbers):
-        yield from ((timeline[number], 1.0) for number in numbers)
-        return
-    done = 0
-    for part in deal(len(numbers), count):
-        first = part.start + (part.stop - part.start - BLOCK) // 2
-        yield _leap(timeline, numbers[done:first]), 0.0
-        settled, done = first + SETTLING, first + BLOCK
-        yield from ((timeline[number], 0.0) for number in numbers[first:settled])
-        weight = (part.stop - part.start) / (BLOCK - SETTLING)
-        yield from ((timeline[number], weight) for number in numbers[settled:done])
-    if numbers[done:]:
-        yield _leap(timeline, numbers[done:]), 0.0
-
-
-def _leap(timeline: Timeline, numbers: range) -> Step:
-    """Some steps in one."""
-    first, last = timeline[numbers[0]], timeline[numbers[-1]]
-    return last._replace(dt=last.time - (first.time - first.dt), growth=0.0)

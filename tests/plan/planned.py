@@ -3,6 +3,7 @@
 from typing import Any
 
 from parcontact.job import Job
+from parcontact.plan.sample import StageCost
 
 Json = dict[str, Any]
 ROUGH: Json = {
@@ -54,3 +55,11 @@ JOBS: dict[str, Json] = {
     },
 }
 SWEEP = {"history": [SLIDE], "sweep": [{"history.0.duration": [1e-3, 2e-3, 4e-3]}]}
+
+
+def alike(steps: int, cost: dict[str, float]) -> StageCost:
+    """A stage of which all steps were tried, each at such a cost."""
+    stage = StageCost(steps)
+    for _ in range(steps):
+        stage.add(cost)
+    return stage

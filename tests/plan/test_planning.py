@@ -19,10 +19,10 @@ from parcontact.parallel.slab import Slab
 from parcontact.plan import report
 from parcontact.plan.costs import SLOW_WRITE, Costs, costs_of, measure_write_rate
 from parcontact.plan.planning import Planner, case_times, cases_to_try, only_steady_states
-from parcontact.plan.sample import Sample, StageCost, sample
+from parcontact.plan.sample import Sample, sample
 from parcontact.plan.trial import choose_grid
 
-from .planned import CELLS, SWEEP, TWO, job
+from .planned import CELLS, SWEEP, TWO, alike, job
 
 
 def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,7 +52,7 @@ def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> No
 
 
 def costs_of_a_trial(share: float = 1.0) -> Costs:
-    stage = StageCost(1, 1, 1.0, {"seconds": 1.0, "operator": 10.0})
+    stage = alike(1, {"seconds": 1.0, "operator": 10.0})
     return Costs(job(), Sample(job(), 2, 0.0, 1.0, 0.0, 0, (stage,), share=share), 1e9)
 
 
@@ -159,7 +159,7 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert max(tried.grid.points) <= 1024
     assert tried.grid.size == large.grid.size
     assert len(Timeline.of(tried)) < len(Timeline.of(large))
-    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (StageCost(9, 9, 9.0, {"seconds": 9.0}),))
+    seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (alike(9, {"seconds": 1.0}),))
     assert costs_of(large, seen, 1e9).sample.steps == len(Timeline.of(large))
     ratio = costs_of(large, seen, 1e9).step / costs_of(tried, seen, 1e9).step
     assert ratio > large.grid.nx**2 / tried.grid.nx**2

@@ -19,7 +19,9 @@ from parcontact.physics.budget import SPOTS_ORDER, ErrorSums
 from parcontact.physics.time_error import TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.costs import Costs, costs_of
-from parcontact.plan.sample import Sample, StageCost, sample
+from parcontact.plan.sample import Sample, sample
+
+from .planned import alike
 
 Json = dict[str, Any]
 WAVE = 1.25e-4
@@ -39,8 +41,8 @@ def costs(planned: Job, time: float = 0.0, mesh: float = 0.0, of: str = "frictio
     stages = []
     for span in Timeline.of(planned).spans:
         n = span.jumps + span.count
-        sums = {"seconds": n, "operator": n * calls, f"{of} weight": n, f"{of} time error": n * time}
-        stages.append(StageCost(n, n, float(n), {**sums, f"{of} mesh error": n * mesh}))
+        sums = {"seconds": 1.0, "operator": calls, f"{of} weight": 1.0, f"{of} time error": time}
+        stages.append(alike(n, {**sums, f"{of} mesh error": mesh}))
     seen = Sample(planned, 1, 0.0, 0.0, 0.0, 0, tuple(stages))
     return costs_of(planned, seen, 1e30)
 
