@@ -26,14 +26,6 @@ def directory(name: str) -> Path | None:
     return None
 
 
-def is_own(path: Path) -> bool:
-    """Whether this is a file of this user itself, no link to one, which nobody else may change."""
-    with suppress(OSError):
-        found = path.lstat()
-        return stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & OTHERS_WRITE
-    return False
-
-
 def _private(place: Path) -> bool:
     """Whether a directory is this user's, nobody else may write to it, and nobody else can put another in its place."""
     found = place.lstat()

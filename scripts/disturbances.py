@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from faults import Campaign
 
-LINKS = (".lock", "run.log", "fields.xdmf", "job.resolved.yaml", "job.yaml", "picture.png", "checkpoint/step-4.h5.part")
-VANISHING = ("measures.csv", "fields.xdmf", "run.log", "job.yaml", "job.resolved.yaml", ".lock", ".parcontact")
+LINKS = (".lock", "fields.xdmf", "job.resolved.yaml", "job.yaml", "picture.png")
+VANISHING = ("fields.xdmf", "run.log", "job.yaml", "job.resolved.yaml", ".lock", ".parcontact")
 LIMITS = {"f": (1, 6000), "n": (8, 60), "v": (200_000, 1_500_000)}  # of ulimit: kB of a file, open files, kB of memory
 CODES = (0, 1, 2, 3)
 

@@ -106,7 +106,8 @@ def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in
         _seal(part)
 
     try:
-        layout.lay_out(part, slab, build, SEAL)
+        size = sum(rows.itemsize for rows in maps.values()) * slab.nx * slab.ny
+        layout.lay_out(part, slab, build, size, SEAL)
         hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()], in_turn)
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.on_root(slab, finish, f"cannot write {part}")

@@ -109,7 +109,8 @@ class FieldsFile:
     def _replace(self, found: "Layout | None", kept: Sequence[int] = ()) -> None:
         """Lay a new file out, and copy the maps of the steps that are `kept`; one that was not saved then is NaN."""
         new = self.slab.agree(files.unused(self.path))
-        layout.lay_out(new, self.slab, self._build)
+        size = len(self.steps) * len(self.names) * self.slab.nx * self.slab.ny * layout.DOUBLE
+        layout.lay_out(new, self.slab, self._build, size)
         if found:
             self._copy(found, kept, new)
         hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")

@@ -5,16 +5,19 @@ rank is raised on all, as a RunError in one sentence.
 """
 
 import errno
+import io
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from ..errors import InputError, RunError
+from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
@@ -32,12 +35,12 @@ class Part(NamedTuple):
 
 def write(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
     """Every rank writes its rows; collective. `in_turn` forgoes MPI-IO."""
-    _move(path, slab, list(parts), "r+", in_turn)
+    _move(path, slab, list(parts), True, in_turn)
 
 
 def read(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
     """Every rank reads its rows into `part.rows`; collective. `in_turn` forgoes MPI-IO."""
-    _move(path, slab, list(parts), "r", in_turn)
+    _move(path, slab, list(parts), False, in_turn)
 
 
 def sync(path: Path, slab: Slab) -> None:
@@ -59,12 +62,22 @@ def sync_one(path: Path) -> None:
         os.close(handle)
 
 
-def overwrite(target: BinaryIO, data: bytes | memoryview, position: int) -> None:
-    """Write all of `data` to its place in a file: the system may take less at a time."""
-    rest = memoryview(data)
+def overwrite(handle: int, data: bytes | memoryview, position: int) -> None:
+    """Write all of `data` to its place in a file."""
+    _transfer(partial(os.pwrite, handle), memoryview(data), position)
+
+
+def _transfer(act: Callable[[memoryview, int], int], rest: memoryview, position: int) -> None:
+    """Write or read all of `rest` at a position: the system may take less at a time."""
     while rest:
-        done = os.pwrite(target.fileno(), rest, position)
+        done = act(rest, position)
+        if not done:
+            raise ValueError("it ends early")
         rest, position = rest[done:], position + done
+
+
+def _read_at(handle: int, data: memoryview, position: int) -> int:
+    return os.preadv(handle, [data], position)
 
 
 def on_root(slab: Slab, action: Callable[[], Any], what: str, kind: type[Exception] = RunError) -> None:
@@ -97,109 +110,67 @@ def reason(error: BaseException) -> str:
     return text.splitlines()[0] if text else type(error).__name__
 
 
-def _move(path: Path, slab: Slab, parts: Sequence[Part], mode: str, in_turn: bool) -> None:
-    together = h5py.get_config().mpi and not in_turn and slab.comm.size > 1
-    _see(path, slab, mode)
-    problem = (_together if together else _by_turns)(path, slab, parts, mode)
-    if problem:
-        problem = f"cannot {'read' if mode == 'r' else 'write'} {path}: {_explained(problem, path, mode)}"
-    raise_first(slab, problem)
-
-
-def _see(path: Path, slab: Slab, mode: str) -> None:
-    """A file that one rank cannot open must not be opened together by the others."""
-    problem = ""
+def _move(path: Path, slab: Slab, parts: Sequence[Part], writes: bool, in_turn: bool) -> None:
+    """Write or read the rows at their places; collective. One rank that cannot take part is an error of all before."""
+    what, problem, places = f"cannot {'write' if writes else 'read'} {path}", "", list[int]()
     try:
-        os.close(os.open(path, os.O_RDONLY if mode == "r" else os.O_RDWR))
+        os.close(os.open(path, os.O_RDWR if writes else os.O_RDONLY))
+        with h5py.File(path, "r", locking=False) as file:
+            places = [_place(file[part.name], part, slab) for part in parts]
     except OSError as error:
         problem = f"cannot open {path}: {reason(error)}"
+    except FAILURES as error:
+        problem = f"{what}: {reason(error)}"
+    raise_first(slab, problem)
+    together = h5py.get_config().mpi and not in_turn and slab.comm.size > 1
+    if problem := (_together if together else _by_turns)(path, slab, parts, places, writes):
+        space = os.statvfs(path)
+        full = writes and space.f_bavail * space.f_frsize < FULL
+        problem = f"{what}: {os.strerror(errno.ENOSPC) if full else problem}"
     raise_first(slab, problem)
 
 
-def _explained(problem: str, path: Path, mode: str) -> str:
-    try:
-        space = os.statvfs(path)
-    except OSError as error:
-        return reason(error)
-    full = mode != "r" and space.f_bavail * space.f_frsize < FULL
-    return os.strerror(28) if full else problem
+def _place(dataset: h5py.Dataset, part: Part, slab: Slab) -> int:
+    """Return where in the file the rows of this rank begin; raises ValueError if they are of another kind."""
+    if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
+        kinds = f"{dataset.dtype} {dataset.shape}, not of {part.rows.dtype} {part.rows.shape} and its like"
+        raise ValueError(f"{part.name} is of {kinds}")
+    if not part.rows.size:
+        return 0
+    index = int(np.ravel_multi_index((*part.at, slab.rows.start, 0), dataset.shape))
+    return int(dataset.id.get_offset()) + index * dataset.dtype.itemsize
 
 
-def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> str:
+def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[int], writes: bool) -> str:
     """One rank after the other; those without rows only wait."""
     problem = ""
     for rank in range(slab.comm.size):
         if rank == slab.comm.rank and slab.shape[0]:
             try:
-                _alone(path, slab, parts, mode)
+                with io.FileIO(path, "r+" if writes else "r") as file:
+                    act = partial(os.pwrite if writes else _read_at, file.fileno())
+                    for part, place in zip(parts, places, strict=True):
+                        _transfer(act, part.rows.data.cast("B"), place)
             except FAILURES as error:
                 problem = reason(error)
         slab.comm.Barrier()
     return problem
 
 
-def _alone(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> None:
-    with h5py.File(path, "r", locking=mode == "r") as file:  # what is written to is in a directory of ours
-        moves = [_Move(file, part, slab) for part in parts]
-        if mode == "r":
-            for move in moves:
-                move.read()
-            return
-        places = [move.place for move in moves]
-    with path.open("r+b") as target:
-        for part, place in zip(parts, places, strict=True):
-            overwrite(target, part.rows.data.cast("B"), place)
-
-
-def _together(path: Path, slab: Slab, parts: Sequence[Part], mode: str) -> str:
-    """All ranks at once. Who cannot take part must be known before, and who fails goes on with the rest."""
+def _together(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[int], writes: bool) -> str:
+    """All ranks at once, by MPI-IO; who fails goes on with the rest."""
     problem = ""
-    how = h5py.h5p.create(h5py.h5p.DATASET_XFER)
-    how.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
     try:
-        file = h5py.File(path, mode, driver="mpio", comm=slab.comm)
-    except FAILURES as error:
-        return reason(error)
-    moves = []
+        file = MPI.File.Open(slab.comm, str(path), MPI.MODE_RDWR if writes else MPI.MODE_RDONLY)
+    except MPI.Exception as error:
+        return str(error)
+    for part, place in zip(parts, places, strict=True):
+        try:
+            (file.Write_at_all if writes else file.Read_at_all)(place, part.rows)
+        except MPI.Exception as error:
+            problem = problem or str(error)
     try:
-        moves = [_Move(file, part, slab) for part in parts]
-    except FAILURES as error:
-        problem = reason(error)
-    if not any(slab.from_all(problem)):
-        for move in moves:
-            try:
-                move.read(how) if mode == "r" else move.write(how)
-            except FAILURES as error:
-                problem = problem or reason(error)
-    try:
-        file.close()
-    except FAILURES as error:
-        problem = problem or reason(error)
+        file.Close()
+    except MPI.Exception as error:
+        problem = problem or str(error)
     return problem
-
-
-class _Move:
-    """This rank's rows in memory and in a file; safe for ranks without rows."""
-
-    def __init__(self, file: h5py.File, part: Part, slab: Slab) -> None:
-        dataset = file[part.name]
-        if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
-            kinds = f"{dataset.dtype} {dataset.shape}, not of {part.rows.dtype} {part.rows.shape} and its like"
-            raise ValueError(f"{part.name} is of {kinds}")
-        self.rows, self._id, self._space = part.rows, dataset.id, dataset.id.get_space()
-        count = (1,) * len(part.at) + part.rows.shape
-        if part.rows.size:
-            self._memory = h5py.h5s.create_simple(count)
-            self._space.select_hyperslab((*part.at, slab.rows.start, 0), count)
-            index = int(np.ravel_multi_index((*part.at, slab.rows.start, 0), dataset.shape))
-            self.place = int(dataset.id.get_offset()) + index * dataset.dtype.itemsize
-        else:
-            self._memory = h5py.h5s.create_simple((1,))
-            self._memory.select_none()
-            self._space.select_none()
-
-    def read(self, how: h5py.h5p.PropDXID | None = None) -> None:
-        self._id.read(self._memory, self._space, self.rows, dxpl=how)
-
-    def write(self, how: h5py.h5p.PropDXID) -> None:
-        self._id.write(self._memory, self._space, self.rows, dxpl=how)

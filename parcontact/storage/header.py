@@ -26,10 +26,11 @@ def lines(comm: MPI.Intracomm) -> Iterator[str]:
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / GIGABYTE
     load = ", ".join(f"{value:.2f}" for value in os.getloadavg())
     cores = len(os.sched_getaffinity(0))
-    yield f"machine: {_processor()}, {cores} of {os.cpu_count()} cores, {memory:.3g} GB of memory, load {load}"
+    yield f"machine: {processor()}, {cores} of {os.cpu_count()} cores, {memory:.3g} GB of memory, load {load}"
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the name of the processor."""
     try:
         with open("/proc/cpuinfo") as file:
             return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))

@@ -1,14 +1,10 @@
 """HDF5 files laid out with places for all maps before the first is written.
 
 What is not a map is written once, by root; what is one has its place and changes nothing else, so that a run killed
-while it writes leaves a readable file. HDF5 does not survive a disk that is full when it writes what is not a map: it
-does that in memory, from where plain writing takes it to the disk.
+while it writes leaves a readable file.
 """
 
-import io
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,42 +17,36 @@ from . import hdf5
 from .hdf5 import overwrite
 
 PIECE = 1 << 16  # bytes read at a time
+DOUBLE = 8  # bytes of a number in a map
+RESERVE = 1 << 20  # bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
 
 
-def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], block: int = 0) -> None:
-    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective. The name must be unused."""
+def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
+    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective. The name must be unused.
+
+    All maps take `size` bytes. That there is room for the rest of the file, and no limit to its length, is tried first.
+    """
 
     def make() -> None:
-        memory = _Memory()
-        with h5py.File(memory, "w", userblock_size=block) as file:
-            build(file)
-            found = regions(file)
-        with path.open("xb") as target, _removed_after_an_error(path):
-            target.truncate(memory.size)
-            for start, stop in outside(memory.size, found):
-                overwrite(target, memory.piece(start, stop - start), start)
+        try:
+            with path.open("xb") as probe:
+                probe.write(bytes(RESERVE))
+                probe.truncate(RESERVE + size)
+            with h5py.File(path, "w", userblock_size=block, locking=False) as file:
+                build(file)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
 
     hdf5.on_root(slab, make, f"cannot make {path}")
 
 
 def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
-    """Root changes a file, but neither its maps nor its length, with `act(file)`; collective."""
+    """Root changes attributes of a file, which keep their size, with `act(file)`; collective."""
 
     def apply() -> None:
-        with h5py.File(path, "r", locking=False) as file:
-            found = regions(file)
-        with path.open("r+b") as target:
-            memory, size = _Memory(), os.fstat(target.fileno()).st_size
-            memory.truncate(size)
-            spans = list(outside(size, found))
-            for start, stop in spans:
-                memory.put(os.pread(target.fileno(), stop - start, start), start)
-            with h5py.File(memory, "r+") as file:
-                act(file)
-            if memory.size != size:
-                raise ValueError("its length may not change")
-            for start, stop in spans:
-                overwrite(target, memory.piece(start, stop - start), start)
+        with h5py.File(path, "r+", locking=False) as file:
+            act(file)
 
     hdf5.on_root(slab, apply, f"cannot write {path}")
 
@@ -68,7 +58,7 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
         types = {name: file[name].dtype for name in values}
     with path.open("r+b") as target:
         for name, numbers in values.items():
-            overwrite(target, numbers.astype(types[name]).tobytes(), places[name])
+            overwrite(target.fileno(), numbers.astype(types[name]).tobytes(), places[name])
 
 
 def regions(file: h5py.File) -> list[tuple[int, int]]:
@@ -90,60 +80,6 @@ def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterat
         for position in range(start, first, PIECE):
             yield position, min(position + PIECE, first)
         start = last
-
-
-@contextmanager
-def _removed_after_an_error(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
-
-
-class _Memory(io.RawIOBase):
-    """A file in memory for HDF5, which crashes where a write fails; the places of maps, never written, take no room."""
-
-    def __init__(self) -> None:
-        self.size, self._at = 0, 0
-        self._pages: dict[int, bytearray] = {}
-
-    def put(self, data: bytes | memoryview, start: int) -> None:
-        """Write from a place on."""
-        done = 0
-        while done < len(data):
-            number, first = divmod(start + done, PIECE)
-            count = min(PIECE - first, len(data) - done)
-            page = self._pages.setdefault(number, bytearray(PIECE))
-            page[first : first + count] = data[done : done + count]
-            done += count
-        self.size = max(self.size, start + len(data))
-
-    def piece(self, start: int, length: int) -> bytes:
-        """Read from a place on."""
-        stop = min(start + length, self.size)
-        numbers = range(start // PIECE, -(-stop // PIECE))
-        whole = b"".join(self._pages.get(number, bytes(PIECE)) for number in numbers)
-        return whole[start % PIECE : start % PIECE + max(0, stop - start)]
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self.size}[whence]
-        return self._at
-
-    def readinto(self, buffer: Any) -> int:
-        data = self.piece(self._at, len(buffer))
-        buffer[: len(data)] = data
-        self._at += len(data)
-        return len(data)
-
-    def write(self, data: Any) -> int:
-        self.put(memoryview(data), self._at)
-        self._at += len(data)
-        return len(data)
-
-    def truncate(self, size: int | None = None) -> int:
-        self.size = self._at if size is None else size
-        return self.size
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:

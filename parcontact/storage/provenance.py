@@ -29,10 +29,6 @@ BUDGET_BYTES = 1_000
 CHAIN_BYTES = 50_000  # of the text of a chain: an attribute of fixed size can be renewed in place
 
 
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
 @dataclass(frozen=True)
 class Link:
     """One run of a chain, or several in a row that were alike: its resolved job, and the step from which it went on."""
@@ -42,7 +38,7 @@ class Link:
     from_step: int = 0
     runs: int = 1
     program: str = PROGRAM
-    started: str = field(default_factory=_now)
+    started: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
 
 
 @dataclass(frozen=True)
@@ -57,14 +53,13 @@ class Provenance:
     budget: Mapping[str, Any] = field(default_factory=dict)
 
     def write(self, file: h5py.File) -> None:
-        """Attributes of the file: program, resolved job (YAML), chain (JSON), error budget (JSON), ranks, seeds,
-        libraries, references."""
+        """Write the attributes of the file: program, resolved job (YAML), chain (JSON), error budget (JSON), ranks,
+        seeds, libraries, references."""
         now = self.chain[-1]
         file.attrs["program"] = now.program
         file.attrs["job"] = now.job
-        file.attrs.create("chain", _fixed(self.chain, now.job))
-        file.attrs.create("warnings", self._warnings)
-        file.attrs.create(BUDGET, self._budget)
+        for name, text in self._renewable(now.job).items():
+            file.attrs.create(name, text)
         file.attrs["ranks"] = now.ranks
         small = all(seed < 2**63 for seed in self.seeds)
         file.attrs["seeds"] = np.array(self.seeds, dtype=np.int64) if small else [str(seed) for seed in self.seeds]
@@ -77,47 +72,44 @@ class Provenance:
 
     def renew(self, file: h5py.File) -> None:
         """Put the longer chain, and what else has changed, into a file that has one; nothing changes its place."""
-        file.attrs.modify("chain", _fixed(self.chain, file.attrs["job"]))
-        if "warnings" in file.attrs:
-            file.attrs.modify("warnings", self._warnings)
-        if BUDGET in file.attrs:
-            file.attrs.modify(BUDGET, self._budget)
+        for name, text in self._renewable(file.attrs["job"]).items():
+            if name in file.attrs:
+                file.attrs.modify(name, text)
 
-    @property
-    def _warnings(self) -> NDArray[np.bytes_]:
-        """One a line, of fixed size: it can be renewed in place."""
-        return np.array("\n".join(self.warnings).encode()[:WARNING_BYTES], dtype=f"S{WARNING_BYTES}")
-
-    @property
-    def _budget(self) -> NDArray[np.bytes_]:
-        """As JSON, of fixed size too."""
-        return np.array(json.dumps(self.budget).encode(), dtype=f"S{BUDGET_BYTES}")
+    def _renewable(self, job: str) -> dict[str, NDArray[np.bytes_]]:
+        """Return the attributes that change during a run, of fixed size; `job` is that of the file."""
+        texts = {
+            "chain": (_chain_text(self.chain, job), CHAIN_BYTES),
+            "warnings": ("\n".join(self.warnings), WARNING_BYTES),
+            BUDGET: (json.dumps(self.budget), BUDGET_BYTES),
+        }
+        return {name: np.array(text.encode()[:size], dtype=f"S{size}") for name, (text, size) in texts.items()}
 
 
 def read_budget(file: h5py.File) -> dict[str, Any]:
-    """The error budget of the run so far, of friction and area by part (relative); empty where there is none."""
+    """Return the error budget of the run so far, of friction and area by part (relative); empty where there is none."""
     return dict(json.loads(bytes(file.attrs.get(BUDGET, b"{}"))))
 
 
 def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
-    """The chain with one more run; a run like the last is only counted."""
+    """Return the chain with one more run; a run like the last is only counted."""
     if chain and (chain[-1].job, chain[-1].ranks, chain[-1].program) == (link.job, link.ranks, link.program):
         return (*chain[:-1], replace(chain[-1], runs=chain[-1].runs + 1))
     return (*chain, link)
 
 
 def read_chain(file: h5py.File) -> tuple[Link, ...]:
-    """The chain of runs that made the file."""
+    """Return the chain of runs that made the file."""
     links = json.loads(bytes(file.attrs["chain"]))
     return tuple(Link(**{**link, "job": link["job"] or file.attrs["job"]}) for link in links)
 
 
-def _fixed(chain: Sequence[Link], job: str) -> NDArray[np.bytes_]:
-    """As JSON in an array of fixed size: an empty job is that of the file; what does not fit is left out."""
+def _chain_text(chain: Sequence[Link], job: str) -> str:
+    """Return a chain as JSON: an empty job is that of the file; what does not fit is left out, the oldest first."""
     links = [asdict(replace(link, job="" if link.job == job else link.job)) for link in chain]
     for link in links:
         if len(json.dumps(links)) > CHAIN_BYTES and link["job"]:
             link["job"] = LEFT_OUT
-    while len(json.dumps(links)) > CHAIN_BYTES:
+    while len(text := json.dumps(links)) > CHAIN_BYTES:
         links.pop(0)
-    return np.array(json.dumps(links).encode(), dtype=f"S{CHAIN_BYTES}")
+    return text

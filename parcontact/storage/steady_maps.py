@@ -66,7 +66,8 @@ class SteadyMaps:
 
     def _make(self, provenance: Provenance) -> None:
         new = self.slab.agree(files.unused(self.path))
-        layout.lay_out(new, self.slab, lambda file: self._build(file, provenance))
+        size = len(self.points) * len(self.names) * self.slab.nx * self.slab.ny * layout.DOUBLE
+        layout.lay_out(new, self.slab, lambda file: self._build(file, provenance), size)
         hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
 
     def _build(self, file: h5py.File, provenance: Provenance) -> None:

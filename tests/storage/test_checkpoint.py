@@ -163,7 +163,7 @@ def _unsealed(data: bytes) -> bytes:
 
 DAMAGE: list[tuple[Callable[[bytes], bytes], str]] = [
     (lambda data: data[: len(data) // 2], "is damaged: it has .* bytes instead of"),
-    (lambda data: data[:100], "is damaged: its seal cannot be read"),
+    (lambda data: data[:60], "is damaged: its seal cannot be read"),
     (lambda data: data + b"more", "is damaged: it has .* bytes instead of"),
     (lambda data: b"", "is incomplete or damaged: it has no seal"),
     (_unsealed, "is incomplete or damaged: it has no seal"),
