@@ -5,11 +5,8 @@ is kept in a private directory, so that only a first run waits for the compiler;
 """
 
 import fcntl
-import os
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
 from glob import escape
 from importlib import import_module
 from importlib.util import find_spec
@@ -21,7 +18,6 @@ import numba
 from . import private
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-MAX_SECONDS_TO_WAIT = 20.0  # seconds for another process; then a function is compiled once more
 LOCK = ".lock"
 OPTIONS: dict[str, Any] = {"fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
 
@@ -45,8 +41,8 @@ def cache_path(compiled: Any) -> Path | None:
 class _OneAtATime:
     """numba's store of the machine code of a function, which nobody reads while another process writes to it.
 
-    numba writes down what is in its files before it writes these: who reads in between is given what was in them
-    before, the code of an older source or of other types.
+    numba writes its index of files before the files: a process that reads in between is given what was in them before,
+    the code of an older source or of other types.
     """
 
     def __init__(self, store: Any, lock: Path) -> None:
@@ -56,16 +52,13 @@ class _OneAtATime:
         return getattr(self._store, name)
 
     def load_overload(self, *given: Any) -> Any:
-        """The machine code, None if there is none or it cannot be read now."""
-        with _locked(self._lock, fcntl.LOCK_SH) as locked:
-            return self._store.load_overload(*given) if locked else None
+        with _locked(self._lock, fcntl.LOCK_SH):
+            return self._store.load_overload(*given)
 
     def save_overload(self, *given: Any) -> None:
-        """Keep machine code, unless others read and write for too long."""
-        with _locked(self._lock, fcntl.LOCK_EX) as locked:
-            if locked:
-                self._remove_code_of_older_source()
-                self._store.save_overload(*given)
+        with _locked(self._lock, fcntl.LOCK_EX):
+            self._remove_code_of_older_source()
+            self._store.save_overload(*given)
 
     def _remove_code_of_older_source(self) -> None:
         """Were this process killed now, the next one would take it for the code of the new one."""
@@ -77,40 +70,23 @@ class _OneAtATime:
 
 
 @contextmanager
-def _locked(path: Path, kind: int) -> Iterator[bool]:
-    """Lock a file meanwhile, where the file system knows locks; False if others have it for too long."""
+def _locked(path: Path, kind: int) -> Iterator[None]:
+    """Lock a file meanwhile, where the file system knows locks and has room for it."""
     with ExitStack() as stack:
-        handle = None
-        with suppress(OSError):  # on a full disk what is kept can still be read
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            stack.callback(os.close, handle)
-        yield handle is None or _lock(handle, kind)
-
-
-def _lock(handle: int, kind: int) -> bool:
-    deadline = time.monotonic() + MAX_SECONDS_TO_WAIT
-    while True:
-        try:
-            fcntl.flock(handle, kind | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() > deadline:
-                return False
-            time.sleep(0.01)
-        except OSError:
-            return True
-        else:
-            return True
+        with suppress(OSError):
+            fcntl.flock(stack.enter_context(path.open("a")), kind)
+        yield
 
 
 def _store_of(compiled: Any) -> tuple[Any, str]:
-    """What has numba's store of a compiled function, and under which name; it has none if compiling is off."""
+    """The owner of numba's store of a compiled function, and its attribute; there is none if compiling is off."""
     dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a function of points, or of a loop
     return dispatcher, "_cache" if hasattr(dispatcher, "_cache") else "cache"
 
 
 def _compiled(compiler: Callable[[bool], Any]) -> Any:
-    """What `compiler(kept)` makes, with its machine code kept if there is a private place for it."""
-    place = _place()
+    """Make a function by `compiler(kept)`, with its machine code kept if there is a private place for it."""
+    place = private.directory("compiled")
     if place is None:
         return compiler(False)
     config: Any = numba.config
@@ -127,11 +103,6 @@ def _compiled(compiler: Callable[[bool], Any]) -> Any:
     holder, name = _store_of(compiled)
     setattr(holder, name, _OneAtATime(getattr(holder, name), place / LOCK))
     return compiled
-
-
-@cache
-def _place() -> Path | None:
-    return private.directory("compiled")
 
 
 def _import_numba_arrays() -> None:

@@ -1,10 +1,8 @@
 """Compiled loops where nothing can be kept on disk, and what of numba they import."""
 
-import fcntl
 import subprocess
 import sys
 from pathlib import Path
-from unittest.mock import Mock
 
 import numba.core.caching
 import pytest
@@ -86,23 +84,6 @@ def test_nobody_reads_what_is_being_written(tmp_path: Path, outside_mpi: dict[st
     assert said(LATE, 10.25) == ["12.25", "12.25"]
     assert said(KILLED, 100.125) == []
     assert said(READER, 100.125) == ["102.125"]
-
-
-def test_a_function_that_cannot_be_read_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also when another process keeps something for ever."""
-    monkeypatch.setattr(compiled, "MAX_SECONDS_TO_WAIT", 0.1)
-    lock = tmp_path / "lock"
-    store = compiled._OneAtATime(Mock(load_overload=Mock(return_value="code")), lock)
-    assert store.load_overload("types") == "code"
-    with lock.open("w") as other:
-        fcntl.flock(other, fcntl.LOCK_SH)
-        assert store.load_overload("types") == "code"
-        store.save_overload("types", "code")
-        assert not store._store.save_overload.called
-        fcntl.flock(other, fcntl.LOCK_EX)
-        assert store.load_overload("types") is None
-    store.save_overload("types", "code")
-    assert store._store.save_overload.called
 
 
 def sum_to(n: int) -> int:

@@ -10,11 +10,11 @@ from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from .mpi import MPI
 from .regrid import fetch
+from .rows import RowsBeside
 from .slab import Slab, dealt_to
 
 FEW = 8  # times fewer cells than a rank has points: then every rank has all cells
@@ -109,40 +109,3 @@ class Step:
             ]
             self._kept[key] = RowsBeside(slab, wanted, self.fine.comm.rank)
         return self._kept[key]
-
-
-class RowsBeside:
-    """Rows of a map that ranks want of each other, in one message; one that the map does not have is of zeros.
-
-    `wanted` are the numbers of those rows, of each rank; a map that every rank has is that of a rank alone.
-    """
-
-    def __init__(self, slab: Slab, wanted: list[list[int]], rank: int) -> None:
-        self._slab, self._count = slab, len(wanted[rank])
-        ranks = range(slab.comm.size)
-        mine = wanted if slab.comm.size > 1 else [wanted[rank]]
-        leaving = [[number for number in numbers if _has(slab.rows, number)] for numbers in mine]
-        self._leaving = np.array([number - slab.rows.start for numbers in leaving for number in numbers], np.intp)
-        self._sent = [len(numbers) for numbers in leaving]
-        coming = [[k for k, number in enumerate(wanted[rank]) if _has(slab.dealt[other], number)] for other in ranks]
-        self._places = np.array([k for places in coming for k in places], np.intp)
-        self._got = [len(places) for places in coming]
-
-    def fetch(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Collective."""
-        slab, leaving = self._slab, values[self._leaving]
-        out = np.zeros((self._count, slab.nx), values.dtype)
-        if slab.comm.size == 1:
-            out[self._places] = leaving
-            return out
-        width = slab.nx * values.itemsize
-        arriving = np.empty((len(self._places), slab.nx), values.dtype)
-        sent, got = ([count * width for count in counts] for counts in (self._sent, self._got))
-        slab.comm.Alltoallv([leaving.view(np.uint8), sent, "B"], [arriving.view(np.uint8), got, "B"])
-        slab.tally["bytes sent"] += sum(sent) - sent[slab.comm.rank]
-        out[self._places] = arriving
-        return out
-
-
-def _has(rows: slice, number: int) -> bool:
-    return rows.start <= number < rows.stop

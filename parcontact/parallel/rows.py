@@ -1,6 +1,10 @@
 """Moving whole rows of a map, from one rank to another where they have to."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .slab import Array, Slab
 
@@ -34,7 +38,7 @@ def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
     The first row of a map has the last one before it if the map is `cyclic`, otherwise itself. A rank without rows gets
     zeros.
     """
-    return _nearest(slab, field, 1, cyclic, 1)[0]
+    return _beside(slab, field, [-1], [], cyclic)[0]
 
 
 def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
@@ -43,32 +47,57 @@ def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, A
 
     A map that is not `cyclic` goes on with rows like its first and its last. A rank without rows gets zeros.
     """
-    return _nearest(slab, field, count, cyclic, 1), _nearest(slab, field[::-1], count, cyclic, -1)
+    found = _beside(slab, field, range(-1, -1 - count, -1), range(count), cyclic)
+    return found[:count], found[count:]
 
 
-def _nearest(slab: Slab, own: Array, count: int, cyclic: bool, way: int) -> Array:
-    """The rows before the first of this rank's `own`; if `way` is -1, rows and ranks are in reverse order.
+def _beside(slab: Slab, field: Array, above: Sequence[int], below: Sequence[int], cyclic: bool) -> Array:
+    """Rows counted from this rank's first one, and from the one after its last."""
 
-    They are passed on from rank to rank one by one, as a rank may have fewer rows than are asked for.
+    def wanted(part: slice) -> list[int]:
+        numbers = [part.start + k for k in above] + [part.stop + k for k in below]
+        return [number % slab.ny if cyclic else min(max(number, 0), slab.ny - 1) for number in numbers]
+
+    everyone = [wanted(part) if part.start < part.stop else [] for part in slab.dealt]
+    found = RowsBeside(slab, everyone, slab.comm.rank).fetch(field)
+    return found if everyone[slab.comm.rank] else np.zeros((len(above) + len(below), slab.nx), field.dtype)
+
+
+class RowsBeside:
+    """Rows of a map that ranks want of each other, in one message; one that the map does not have is of zeros.
+
+    `wanted` are the numbers of those rows, of each rank; a map that every rank has is that of a rank alone.
     """
-    ranks = [rank for rank, part in enumerate(slab.dealt) if part.start < part.stop][::way]
-    found = np.zeros((count, slab.nx), own.dtype)
-    if slab.comm.rank not in ranks:
-        return found
-    place, alone = ranks.index(slab.comm.rank), len(ranks) == 1
-    first, last = place == 0 and not cyclic, place == len(ranks) - 1 and not cyclic
-    for k in range(count):
-        leaving = own[-1 - k] if k < len(own) else found[k - len(own)]
-        found[k] = own[0] if first or not alone else leaving
-        if alone:
-            continue
-        target = None if last else slab.comm.Isend(np.ascontiguousarray(leaving), ranks[(place + 1) % len(ranks)])
-        if not first:
-            slab.comm.Recv(found[k], ranks[place - 1])
-        if target is not None:
-            target.Wait()
-            slab.tally["bytes sent"] += found[k].nbytes
-    return found
+
+    def __init__(self, slab: Slab, wanted: list[list[int]], rank: int) -> None:
+        self._slab, self._count = slab, len(wanted[rank])
+        ranks = range(slab.comm.size)
+        mine = wanted if slab.comm.size > 1 else [wanted[rank]]
+        leaving = [[number for number in numbers if _has(slab.rows, number)] for numbers in mine]
+        self._leaving = np.array([number - slab.rows.start for numbers in leaving for number in numbers], np.intp)
+        self._sent = [len(numbers) for numbers in leaving]
+        coming = [[k for k, number in enumerate(wanted[rank]) if _has(slab.dealt[other], number)] for other in ranks]
+        self._places = np.array([k for places in coming for k in places], np.intp)
+        self._got = [len(places) for places in coming]
+
+    def fetch(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Collective."""
+        slab, leaving = self._slab, values[self._leaving]
+        out = np.zeros((self._count, slab.nx), values.dtype)
+        if slab.comm.size == 1:
+            out[self._places] = leaving
+            return out
+        width = slab.nx * values.itemsize
+        arriving = np.empty((len(self._places), slab.nx), values.dtype)
+        sent, got = ([count * width for count in counts] for counts in (self._sent, self._got))
+        slab.comm.Alltoallv([leaving.view(np.uint8), sent, "B"], [arriving.view(np.uint8), got, "B"])
+        slab.tally["bytes sent"] += sum(sent) - sent[slab.comm.rank]
+        out[self._places] = arriving
+        return out
+
+
+def _has(rows: slice, number: int) -> bool:
+    return rows.start <= number < rows.stop
 
 
 def _arriving(source: slice, target: slice, count: int, ny: int) -> slice:

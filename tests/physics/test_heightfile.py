@@ -179,3 +179,36 @@ def test_a_file_that_ends_early(tmp_path: Path) -> None:
     (tmp_path / "heights.npy").write_bytes(whole[:-1])
     with pytest.raises(InputError, match="it ends before the last of its values"):
         open_numbers(tmp_path / "heights.npy")
+
+
+def test_types_that_are_no_numbers(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Among them one that h5py does not know."""
+
+    def make(path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            space = h5py.h5s.create_simple((NY, NX))
+            h5py.h5d.create(file.id, b"time", h5py.h5t.UNIX_D32LE, space)
+            file["flags"] = np.zeros((NY, NX), bool)
+            file["waves"] = np.zeros((NY, NX), complex)
+            file["pairs"] = np.zeros((NY, NX), [("a", float), ("b", int)])
+            file.create_dataset("texts", (NY, NX), h5py.string_dtype())
+            file.create_dataset("links", (NY, NX), h5py.ref_dtype)
+
+    path = made(comm, shared_path / "map.h5", make)
+    assert "cannot be read: " in complaint(comm, path, "time")
+    for name in ("flags", "waves", "pairs", "texts", "links"):
+        assert "which are no heights" in complaint(comm, path, name)
+
+
+@pytest.mark.parametrize("value", [1e300, -1e100, 5e-324])
+def test_heights_beyond_computing(comm: MPI.Intracomm, shared_path: Path, value: float) -> None:
+    path = made(comm, shared_path / "map.npy", lambda path: write(path, np.full((NY, NX), value)))
+    assert f"its largest height is {abs(value):.3g} m, which cannot be computed with" in complaint(comm, path)
+
+
+def test_heights_times_their_scale(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Either may be a number to compute with, and their product not."""
+    path = made(comm, shared_path / "map.npy", lambda path: write(path, np.full((NY, NX), 1e-60)))
+    with pytest.raises(InputError, match=r"its largest height is 1e-120 m, which cannot be computed with"):
+        heightfile.read(path, "heights", Slab(comm, NX, NY), 1e-60)
+    assert heightfile.read(path, "heights", Slab(comm, NX, NY), 1e54).max(initial=1e-6) == pytest.approx(1e-6)
