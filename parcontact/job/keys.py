@@ -67,13 +67,13 @@ def _collect(place: str, annotation: Any, found: dict[type[Part], Section]) -> N
         if part not in found:
             found[part] = Section(place, part, tuple(_keys(part)))
             for name, field in part.model_fields.items():
-                _collect(f"{place}.{field.alias or name}", field, found)
+                _collect(f"{place}.{name}", field, found)
 
 
 def _keys(part: type[Part]) -> Iterator[Key]:
     found = part.model_json_schema(schema_generator=SchemaOfKeys)
     for word, schema in found["properties"].items():
-        words = literal_words(part.field(word).annotation)
+        words = literal_words(part.model_fields[word].annotation)
         text = schema.get("description") or (choices(words) if words else "a mapping of the keys below")
         units = [unit for unit in re.findall(r"\[([^\]]+)\]", text) if "," not in unit]
         needed = word in found.get("required", ()) or word == kind_key(part)

@@ -233,7 +233,9 @@ OTHERS = {
     "steady: {velocities: [1, -2]}": (
         "5:26: steady.velocities.1 must be positive speeds [m/s]: a list, or first:last:count, got -2"
     ),
-    "steady: {velocities: []}": "5:22: steady.velocities must have at least one number, got none",
+    "steady: {velocities: []}": (
+        "5:22: steady.velocities must be positive speeds [m/s]: a list, or first:last:count, got []"
+    ),
     "steady: {velocities: 1, direction: [0, 0]}": (
         "5:36: steady.direction must not be zero in both components, got [0, 0]"
     ),

@@ -120,7 +120,7 @@ def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) ->
     meaning, example = reference.meanings()[part.__name__][word]
     assert meaning.endswith(".")
     value = yamltext.parse(f"{word}: {example}", "example").data[word]
-    field = part.field(word)
+    field = part.model_fields[word]
     annotation: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
     TypeAdapter(annotation).validate_python(value)
 

@@ -27,15 +27,12 @@ def plain(value: Any) -> Any:
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
     """The keys of a part that have a value, as they are written in a job."""
-    for name, field in type(part).model_fields.items():
-        value = getattr(part, name)
-        if value is not None:
-            yield field.alias or name, value
+    return ((name, value) for name, value in part if value is not None)
 
 
 def unit(part: Part, key: str) -> str:
     """The unit of a key, from the brackets in its description; '' for numbers without one and for words."""
-    found = re.search(r"\[([^\],]+)\]", type(part).field(key).description or "")
+    found = re.search(r"\[([^\],]+)\]", type(part).model_fields[key].description or "")
     return found.group(1) if found and found.group(1) != "-" else ""
 
 

@@ -24,7 +24,6 @@ from pydantic import (
     ValidationInfo,
     model_validator,
 )
-from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails
 
 from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse, shorten
@@ -62,7 +61,7 @@ class Rule(NamedTuple):
 class Part(BaseModel):
     """Base of all sections."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     label: ClassVar[str] = ""  # what the part is called, unless its kind says it: "shape sphere"
     one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
@@ -77,12 +76,7 @@ class Part(BaseModel):
     @classmethod
     def words(cls) -> tuple[str, ...]:
         """Return the keys as they are written in a job."""
-        return tuple(field.alias or name for name, field in cls.model_fields.items())
-
-    @classmethod
-    def field(cls, word: str) -> FieldInfo:
-        """Return the field that is written as `word`."""
-        return next(field for name, field in cls.model_fields.items() if word in (field.alias, name))
+        return tuple(cls.model_fields)
 
     @model_validator(mode="wrap")
     @classmethod
@@ -138,7 +132,7 @@ class Part(BaseModel):
             what = f"is not a key of {label}" if label else "is not a known key"
             advice = did_you_mean(shorten(name), cls.words()) or f"; there are {', '.join(cls.words())}"
             return Fault(what + advice, path, at_key=True)
-        field = cls.field(name)
+        field = cls.model_fields[name]
         words = literal_words(field.annotation) if _absent(error) or kind == "literal_error" else ()
         expected = f"must be {choices(words) if words else field.description}"
         if _absent(error):

@@ -20,8 +20,6 @@ CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
 PRESSURE = "a pressure [Pa] of zero or more"
 FORCE = "a force [N] of zero or more"
 APPROACH = "a finite approach [m]"
-
-
 SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
 
 
@@ -43,17 +41,15 @@ class Ramp:
 
 
 def _ramp(number: Any, description: str) -> PlainValidator:
-    """A validator for `Ramp`: one number, or {from, to}."""
-    start = (number, Field(alias="from", description=description))
-    end = (number, Field(alias="to", description=description))
-    keys = create_model("Ends", __base__=Part, start=start, end=end)
+    """Return a validator that makes a `Ramp` of one number, or of {from, to}."""
+    end: Any = (number, Field(description=description))
+    keys = create_model("Ends", __base__=Part, **{"from": end, "to": end})
 
     def read(value: Any, info: ValidationInfo) -> Ramp:
         if isinstance(value, Ramp):
             return value
         given = value if isinstance(value, dict) else {"from": value, "to": value}
-        ends = keys.model_validate(given, context=info.context)
-        return Ramp(*(number for _, number in ends))
+        return Ramp(*(number for _, number in keys.model_validate(given, context=info.context)))
 
     return PlainValidator(read, json_schema_input_type=number | keys)
 
@@ -92,10 +88,9 @@ def _stepping(
 ) -> Iterator[Fault]:
     """A stage that does not last must have no steps."""
     lasts = duration is not None or distance is not None
-    given = {"time_step": time_step, "cells_per_step": cells_per_step}
-    steps = [name for name, value in given.items() if value is not None]
-    if steps and not lasts:
-        yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (steps[0],))
+    if not lasts and (time_step or cells_per_step):
+        key = "time_step" if time_step else "cells_per_step"
+        yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (key,))
     for name, value in (("distance", distance), ("cells_per_step", cells_per_step)):
         if value is not None and not any(velocity):
             yield Fault("needs a velocity [m/s] that is not zero", (name,))
@@ -136,7 +131,7 @@ class Stage(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
-        """A stage that lasts and does not say in which steps chooses them itself."""
+        """Let a stage that lasts and does not say in which steps choose them itself."""
         lasts, given = data.keys() & {"duration", "distance"}, data.keys() & {"time_step", "cells_per_step"}
         return {**data, "time_step": AUTO} if lasts and not given else data
 
@@ -187,6 +182,7 @@ class Initial(Part):
 
 
 def numbers(value: Any) -> Any:
+    """Return a list, or the numbers of a range first:last:count."""
     if not isinstance(value, str):
         return listed(value)
     try:
@@ -195,12 +191,7 @@ def numbers(value: Any) -> Any:
         refuse(Fault(f"must be {error}, got {quote(value)}"))
 
 
-def _some(name: str) -> Rule:
-    def check(values: tuple[float, ...] | None) -> Iterator[Fault]:
-        if values == ():
-            yield Fault("must have at least one number, got none", (name,))
-
-    return Rule((name,), check)
+SomeNumbers = Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(numbers)]
 
 
 def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
@@ -211,19 +202,17 @@ def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
 class Steady(Part):
     """Steady sliding solved directly, for each speed under each pressure, at each temperature."""
 
-    velocities: Annotated[tuple[Positive, ...], BeforeValidator(numbers)] = Field(
-        description="positive speeds [m/s]: a list, or first:last:count"
-    )
-    pressures: Annotated[tuple[Positive, ...] | None, BeforeValidator(numbers)] = Field(
+    velocities: SomeNumbers = Field(description="positive speeds [m/s]: a list, or first:last:count")
+    pressures: SomeNumbers | None = Field(
         default=None, description="positive pressures [Pa]: a list, or first:last:count"
     )
-    temperatures: Annotated[tuple[Celsius, ...] | None, BeforeValidator(listed)] = Field(
+    temperatures: Annotated[tuple[Celsius, ...], Field(min_length=1), BeforeValidator(listed)] | None = Field(
         default=None, description="temperatures [deg C], up to 5000: a list"
     )  # default: that of the material
     direction: tuple[Real, Real] = Field(default=(1.0, 0.0), description="a direction [x, y] [-]")
-    waves: Flag = Field(default=False, description="true or false")
+    waves: Flag = False
 
-    rules = (_some("velocities"), _some("pressures"), _some("temperatures"), Rule(("direction",), _directed))
+    rules = (Rule(("direction",), _directed),)
 
     @property
     def unit_direction(self) -> tuple[float, float]:
