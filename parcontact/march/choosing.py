@@ -78,7 +78,7 @@ class StepChooser:
 
         It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before.
         """
-        numerics = self.scene.job.numerics
+        numerics = self.scene.choices.numerics
         order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
         ratio = error / (TIME_SHARE * numerics.accuracy)
         wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
@@ -114,7 +114,7 @@ class StepChooser:
         if dt <= limits.least or dt >= limits.most:
             return min(max(dt, limits.least), limits.most)
         if span.stage.speed:
-            cell = one_cell(span.stage, self.scene.job.grid)
+            cell = one_cell(span.stage, self.scene.choices.grid)
             return min(cell * cells_per_step(dt / cell, self.at_whole_cells), limits.most)
         power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
         return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
@@ -125,14 +125,14 @@ class StepChooser:
         if self._goes_on(span) and self.chosen.next:
             return self._level(span, self.chosen.next)
         if span.stage.speed:
-            return min(limits.most, one_cell(span.stage, self.scene.job.grid))
+            return min(limits.most, one_cell(span.stage, self.scene.choices.grid))
         return self._level(span, RELAXING * self.scene.material.shortest_time)
 
     def _goes_on(self, span: Span) -> bool:
         """Whether nothing has changed since the stage before, which chose its steps too."""
         if span.index == 0 or span.jumps:
             return False
-        before = self.scene.job.history[span.index - 1]
+        before = self.scene.choices.timeline.history[span.index - 1]
         return before.chooses and before.velocity == span.stage.velocity
 
     def _step(self, span: Span, number: int, dt: float, rejected: bool = False) -> Step:
@@ -157,8 +157,8 @@ class StepChooser:
         if span.stage.velocity[1]:
             return dt
         (x, _), (along, _) = span.origin, span.stage.velocity
-        cell = one_cell(span.stage, self.scene.job.grid)
-        at = math.copysign(1.0, along) * x / self.scene.job.grid.dx + now / cell
+        cell = one_cell(span.stage, self.scene.choices.grid)
+        at = math.copysign(1.0, along) * x / self.scene.choices.grid.dx + now / cell
         size = dt / cell
         way = (math.ceil(at / size + LEAST_WAY) * size - at) * cell
         return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way

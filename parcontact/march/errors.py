@@ -113,9 +113,9 @@ class Solved:
 def estimate_errors(scene: Scene, looks: Looks, solved: Solved) -> Estimate:
     """Return how wrong a step is; collective."""
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
-    points, branches, grid = scene.slab.points, scene.material.branched, scene.job.grid
+    points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
     prony = None if branches is None else branches.prony
-    known = known_of(scene.setup, scene.folded.bound, scene.job.numerics.integrator == "exponential", prony)
+    known = known_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
     looks, look = _look(scene, looks, solved)
     looks, apart = _compare_views(scene, looks, solved)
     if measures.contact_area == 0.0:
@@ -144,7 +144,7 @@ def _look(scene: Scene, looks: Looks, solved: Solved) -> tuple[Looks, Look]:
     branches = scene.material.branched
     if branches is None:
         return looks, NO_LOOK
-    pair = Embedded(scene.slab, branches, scene.job.grid.dx / scene.units.length)
+    pair = Embedded(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if measures.contact_area == 0.0:
         free = pair.look_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_LOOK
         return replace(looks, pair=LastLook()), free
@@ -161,7 +161,7 @@ def _compare_views(scene: Scene, looks: Looks, solved: Solved) -> tuple[Looks, f
 
     Of an elastic body the latter is 0.
     """
-    step, measures, grid = solved.step, solved.measures, scene.job.grid
+    step, measures, grid = solved.step, solved.measures, scene.choices.grid
     if scene.material.branched is None or measures.friction == 0.0:
         return looks, max(measures.friction - measures.friction_interface, 0.0)
     last = looks.views.once_more(step, ALIKE_VIEWS)

@@ -23,7 +23,7 @@ class StepError(RunError):
 
 
 def where(scene: Scene, step: Step) -> str:
-    return f"step {step.number} at t = {step.time:g} s (stage {scene.job.history[step.stage].name!r})"
+    return f"step {step.number} at t = {step.time:g} s (stage {scene.choices.timeline.history[step.stage].name!r})"
 
 
 def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
@@ -46,7 +46,7 @@ def of_solve(
 
 def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array, moved: float) -> Iterator[str]:
     """What may help, the likeliest first; collective up to its end."""
-    numerics = scene.job.numerics
+    numerics = scene.choices.numerics
     if not np.isfinite(last.certificate.worst):
         yield FINITE
         return

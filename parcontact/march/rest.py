@@ -36,7 +36,7 @@ def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step
     if state.chosen is not None and span.stage.chooses and span.place(number) > 0:
         chooser = StepChooser(scene, state.chosen, state.starts.prefers_moved)
         return chooser.propose(span, number, is_relaxed=_is_relaxed(scene, state, span, number))
-    output = scene.job.output
+    output = scene.choices.output
     due = [-(-number // output.every) * output.every] if output.fields else []
     target = min([span.last, *due, *([stop] if stop >= number else [])]) if span.rests else number
     if target > number and span.place(number) >= 1 and _is_relaxed(scene, state, span, number):
@@ -54,7 +54,7 @@ def _is_relaxed(scene: Scene, state: State, span: Span, number: int) -> bool:
     if index == 1:  # a jump of the load has just been: branches that have no map have not relaxed yet
         return False
     change = remaining(scene, state, scene.material.branched, span.interval(span.count, since=index - 1))
-    return scene.slab.agree(change <= SHARE * scene.job.numerics.tolerance)
+    return scene.slab.agree(change <= SHARE * scene.choices.numerics.tolerance)
 
 
 def remaining(scene: Scene, state: State, body: ZenerBody, seconds: float) -> float:

@@ -107,7 +107,7 @@ def make_start(
 
 def cells_moved(scene: Scene, step: Step, since: tuple[float, float]) -> tuple[float, float]:
     """Return by how many cells the surface moves from a position [m] to the end of a step, along x and y."""
-    grid = scene.job.grid
+    grid = scene.choices.grid
     return cells_between(since, step.position, (grid.dx, grid.dy))
 
 
@@ -122,7 +122,7 @@ def _whole_cells_ago(scene: Scene, pasts: Sequence[Past], step: Step) -> Past | 
 
 def _travel(scene: Scene, step: Step, now: Past, before: Past, growth: float, alpha: float, out: Array) -> None:
     """Form `out = (1 + growth) now - growth before`, moved with the surface by whole cells."""
-    slab, points = scene.slab, scene.job.grid.points
+    slab, points = scene.slab, scene.choices.grid.points
     along_x, along_y = (
         round(moved) % count  # a step may pass more boxes than a machine's whole numbers reach
         for moved, count in zip(cells_moved(scene, step, now.position), points, strict=True)

@@ -83,7 +83,7 @@ def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
     touching = Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
     further = FURTHER * scene.choices.further_starts.on
     pasts = tuple(Past(slab.zeros()) for _ in range(1 + scene.choices.extrapolated_starts.on + further))
-    chosen = ChosenSteps.of(scene.job) if scene.job.remembers and any(s.chooses for s in scene.job.history) else None
+    chosen = ChosenSteps.of(scene.job) if scene.choices.timeline.chooses else None
     state = State(
         Row(measures=touching),
         pasts,

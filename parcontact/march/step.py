@@ -121,7 +121,7 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
 
 def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:
     """Return what the load of a step prescribes, in the run's units; collective. Raises StepError."""
-    grid = scene.job.grid
+    grid = scene.choices.grid
     if step.control == "approach":
         d = (step.load + scene.setup.surface.datum) / scene.units.height
         _refuse_beyond_full_contact(scene, step, d, trial.effective)
@@ -133,7 +133,7 @@ def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:
 def _refuse_beyond_full_contact(scene: Scene, step: Step, d: float, effective: Array) -> None:
     """Raise StepError where a periodic half space cannot follow an approach: its mean surface would be below its
     undeformed level. Where the rigid surface yields it can."""
-    if scene.job.grid.boundary == "periodic" and scene.job.material.hardness is None:
+    if scene.choices.grid.boundary == "periodic" and scene.choices.hardness is None:
         mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
         datum = scene.setup.surface.datum
         rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height
@@ -166,7 +166,7 @@ def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Con
 
 def _accepts(scene: Scene, contact: Contact) -> bool:
     """Whether the job takes a solve that did not reach the tolerance."""
-    return scene.job.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
+    return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
 def _passed(scene: Scene, step: Step) -> str:
