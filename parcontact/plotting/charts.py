@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
@@ -24,7 +23,6 @@ HEADROOM = 1.08  # of a panel over its highest point
 FRACTION = "contact area /\nnominal area"
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
 FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are told
-HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white")]  # of words that lines may cross
 
 
 @dataclass(frozen=True)
@@ -83,10 +81,9 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
             _name_peak(axes, series[0], chart.x.unit)
         units.label(axes.yaxis, chart.y.name, chart.y.unit)
     _mark(axes, chart.stages, chart.named)
-    if names := sum(bool(one.name) for one in series):
-        place = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {"ncols": 1 + (len(series) > 4)}
-        for text in axes.legend(title=chart.legend_title or None, **place).get_texts():
-            text.set_path_effects(HALO)
+    if names := len(axes.get_legend_handles_labels()[1]):
+        place = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {"ncols": 1 + (names > 4)}
+        axes.legend(title=chart.legend_title or None, **place)
 
 
 def _on_axes(one: Series, log_x: bool, log_y: bool) -> Series:
@@ -129,7 +126,7 @@ def _limit(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> N
         axes.set_ylim(0.0, HEADROOM * max(highest, *map(_highest, bars), 0.0) or 1.0)
         if not highest:
             axes.set_yticks([0.0])  # a scale would be made up
-    if chart.spikes and not chart.peak and not log_x:
+    if chart.spikes and not log_x:
         xs = np.concatenate([one.x for one in series])
         late = xs > np.nanmin(xs) + SPIKE_SHARE * (np.nanmax(xs) - np.nanmin(xs))
         rest = _highest(ys[late])
@@ -145,22 +142,12 @@ def _highest(values: Array) -> float:
 
 
 def _name_peak(axes: Axes, one: Series, unit: str) -> None:
-    """Name the highest point of a line, if it is inside and the line has come down from it."""
+    """Name the highest point of a line in the legend, if it is inside and the line has come down from it."""
     height = np.nan_to_num(np.abs(one.y))
     at = int(np.argmax(height))
-    if not (0 < at < height.size - 1 and height[at] > 1.02 * height[-1]):
-        return
-    x, y, below = one.x[at], one.y[at], one.y[at] < 0.0
-    axes.plot(x, y, "o", color=style.RED, scalex=False, scaley=False)
-    shown, size = units.prefixed(unit, axes.get_xlim()[1])
-    share = _share(axes, x)
-    side, aside = ("left", 6) if share < 0.4 else ("center", 0) if share < 0.6 else ("right", -6)
-    look: dict[str, Any] = {"ha": side, "va": "top" if below else "bottom", "color": style.RED, "fontsize": 9}
-    look |= {"xytext": (aside, -5 if below else 5), "textcoords": "offset points", "path_effects": HALO}
-    axes.annotate(f"{y:.3g} at {x / size:.3g} {shown}".rstrip(), (x, y), **look)
-    low, high = axes.get_ylim()
-    room = 0.15 * (high - low)
-    axes.set_ylim(low - room * below, high + room * (not below))
+    if 0 < at < height.size - 1 and height[at] > 1.02 * height[-1]:
+        told = f"{one.y[at]:.3g} at {units.text(one.x[at], unit)}"
+        axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=told, scalex=False, scaley=False)
 
 
 def _share(axes: Axes, x: float) -> float:
@@ -213,20 +200,13 @@ def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
     found: dict[tuple[str, Axis, Axis], Chart] = {}
     for number, (name, charts) in enumerate(runs):
         for chart in charts:
-            lines = [
-                replace(
-                    one,
-                    name=", ".join(filter(None, (style.plain(name), one.name))),
-                    look={
-                        **one.look,
-                        "color": style.line(number)["color"],
-                        "linestyle": style.line(number + k)["linestyle"],
-                    },
-                )
-                for k, one in enumerate(chart.series)
-            ]
             key = chart.key, chart.x, chart.y
             known = found.get(key, replace(chart, series=(), stages=(), peak=False, legend_title=""))
+            lines = list(known.series)
+            for k, one in enumerate(chart.series):
+                dashes = style.line(number + k)["linestyle"]
+                look = one.look | {"color": style.line(number)["color"], "linestyle": dashes}
+                lines.append(replace(one, name=", ".join(filter(None, (style.plain(name), one.name))), look=look))
             spikes, log_x = known.spikes and chart.spikes, known.log_x and chart.log_x
-            found[key] = replace(known, series=(*known.series, *lines), spikes=spikes, log_x=log_x)
+            found[key] = replace(known, series=lines, spikes=spikes, log_x=log_x)
     return list(found.values())

@@ -15,6 +15,7 @@ from .run import Run
 
 EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
 FEW_ROWS = 8
+VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,8 @@ def charts(run: Run, over: str = "") -> list[Chart]:
         return []
     along = _abscissa(run, over)
     log = along.axis.unit == "s" and _steps_grow(along.values)
-    found = [
-        replace(chart, stages=along.stages, spikes=not along.marked, log_x=log, named=number == 0)
-        for number, chart in enumerate(_charts(run, along))
-    ]
+    found = [replace(chart, stages=along.stages, log_x=log) for chart in _charts(run, along)]
+    found[0] = replace(found[0], named=True)
     return found if along.marked else [_beside_theory(chart, run) for chart in found]
 
 
@@ -64,46 +63,47 @@ def _beside_theory(chart: Chart, run: Run) -> Chart:
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
     lines = [replace(own, name="simulation"), Series("theory", theory[over], theory[column], style.line(1))]
-    if chart.key == "friction" and run.viscous is not None:  # the theory excludes interface friction
-        lines.append(Series("without interface", own.x, run.viscous, style.line(2)))
+    if chart.key == "friction" and VISCOUS in run.columns:  # the theory excludes interface friction
+        lines.append(Series("without interface", own.x, run.columns[VISCOUS], style.line(2)))
     return replace(chart, series=lines)
 
 
 def _charts(run: Run, along: Abscissa) -> Iterator[Chart]:
     """Yield the panels that a run has: key, measure, lines by name, and whether there is something to see."""
-    column, free = run.column, run.free
+    columns, free = run.columns, run.free
     signed = run.backwards and not along.marked  # over the speed, no direction is told
     friction = "friction coefficient" + "\nalong x" * signed
     load_axis, load = run.load
     area_axis, area = run.in_contact
     panels: tuple[tuple[str, Axis, dict[str, Array], bool], ...] = (
-        ("friction", Axis(friction), {"": run.signed if signed else column("friction")}, run.slides),
+        ("friction", Axis(friction), {"": columns["friction_x" if signed else "friction"]}, run.slides),
         ("area", area_axis, {"": area}, True),
-        ("approach", Axis("approach", "m"), {"": np.where(load > 0.0, column("approach"), np.nan)}, free),
-        ("gap", Axis("mean gap", "m"), {"": column("mean_gap")}, not free and area.min() < 1.0),
-        ("pressure", Axis("highest pressure", "Pa"), {"": column("max_pressure")}, True),
+        ("approach", Axis("approach", "m"), {"": np.where(load > 0.0, columns["approach"], np.nan)}, free),
+        ("gap", Axis("mean gap", "m"), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
+        ("pressure", Axis("highest pressure", "Pa"), {"": columns["max_pressure"]}, True),
         ("load", load_axis, {"": load}, run.lasts and np.ptp(load) > 1e-9 * load.max()),
         (
             "energy",
             Axis("energy", "J"),
-            {"work done": column("work"), "dissipated": column("dissipated"), "stored": column("stored")},
-            run.lasts and bool(np.isfinite(column("work")).all()),
+            {"work done": columns["work"], "dissipated": columns["dissipated"], "stored": columns["stored"]},
+            run.lasts and bool(np.isfinite(columns["work"]).all()),
         ),
     )
     for key, axis, lines, there in panels:
         if there:
-            peak = key == "friction" and not along.marked
-            yield Chart(key, along.axis, axis, along.series(lines), bottom=key != "approach", peak=peak)
+            found = Chart(key, along.axis, axis, along.series(lines), bottom=key != "approach")
+            peak = key == "friction"
+            yield found if along.marked else replace(found, peak=peak, spikes=not peak)
 
 
 def numbers(run: Run) -> str:
     """Return what the last solve has found, in words."""
     axis, load = run.load
-    fraction = run.column("contact_area")[-1]
+    fraction = run.columns["contact_area"][-1]
     area = units.text(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
     name, column = ("approach", "approach") if run.free else ("mean gap", "mean_gap")
-    length = units.text(run.column(column)[-1], "m", 4)
-    highest = units.text(run.column("max_pressure")[-1], "Pa", 4)
+    length = units.text(run.columns[column][-1], "m", 4)
+    highest = units.text(run.columns["max_pressure"][-1], "Pa", 4)
     pressed = f"{axis.name} {units.text(load[-1], axis.unit, 4)}"
     return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
 
@@ -113,12 +113,12 @@ def _abscissa(run: Run, over: str) -> Abscissa:
     if not over:
         slides = run.slides and all(stage.speed > 0.0 for stage in run.job.history if stage.seconds)
         over = ("distance" if slides else "time") if run.lasts else "load"
-    everywhere = np.arange(run.column("step").size)
+    everywhere = np.arange(run.columns["step"].size)
     if over == "load":
         return Abscissa(*run.load, everywhere, marked=True)
     if over == "velocity":
         return _over_velocity(run)
-    axis, values = Axis("distance slid", "m") if over == "distance" else Axis("time", "s"), run.column(over)
+    axis, values = Axis("distance slid", "m") if over == "distance" else Axis("time", "s"), run.columns[over]
     if not np.ptp(values):
         told = f"{over}, which stays {values[-1]:g} {axis.unit}"
         raise InputError(f"{run.directory}: there is nothing to draw over {told}")
@@ -126,16 +126,6 @@ def _abscissa(run: Run, over: str) -> Abscissa:
     for number, rows in run.rows_of_stages.items():
         stages.append((run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]])))
     return Abscissa(axis, values, everywhere, stages)
-
-
-def refuse_one_velocity(run: Run) -> None:
-    """Raise InputError for a run that slides at one velocity: over it there is a dot, but no line."""
-    speeds = {stage.speed for stage in run.job.history if stage.speed > 0.0}
-    if len(speeds) == 1:
-        raise InputError(
-            f"{run.directory}: there is nothing to draw over velocity, which is {speeds.pop():g} m/s wherever the "
-            "surface slides; --compare draws several runs in one picture"
-        )
 
 
 def _over_velocity(run: Run) -> Abscissa:

@@ -4,6 +4,7 @@ Which panels there are follows from the job: friction if the surface slides, ene
 over the load if all stages are single solves, pressures along a line through a sphere beside Hertz's.
 """
 
+import os
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -81,10 +82,8 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        panels = Options().drawn(steady.charts(table.parent))
-        return _save(
-            style.figure_of(_wrapped(steady.title(table.parent)), [panels], legend=True), table.with_suffix("")
-        )
+        title, panels = _wrapped(steady.title(table.parent)), Options().drawn(steady.charts(table.parent))
+        return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
 
 
 def _wrapped(title: str) -> str:
@@ -111,7 +110,7 @@ def _movie(directory: Path, options: Options) -> Path:
     try:
         with h5py.File(path, "r", locking=False) as file:
             labels = frame_labels(Run(directory), file)
-            there = [key for key in ("pressure", "displacement", "gap", "height") if key in file]
+            there = [key for key in maps.LOOKS if key in file]
             if name not in there or not labels:
                 raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
             chosen = spread(labels, FRAMES)
@@ -141,8 +140,6 @@ def _picture(directory: Path, options: Options) -> Figure:
         run = Run(directory)
         found = _wrapped(run.job.title or directory.absolute().name)
         titles.append(found if run.curves else f"{found}\n{histories.numbers(run)}")
-        if options.over == "velocity" and not has_curve:
-            histories.refuse_one_velocity(run)
         groups.append(options.drawn(options.chosen(histories.charts(run, options.over))))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
@@ -200,12 +197,10 @@ def _names(directories: Sequence[Path]) -> list[str]:
     """Return what tells directories apart: of cases of one sweep their keys, else the last parts of paths."""
     if named := _names_of_cases(directories):
         return named
-    parts = [directory.absolute().parts for directory in directories]
-    for count in range(1, max(map(len, parts), default=1) + 1):
-        names = ["/".join(part[-count:]) for part in parts]
-        if len(set(names)) == len(names):
-            break
-    return names
+    paths = [directory.absolute() for directory in directories]
+    above = os.path.commonpath([path.parent for path in paths])
+    names = [path.name for path in paths]
+    return names if len(set(names)) == len(names) else [str(path.relative_to(above)) for path in paths]
 
 
 def _names_of_cases(directories: Sequence[Path]) -> list[str]:
@@ -218,9 +213,8 @@ def _names_of_cases(directories: Sequence[Path]) -> list[str]:
     rows = [known[path.name] for path in paths if path.name in known]
     keys = list(rows[0])[1 : list(rows[0]).index("state")] if rows else []
     differing = [key for key in keys if len({row[key] for row in rows}) > 1]
-    names = [", ".join(f"{key.split('.')[-1]} {_short(row[key])}" for key in differing) for row in rows]
+    told = ({key.split(".")[-1]: row[key] for key in differing} for row in rows)
+    names = [
+        ", ".join(f"{key} {v:.4g}" if isinstance(v, float) else f"{key} {v}" for key, v in one.items()) for one in told
+    ]
     return names if len(set(names)) == len(paths) and all(names) else []
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -17,11 +17,10 @@ from . import units
 from .charts import FRACTION, Axis
 
 MEASURED = (
-    *("step", "time", "distance", "pressure", "force_x", "force_y", "friction", "contact_area", "approach"),
-    *("mean_gap", "max_pressure", "work", "stored", "dissipated"),
+    *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "approach", "mean_gap"),
+    *("max_pressure", "work", "stored", "dissipated"),
 )
 NEAREST = 3  # steps with maps that a message names
-VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
 class Run:
@@ -31,34 +30,20 @@ class Run:
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
         self.area = self.job.grid.lx * self.job.grid.ly  # of the box [m^2]
         self.free = self.job.grid.boundary == "free"
-        self._columns = table(directory / "measures.csv", MEASURED)
-        if not self._columns["step"].size:
+        self._all = table(directory / "measures.csv", MEASURED)
+        if not self._all["step"].size:
             raise InputError(f"{directory} holds no step yet")
-        self._first = 1 if self._columns["pressure"][0] == 0.0 and self._columns["step"].size > 1 else 0
-        self.lasts, self.slides = self._columns["time"][-1] > 0.0, self._columns["distance"][-1] > 0.0
-
-    def column(self, name: str) -> Array:
-        return self._columns[name][self._first :]
-
-    @property
-    def viscous(self) -> Array | None:
-        """Friction without that of the interface, of a run with one."""
-        return self.column(VISCOUS) if VISCOUS in self._columns else None
+        first = int(self._all["pressure"][0] == 0.0 and self._all["step"].size > 1)
+        self.columns = {name: values[first:] for name, values in self._all.items()}
+        self.lasts, self.slides = self._all["time"][-1] > 0.0, self._all["distance"][-1] > 0.0
 
     @property
     def load(self) -> tuple[Axis, Array]:
-        return load_of(self.column("pressure"), self.area * self.free)
+        return load_of(self.columns["pressure"], self.area * self.free)
 
     @property
     def in_contact(self) -> tuple[Axis, Array]:
-        return contact_of(self.column("contact_area"), self.area * self.free)
-
-    @property
-    def signed(self) -> Array:
-        """Friction along x, positive where it opposes motion along +x: `friction_x`."""
-        x, y = self.column("force_x"), self.column("force_y")
-        force = np.hypot(x, y)
-        return -self.column("friction") * np.divide(x, force, out=np.zeros_like(force), where=force > 0.0)
+        return contact_of(self.columns["contact_area"], self.area * self.free)
 
     @property
     def backwards(self) -> bool:
@@ -69,19 +54,19 @@ class Run:
     @property
     def curves(self) -> bool:
         """Whether there is anything to draw over time or load: a single solve is a few numbers."""
-        return bool(self.lasts) or len(set(self.column("pressure"))) > 1
+        return bool(self.lasts) or len(set(self.columns["pressure"])) > 1
 
     @cached_property
     def timeline(self) -> Timeline:
         """What the job says about each step."""
-        steps, times = self._columns["step"].astype(int).tolist(), self._columns["time"].tolist()
+        steps, times = self._all["step"].astype(int).tolist(), self._all["time"].tolist()
         return Timeline.of(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
     def rows_of_stages(self) -> dict[int, list[int]]:
         """The rows of each stage, by its number; the initial state belongs to the first."""
         found: dict[int, list[int]] = {}
-        for row, step in enumerate(self.column("step").astype(int).tolist()):
+        for row, step in enumerate(self.columns["step"].astype(int).tolist()):
             if (stage := self._stage(step)) >= 0:
                 found.setdefault(stage, []).append(row)
         return found
@@ -98,12 +83,12 @@ class Run:
 
     def pressed(self, step: int) -> str:
         """Return what presses after a step, as its stage prescribes it; '' where no row tells."""
-        rows, stage = np.flatnonzero(self._columns["step"] == step), self._stage(step)
+        rows, stage = np.flatnonzero(self._all["step"] == step), self._stage(step)
         if not rows.size:
             return ""
         if stage >= 0 and self.job.history[stage].control == "approach":
-            return f"approach {units.text(self._columns['approach'][rows[-1]], 'm')}"
-        axis, loads = load_of(self._columns["pressure"], self.area * self.free)
+            return f"approach {units.text(self._all['approach'][rows[-1]], 'm')}"
+        axis, loads = load_of(self._all["pressure"], self.area * self.free)
         return units.text(loads[rows[-1]], axis.unit)
 
     def moved(self, step: int) -> tuple[float, float]:

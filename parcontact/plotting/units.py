@@ -6,7 +6,6 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter
 
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-WHOLE = 1e6  # numbers below have no exponent
 
 
 def prefixed(unit: str, largest: float) -> tuple[str, float]:
@@ -28,9 +27,7 @@ def text(value: float, unit: str, digits: int = 3) -> str:
     """Return a number with its unit."""
     rounded = float(f"{value:.{digits}g}")
     shown, size = prefixed(unit, rounded)
-    number = f"{rounded / size:.{digits}g}"
-    whole = f"{float(number):.0f}" if "e+" in number and rounded / size < WHOLE else number
-    return f"{whole} {shown}".rstrip()
+    return f"{rounded / size:g} {shown}".rstrip()
 
 
 def label(axis: Axis, name: str, unit: str) -> None:

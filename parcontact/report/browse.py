@@ -16,7 +16,6 @@ from ..plotting.run import Run, box, frame_labels, load_of
 from ..storage import hdf5
 from .parts import RC, Browser, uri_of
 
-MAPS = ("pressure", "gap", "displacement", "height")
 MOST = 24  # pictures of one map: instants in between are left out
 DPI = 100
 COLORS = 256  # of a picture: less than half of the bytes that true colours need, and one does not see it
@@ -38,15 +37,15 @@ def _browsers(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[
     try:
         with h5py.File(path, "r", locking=False) as file, style.drawing(RC):
             labels = spread(label(file), MOST)
-            return [_browser(file, name, labels) for name in MAPS if name in file and labels]
+            return [_browser(file, name, labels) for name in maps.LOOKS if name in file and labels]
     except hdf5.FAILURES:
         return []
 
 
 def _browser(file: h5py.File, name: str, labels: dict[int, str]) -> Browser:
     counted = progress.shown(list(labels), f"maps of {name}", "map")
-    images = (image for image, _ in zip(maps.frames(file, name, labels, SIZE, DPI), counted, strict=True))
-    return Browser(name, list(labels.values()), [uri_of(small_png(image), "image/png") for image in images])
+    images = zip(maps.frames(file, name, labels, SIZE, DPI), counted, strict=True)
+    return name, [(uri_of(small_png(image), "image/png"), labels[index]) for image, index in images]
 
 
 def small_png(image: Image.Image) -> bytes:

@@ -12,8 +12,11 @@ from matplotlib.figure import Figure
 from ..plotting import charts, style
 
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
-PHONE_COLUMNS = 2  # of a table that is shown as one on a phone
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
+
+Picture = tuple[str, str]  # its data: URI, and what it shows
+Browser = tuple[str, Sequence[Picture]]  # a map by its name, of which one picture is shown at a time
+Download = tuple[str, str, int]  # a file inside the page: its name, its data: URI and its bytes
 
 
 @dataclass(frozen=True)
@@ -23,37 +26,6 @@ class Table:
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str = ""
-
-    @property
-    def folds(self) -> bool:
-        """Whether it is too wide for a phone, which shows each row as a list of names and values."""
-        return len(self.head) > PHONE_COLUMNS
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture as a data: URI, and what it shows."""
-
-    uri: str
-    caption: str
-
-
-@dataclass(frozen=True)
-class Browser:
-    """Pictures of a map, one of which is shown at a time: what each of them shows, and their data: URIs."""
-
-    name: str
-    labels: Sequence[str]
-    uris: Sequence[str]
-
-
-@dataclass(frozen=True)
-class Download:
-    """A file inside the page."""
-
-    name: str
-    uri: str
-    size: int
 
 
 @dataclass(frozen=True)
@@ -95,13 +67,13 @@ def of_panel(panel: style.Panel, caption: str) -> Picture:
         figure = Figure(figsize=SIZE, layout="constrained")
         panel(figure.subplots())
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
-    return Picture(uri_of(file.getvalue(), "image/svg+xml"), caption)
+    return uri_of(file.getvalue(), "image/svg+xml"), caption
 
 
 def of_file(path: Path) -> Download:
     """Return a table to be downloaded from the page."""
     data = path.read_bytes()
-    return Download(path.name, uri_of(data, "text/csv"), len(data))
+    return path.name, uri_of(data, "text/csv"), len(data)
 
 
 def uri_of(data: bytes, kind: str) -> str:

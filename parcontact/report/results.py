@@ -11,7 +11,7 @@ from ..storage import measures
 from ..storage.row import UNITS
 from ..summary import slide, sweep_table, theory_settings
 from . import browse
-from .parts import Picture, Section, Table, of_chart, uri_of
+from .parts import Section, Table, of_chart, uri_of
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -71,7 +71,7 @@ def of_study(directory: Path) -> Section:
     told = directory / "study.txt"
     sentences = told.read_text(errors="replace").splitlines() if told.is_file() else ["The study is not finished."]
     pictures = [
-        Picture(uri_of((directory / name).read_bytes(), "image/png"), caption)
+        (uri_of((directory / name).read_bytes(), "image/png"), caption)
         for name, caption in STUDY_PICTURES.items()
         if (directory / name).is_file()
     ]

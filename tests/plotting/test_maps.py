@@ -50,7 +50,7 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     plots.plot([out])
     found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
     assert set(found) == {"pressure", "gap", "height"}
-    assert browse.of_run(Run(out))[0].labels == ["1 kPa (step 1)", "2 kPa (step 2)"]
+    assert [label for _, label in browse.of_run(Run(out))[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
             list(maps.frames(file, name, {1: ""}))

@@ -237,14 +237,6 @@ def test_what_cannot_be_drawn(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_one_velocity_is_no_curve(tmp_path: Path, drawn: list[Figure], capsys: pytest.CaptureFixture[str]) -> None:
-    """Over velocity a run of one has a dot; several are compared."""
-    out = ran(tmp_path, KINDS["sliding"][0].replace("velocity: -", "velocity: "))
-    assert asked(out, "--over", "velocity") == 2
-    assert "which is 0.1 m/s wherever the surface slides; --compare draws several" in capsys.readouterr().err
-    assert drawn == []
-
-
 def test_cases_of_a_sweep_are_told_apart_by_their_keys(tmp_path: Path, drawn: list[Figure]) -> None:
     """Those that differ among the cases that are drawn."""
     (tmp_path / "cases").mkdir()
