@@ -19,7 +19,7 @@ NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
 MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEVELS = 3  # of names above each other, before they are turned
 FEW_NAMES = 2  # of lines, for which a legend finds room among them
-HEADROOM = 1.08  # of a panel over its highest point
+HEADROOM, PEAK_ROOM = 1.08, 1.25  # of a panel over its highest point, and over one that the legend names
 FRACTION = "contact area /\nnominal area"
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
 FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are told
@@ -123,7 +123,7 @@ def _limit(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> N
     highest = _highest(ys)
     if chart.bottom and not (ys < 0.0).any():
         bars = [one.y * (1.0 + np.nan_to_num(np.minimum(one.error, 1.0))) for one in series if one.error is not None]
-        axes.set_ylim(0.0, HEADROOM * max(highest, *map(_highest, bars), 0.0) or 1.0)
+        axes.set_ylim(0.0, (PEAK_ROOM if chart.peak else HEADROOM) * max(highest, *map(_highest, bars), 0.0) or 1.0)
         if not highest:
             axes.set_yticks([0.0])  # a scale would be made up
     if chart.spikes and not log_x:
