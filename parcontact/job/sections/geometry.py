@@ -41,7 +41,7 @@ class Rough(Part):
     shape: Literal["rough"] = "rough"
     hurst: Number = Field(gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
     long_wavelength: Wavelength
-    rolloff_wavelength: Wavelength = Field(default_factory=lambda data: data["long_wavelength"])  # no plateau
+    rolloff_wavelength: Wavelength = Field(default_factory=lambda data: data.get("long_wavelength"))  # no plateau
     short_wavelength: Wavelength
     rms_slope: Positive | None = Field(default=None, description="a positive rms slope [-]")
     rms_height: Positive | None = Field(default=None, description="a positive rms height [m]")

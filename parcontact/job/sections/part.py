@@ -93,7 +93,8 @@ class Part(BaseModel):
         try:
             part = handler(filled)
         except ValidationError as failure:
-            errors = failure.errors()
+            # a list of which a value is wrong is no list that is too short
+            errors = [error for error in failure.errors() if error["type"] != "too_short" or not error["input"]]
         # a default that was made of a wrong value is no second mistake
         of_user = [error for error in errors if _absent(error) or error["loc"][:1] in {(), *((key,) for key in given)}]
         faults = [cls._fault(error, filled) for error in of_user or errors]
