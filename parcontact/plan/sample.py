@@ -91,7 +91,7 @@ class Sample:
         return sum(stage.tried for stage in self.stages)
 
     def total(self, name: str) -> float:
-        """Sum of `seconds`, or of a count by its name in the tally, over all steps; stages not tried are like others."""
+        """Sum of `seconds`, or of a count by its name in the tally, over all steps; untried stages are like others."""
         tried = [stage for stage in self.stages if stage.tried]
         steps = sum(stage.steps for stage in tried)
         return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
