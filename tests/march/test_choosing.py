@@ -164,7 +164,7 @@ def wave(*waves: int) -> Wave:
         ([wave(1, 0), SPHERE, wave(0, -4)], 1),
         ([wave(31, 0)], 1),
         ([Rough.model_construct(long_wavelength=1.0, short_wavelength=32e-3 / 64)], 2),
-        ([Rough.model_construct(short_wavelength=31e-3 / 64)], 1),
+        ([Rough.model_construct(long_wavelength=1.0, short_wavelength=31e-3 / 64)], 1),
         ([SPHERE, FILE], 1),
     ],
 )
