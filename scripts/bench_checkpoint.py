@@ -49,7 +49,7 @@ def measure(chosen: argparse.Namespace) -> bool:
     names += [f"material/branch {k}" for k in range(chosen.branches)]
     rng = np.random.default_rng(comm.rank)
     entries = {name: Entry(rng.random(slab.shape)) for name in names}
-    facts = Facts(1, 0.0, {}, Provenance((Link("", comm.size),)))
+    facts = Facts({}, Provenance((Link("", comm.size),)), step=1)
 
     def plain() -> None:
         with (where / f"rank{comm.rank}").open("wb") as file:

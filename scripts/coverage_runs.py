@@ -24,7 +24,6 @@ from parcontact.errors import InputError, RunError
 from parcontact.march import loop
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import NAMES, Parts
-from parcontact.run.errors_so_far import ErrorsSoFar
 from parcontact.run.half_mesh import place_of
 from parcontact.steady_sliding import curve, start
 from parcontact.steady_sliding.sliding import SteadySliding
@@ -77,15 +76,13 @@ def run(plain: Json) -> Series:
 
 def _march(job: jobs.Job) -> Series:
     march = start.first(job, Slab(MPI.COMM_SELF, *job.grid.points))
-    so_far, rows = ErrorsSoFar(march.row, None), []
-    before = march.row
+    before, rows = march.row, []
 
     def note(now: Any) -> None:
         nonlocal before
         row: Row = now.row
         seconds, slid = row.time - before.time, row.distance - before.distance
         before = row
-        so_far.weigh(row, now.timeline())
         m = row.measures
         far = slid or seconds * 1e-100 or 1e-200
         place = place_of(now.timeline(), row.step)
@@ -93,8 +90,7 @@ def _march(job: jobs.Job) -> Series:
         rows.append([row.time, place, far if row.errors else 0.0, friction, m.contact_area_corrected])
 
     loop.run(march, [note])
-    summary = so_far.summary
-    friction, area = summary.friction, summary.area
+    friction, area = march.state.errors.friction, march.state.errors.area
     mean = [sum(row[2] * row[column] for row in rows) / max(sum(row[2] for row in rows), 1e-300) for column in (3, 4)]
     return Series(rows, _within((friction, area), mean), 0.0, len(rows) - 1)
 

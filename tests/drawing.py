@@ -11,6 +11,7 @@ from mpi4py import MPI
 from parcontact import job
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
+from parcontact.run.run import Options
 
 WAVE = """
 grid: {points: 32, size: 2.0e-3}
@@ -53,7 +54,7 @@ def ran(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "job.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'out'}"])
-    assert runner.run(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points), runner.Options(quiet=True)) == 0
+    assert runner.run(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points), Options(quiet=True)) == 0
     return tmp_path / "out"
 
 

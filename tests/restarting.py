@@ -13,6 +13,7 @@ from mpi4py import MPI
 from parcontact import job
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
+from parcontact.run.run import Options
 from parcontact.storage import marker
 
 ROUGH = {
@@ -88,7 +89,7 @@ class Bench:
             path.write_text(yaml.safe_dump(data))
         self.comm.Barrier()
         loaded = job.load(path, [f"output.directory={out}"])
-        return runner.run(loaded, Slab(self.comm, *loaded.grid.points), runner.Options(quiet=True, **options))
+        return runner.run(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
 
 
 def rows(out: Path) -> list[dict[str, str]]:

@@ -27,12 +27,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..run import runner
+    from ..run.run import Options
 
     if not job.history:
         return _curve(options, job, slab, shows)
     others_file = getattr(options, "others_file", None)  # of a sweep
     chosen = (options.quiet, options.restart, options.until, options.wall)
-    return runner.run(job, slab, runner.Options(*chosen, others_file=others_file, shows=shows))
+    return runner.run(job, slab, Options(*chosen, others_file=others_file, shows=shows))
 
 
 def steady(options: argparse.Namespace) -> int:

@@ -21,6 +21,7 @@ from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..run import restart, runner
+from ..run.run import Options
 from ..scene import choices
 from ..steady_sliding import start
 from ..storage import checkpoint, heights, measures, wisdom
@@ -90,7 +91,7 @@ class Simulation:
         self._meet("runs")
         at = str(self._saved.path if self._saved is not None else path_of(restart))
         with _in_a_file(self.job, self._slab) as job:
-            ended = runner.run_to_end(job, self._slab, runner.Options(quiet, at))
+            ended = runner.run_to_end(job, self._slab, Options(quiet, at))
         if ended.march is None and ended.contents is None:
             raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
         self._march_made, self._saved, self._began = ended.march, ended.contents, True
@@ -156,7 +157,7 @@ class Simulation:
         last = ",".join(measures.texts(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
         heights.store(self.job.surface, file.parent, slab)
-        march.save(file, Facts(march.row.step, march.row.time, plain, provenance, table=Table(last=last)))
+        march.save(file, Facts(plain, provenance, table=Table(last=last)))
 
     @classmethod
     def restore(

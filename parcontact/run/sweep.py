@@ -17,14 +17,14 @@ from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
 from ..summary import sweep_table
 from . import watch
-from .journey import AGAIN, DONE
+from .run import DONE, STOPPED_EARLY
 from .sweep_warnings import SweepWarnings, warn
 
 FAILED = 1
 ELSEWHERE = -1  # no exit code: of a case that another program runs
 ENDS = {
     DONE: "done",
-    AGAIN: "stopped early",
+    STOPPED_EARLY: "stopped early",
     FAILED: "failed",
     ELSEWHERE: "passed over",
 }
@@ -72,9 +72,9 @@ def run(
         stop.forget_own()
         for text in doubts.summary([kinds for _, kinds in found]):
             warn(text)
-        if AGAIN not in codes and not manner.quiet:
+        if STOPPED_EARLY not in codes and not manner.quiet:
             _say(f"results of all cases: {_directory(cases) / sweep_table.TABLE}")
-    return AGAIN if AGAIN in codes else max(codes)
+    return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
 
 
 def dealt(chosen: Sequence[Case], groups: Groups) -> Sequence[Case]:
@@ -114,7 +114,7 @@ def _go(
         if reason := slab.agree(_reason_to_stop(stop, manner.limit) if slab.root else ""):
             if speaks:
                 _say(f"stopped before case {case.number}: {reason}; run again to go on")
-            return AGAIN
+            return STOPPED_EARLY
         if speaks:
             _say(f"{case} (of {len(cases)})")
         doubts.begin(case.number)
@@ -129,10 +129,10 @@ def _go(
             sweep_table.write(directory, cases)
         if speaks and groups.count > 1:
             _say(f"case {case.number}: {ENDS[ended]}")
-        if ended == AGAIN:
+        if ended == STOPPED_EARLY:
             if slab.root and groups.count > 1:
                 stop.ask_own()
-            return AGAIN
+            return STOPPED_EARLY
         code = max(code, ended)
     return code
 

@@ -66,17 +66,17 @@ class Contents:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a checkpoint says of itself: where the run is, its job as plain data, and where the file comes from.
+    """What a checkpoint says of itself: its job as plain data, where the file comes from, and where the run is.
 
     `run` is the id of the run that wrote it, the same in all that one directory holds; `table` is of its measures.
     """
 
-    step: int
-    time: float
     job: Mapping[str, Any]
     provenance: Provenance
     run: str = ""
     table: Table = Table()
+    step: int = 0
+    time: float = 0.0
 
     def write(self, file: h5py.File) -> None:
         file.attrs["step"], file.attrs["time"] = self.step, self.time

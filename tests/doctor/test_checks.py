@@ -11,6 +11,7 @@ from parcontact.doctor import checks, machine
 from parcontact.doctor.bench import Bench, Finding
 from parcontact.doctor.checks import CHECKS, Check, CheckResult, markdown, run_check
 from parcontact.run import runner
+from parcontact.run.run import Options
 
 
 def test_a_case_that_goes_wrong_is_seen() -> None:
@@ -67,6 +68,6 @@ def test_files_that_come_back_as_they_were(comm: MPI.Intracomm, tmp_path: Path) 
 def test_files_that_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run whose result is another one, as after a stop from which it went on wrongly."""
     run = runner.run
-    monkeypatch.setattr(runner, "run", lambda job, slab, options: run(job, slab, runner.Options(until=0.5e-3)))
+    monkeypatch.setattr(runner, "run", lambda job, slab, options: run(job, slab, Options(until=0.5e-3)))
     assert "fields.h5" in machine.find_broken_files(MPI.COMM_SELF, tmp_path)
     assert list(tmp_path.iterdir()) == []

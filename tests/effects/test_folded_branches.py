@@ -22,6 +22,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.body import ZenerBody
 from parcontact.physics.folding import Band, Phase
 from parcontact.run import runner
+from parcontact.run.run import Options
 
 Json = dict[str, Any]
 
@@ -173,7 +174,7 @@ class Place:
             path.write_text(yaml.safe_dump(content))
         self.comm.Barrier()
         loaded = job.load(path, [f"output.directory={self.where / name}", "checkpoint={every: 100}"])
-        runner.run(loaded, Slab(self.comm, *loaded.grid.points), runner.Options(quiet=True, **options))
+        runner.run(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
 
     def friction(self, name: str = "out") -> list[str]:
         with (self.where / name / "measures.csv").open(newline="") as file:

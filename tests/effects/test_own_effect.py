@@ -24,6 +24,7 @@ from parcontact.manual import texts
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import runner
+from parcontact.run.run import Options
 
 pytestmark = pytest.mark.mpi(2)
 
@@ -72,7 +73,7 @@ def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> list[dic
         path.write_text(yaml.safe_dump(WEAR))
     comm.Barrier()
     loaded = job.load(path, [f"output.directory={where / name}"])
-    runner.run(loaded, Slab(comm, NX, NY), runner.Options(quiet=True, **options))
+    runner.run(loaded, Slab(comm, NX, NY), Options(quiet=True, **options))
     comm.Barrier()
     with (where / name / "measures.csv").open(newline="") as file:
         return list(csv.DictReader(file))

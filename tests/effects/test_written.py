@@ -11,7 +11,8 @@ from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
 from mpi4py import MPI
 
 from parcontact.parallel.slab import Slab
-from parcontact.run import journey, runner
+from parcontact.run import runner
+from parcontact.run.run import Options
 from parcontact.storage import fields, measures
 
 
@@ -24,7 +25,7 @@ def run(tmp_path: Path) -> Callable[..., Path]:
         planned = job(history=[PRESS], output=output, **changes)
         planned._path = tmp_path / "job.yaml"
         planned.path.write_text(planned.resolved())
-        assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), runner.Options(quiet=True)) == journey.DONE
+        assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), Options(quiet=True)) == 0
         return tmp_path / name
 
     return go

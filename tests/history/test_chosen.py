@@ -16,6 +16,7 @@ from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
+from parcontact.run.run import Options
 
 POINTS = 32
 CELL = 1e-3 / POINTS
@@ -206,7 +207,7 @@ def run(
     if comm.rank == 0:
         path.write_text(job(**{"output": output, **sections}).resolved())
     comm.Barrier()
-    assert runner.run(load(path), Slab(comm, POINTS, POINTS), runner.Options(True, until=until)) == 0
+    assert runner.run(load(path), Slab(comm, POINTS, POINTS), Options(True, until=until)) == 0
     if comm.rank:
         return []
     with (where / name / "measures.csv").open() as file:

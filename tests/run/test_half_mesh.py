@@ -18,7 +18,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER, ErrorBudget, Parts, compared_with_half_mesh
 from parcontact.run import half_mesh, runner
 from parcontact.run.half_mesh import HalfMesh, place_of
-from parcontact.run.journey import AGAIN
+from parcontact.run.run import STOPPED_EARLY, Options
 from parcontact.storage import measures
 
 Json = dict[str, Any]
@@ -46,7 +46,7 @@ def run(job: Json, out: Path, comm: MPI.Intracomm = MPI.COMM_SELF) -> int:
         path.write_text(yaml.safe_dump(job))
     comm.Barrier()
     loaded = jobs.load(path, [f"output.directory={out}"])
-    return runner.run(loaded, Slab(comm, *loaded.grid.points), runner.Options(quiet=True))
+    return runner.run(loaded, Slab(comm, *loaded.grid.points), Options(quiet=True))
 
 
 def columns(out: Path, *names: str) -> list[Series]:
@@ -111,7 +111,7 @@ def test_it_stops_and_goes_on(tmp_path: Path) -> None:
     assert run(data(), tmp_path / "whole") == 0
     (tmp_path / "cut").mkdir()
     (tmp_path / "cut" / "stop").touch()
-    assert run(data(), tmp_path / "cut") == AGAIN
+    assert run(data(), tmp_path / "cut") == STOPPED_EARLY
     table = measures.read(tmp_path / "cut" / half_mesh.DIRECTORY / "measures.csv")
     assert len(table["step"]) == 1
     assert "run again" in (tmp_path / "cut" / "run.log").read_text().splitlines()[-1]
@@ -128,7 +128,7 @@ def test_a_run_of_another_job_is_made_anew(tmp_path: Path) -> None:
     path = tmp_path / "run.yaml"
     path.write_text(yaml.safe_dump(other))
     loaded = jobs.load(path, [f"output.directory={tmp_path / 'run'}"])
-    options = runner.Options(quiet=True, restart="never")
+    options = Options(quiet=True, restart="never")
     assert runner.run(loaded, Slab(MPI.COMM_SELF, 32, 32), options) == 0
     resolved = (tmp_path / "run" / half_mesh.DIRECTORY / "job.resolved.yaml").read_text()
     assert "backward-euler" in resolved

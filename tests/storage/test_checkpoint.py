@@ -19,7 +19,8 @@ from parcontact.summary import info
 
 NX, NY = 6, 9
 NOON = "2026-01-01T12:00:00+00:00"  # one instant on all ranks
-FACTS = Facts(7, 0.25, {"grid": {"points": [NX, NY]}}, Provenance((Link("title: x\n", 2, started=NOON),), (3,)))
+WHENCE = Provenance((Link("title: x\n", 2, started=NOON),), (3,))
+FACTS = Facts({"grid": {"points": [NX, NY]}}, WHENCE, step=7, time=0.25)
 
 
 def entries(slab: Slab) -> dict[str, Entry]:

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from parcontact.job import Job
-from parcontact.run.errors_so_far import chosen_by_accuracy
+from parcontact.run.run import chosen_by_accuracy
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,237 @@
+"""A run: a march through its timeline that is recorded and saved, and stops if it is asked to."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from .. import scene
+from ..errors import InputError, RunError
+from ..history.chosen import reached
+from ..job import Job
+from ..job.checks.sample import describe_sample
+from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
+from ..march import loop
+from ..march.failure import StepError
+from ..march.loop import March
+from ..scene import sanity
+from ..storage import measures
+from ..storage.checkpoint import Contents, Facts
+from ..storage.console import always
+from ..storage.directory import Directory
+from ..storage.recorder import Recorder
+from ..storage.stopfile import StopFile
+from ..summary import slide
+from .watch import Watch
+
+DONE, STOPPED_EARLY = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
+
+    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. A case of a sweep
+    ends with the stop file of all, `others_file`, too. Doubts about a scene that are not shown, as `shows` says, go
+    into run.log only.
+    """
+
+    quiet: bool = False
+    restart: str = "auto"
+    until: float | None = None
+    wall: float | None = None
+    stop_file: Path | None = None
+    others_file: StopFile | None = None
+    beside: bool = False
+    shows: Callable[[str], bool] = always
+
+
+class Run:
+    """A march on its way to the end of its history, with its files; methods are collective.
+
+    `facts` are what its checkpoints say of it.
+    """
+
+    def __init__(
+        self, march: March, directory: Directory, recorder: Recorder, watch: Watch, facts: Facts, options: Options
+    ) -> None:
+        self.march, self.directory, self.recorder, self.watch = march, directory, recorder, watch
+        self.facts, self.options, self.console = facts, options, recorder.console
+        self.slab, self.job = march.scene.slab, march.scene.job
+        self.timeline = march.timeline(options.until or 0.0)
+        known = set(sanity.ODD_CONTACTS if options.beside else ())
+        self.contacts = sanity.ContactWatch(self.job.numerics.strict, self.timeline, known)
+        self.watch.state_bytes = sum(entry.nbytes for entry in march.entries().values()) * self.slab.comm.size
+        self.first, self.saved, self.failed, self.stop = march.row.step, -1, False, ""
+        self.began, self.saving = time.monotonic(), 0.0
+
+    def go(self, saved: Contents | None) -> int:
+        """Go to the end, from the start or from a checkpoint; returns the exit code. Raises RunError."""
+        self._log_start(saved)
+        if saved:
+            self.recorder.catch_up(self.march.row, self.march.field)
+        try:
+            if not loop.run_tasks(self.march, [self.decide] if saved else [self.record, self.decide]):
+                steps = self.march.steps(self.timeline, self.options.until)
+                loop.run(self.march, [self.record, self.decide], steps)
+        except StepError as error:
+            text = f"{error}{self._leave_checkpoint()}"
+            self._log_counts()
+            self.console.log(text)
+            raise RunError(text) from error
+        if self.job.checkpoint.keep == 0 and self.march.row.step >= len(self.timeline):
+            self._sync()
+            self._refuse_lost_results()
+            if self.slab.root:
+                self.directory.prune(0)
+        elif self.saved != self.march.row.step:
+            self.save(last=True)
+        return self._log_summary()
+
+    # -- after every step -------------------------------------------------------------------------------------------
+
+    def record(self, march: March) -> None:
+        """Write the row of the last step, and its maps if they are due; warn of what is doubtful about its contact."""
+        row = march.row
+        if row.remark:
+            self.console.say(row.remark)
+        self.recorder.write(row, march.field, len(self.timeline) if self.timeline.chooses else 0)
+        try:
+            doubts = self.contacts.judge(row.step, row.measures)
+        except RunError as error:
+            raise RunError(f"{error}{self._leave_checkpoint()}") from error
+        for text in doubts:
+            self.console.warn(text, shown=self.options.shows(text))
+        if doubts:
+            provenance = self.facts.provenance
+            provenance = replace(provenance, warnings=(*provenance.warnings, *doubts))
+            self.facts = replace(self.facts, provenance=provenance)
+            self.recorder.renew(provenance)
+
+    def decide(self, march: March) -> bool:
+        """Save if it is time to; whether the run ends."""
+        row = march.row
+        verdict = self.watch.judge(row.step, row.step > self.first, self.recorder.problem)
+        if verdict.problem:
+            raise RunError(verdict.problem + self._leave_checkpoint())
+        self.stop = verdict.stop if row.step < len(self.timeline) else ""
+        ends = bool(self.stop) or (self.options.until is not None and reached(row.time, self.options.until))
+        if verdict.save and not ends and row.step < len(self.timeline):
+            self.save()
+        return ends
+
+    # -- saving -----------------------------------------------------------------------------------------------------
+
+    def save(self, last: bool = False) -> None:
+        """Write a checkpoint; results that were lost, or cannot be written, end the run when its state is saved."""
+        self._write(last)
+        self._refuse_lost_results()
+
+    def _refuse_lost_results(self) -> None:
+        if problem := self.slab.agree(self.recorder.problem):
+            raise RunError(problem + self._leave_checkpoint())
+
+    def _leave_checkpoint(self) -> str:
+        """Leave a checkpoint of the last good step; returns what to say of it."""
+        try:
+            if self.saved != self.march.row.step:
+                self._write(last=True)
+        except RunError as error:
+            return f"; {error}"
+        return self._newest()
+
+    def _write(self, last: bool) -> None:
+        """Write a checkpoint; one failure is only warned of, two in a row, or one at the end, are a RunError.
+
+        What was recorded is synchronised first, so that no checkpoint is ahead of it.
+        """
+        began, step = time.monotonic(), self.march.row.step
+        self._sync()
+        try:
+            self.march.save(self.directory.checkpoint(step), replace(self.facts, table=self.recorder.table))
+        except RunError as error:
+            if last or self.failed:
+                raise RunError(f"{error}{self._newest()}") from error
+            self.failed = True
+            self.console.warn(f"no checkpoint after step {step}: {error}; the run ends if the next fails too")
+            return
+        self.saved, self.failed = step, False
+        if self.slab.root:
+            self.directory.note(saved=True)
+            self.directory.prune(max(self.job.checkpoint.keep, 1))
+        seconds = time.monotonic() - began
+        self.saving += seconds
+        self.watch.saved(seconds)
+        self.console.log(f"checkpoint after step {step} in {seconds:.3g} s")
+
+    def _sync(self) -> None:
+        """Bring what was recorded to the disk, with the error budget so far."""
+        budget = self.march.state.errors.facts(self.job.numerics.accuracy)
+        self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
+        self.recorder.sync(self.facts.provenance)
+
+    def _newest(self) -> str:
+        saved = self.slab.agree(self.directory.saved() if self.slab.root else [])
+        return f"; the newest checkpoint is {saved[0][1]}" if saved else "; there is no checkpoint"
+
+    # -- what run.log says ------------------------------------------------------------------------------------------
+
+    def _log_start(self, saved: Contents | None) -> None:
+        grid, ranks = self.job.grid, "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
+        title = self.job.title or self.job.path.stem
+        self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
+        if self.job.included:
+            self.console.say(str(self.job.included))
+        for fact in scene.facts(self.march.scene):
+            self.console.say(fact)
+        if saved:
+            self.console.say(f"goes on after step {self.first} from {saved.path}")
+
+    def _log_counts(self) -> None:
+        spent = time.monotonic() - self.began
+        self.console.log(f"checkpoints took {self.saving:.3g} s of {spent:.4g} s")
+        counts = ", ".join(f"{name} {count}" for name, count in sorted(self.slab.tally.items()))
+        self.console.log(f"counts on root: {counts}")
+
+    def _log_summary(self) -> int:
+        """Say how the run has ended and how wrong it is, and note it in its directory; returns the exit code."""
+        row, console, errors = self.march.row, self.console, self.march.state.errors
+        slides = any(stage.speed for stage in self.job.history)
+        self._log_counts()
+        for line in errors.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
+            console.say(line)
+        if errors.area is not None and (text := describe_sample(self.job, slides)):
+            console.say(text)
+        if self.stop:
+            of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
+            console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")
+            return STOPPED_EARLY
+        if self.slab.root and slides:
+            with suppress(OSError, InputError):  # a table that cannot be read now ends no run
+                rows = measures.read(self.directory.path / "measures.csv")
+                for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
+                    console.say(text)
+        finished = row.step >= len(self.timeline)
+        if self.slab.root and finished:
+            self.directory.note(saved=True, finished=(row.step, row.time))
+        how = "done" if finished else f"stopped at t = {row.time:g} s as asked for, run again to go on"
+        console.say(f"{how}: results in {self.directory.path}")
+        return DONE
+
+
+def chosen_by_accuracy(job: Job) -> set[str]:
+    """Return the parts of the error budget that a smaller `numerics.accuracy` makes smaller, as it has chosen the
+    settings behind them.
+
+    Of time it is so where all stages of a slide choose their steps; without a slide, all that last.
+    """
+    numerics = job.numerics
+    lasting = [stage for stage in job.history if stage.seconds > 0.0]
+    stages = [stage for stage in lasting if stage.speed > 0.0] or lasting
+    chosen = {
+        "solver": numerics.tolerance == TOLERANCE_SHARE * numerics.accuracy,
+        "time": bool(stages) and all(stage.chooses for stage in stages),
+        "folded": numerics.branch_error == BRANCH_SHARE * numerics.accuracy,
+    }
+    return {name for name, by_accuracy in chosen.items() if by_accuracy}
