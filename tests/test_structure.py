@@ -17,7 +17,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"compiled", "datafiles"},
     {"rubber"},
     {"parallel", "job"},
-    {"history", "road"},
+    {"history", "road", "leakage"},
     {"physics"},
     {"theory", "solve"},
     {"effects"},

@@ -18,12 +18,13 @@ from .sections.geometry import (
 from .sections.height_arrays import HeightArray
 from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .sections.part import Part
-from .sections.settings import Checkpoint, Grid, Numerics, Output, Study
+from .sections.settings import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.stages import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
 from .sections.values import Positive, log_range
 
 __all__ = [
     "AUTO",
+    "Body",
     "Case",
     "Checkpoint",
     "Control",

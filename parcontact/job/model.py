@@ -20,7 +20,7 @@ from .sections import height_arrays, listing
 from .sections.geometry import OnOneMesh, Rough, Shape
 from .sections.materials import Dma, Elastic, Material, Zener, heated
 from .sections.part import Context, Part, Rule
-from .sections.settings import Checkpoint, Grid, Numerics, Output, Study
+from .sections.settings import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.stages import Initial, Stage, Steady
 from .text.fault import Fault
 from .text.overrides import Included
@@ -31,6 +31,18 @@ from .text.yamltext import dump
 def _kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
     if grid.boundary == "free" and numerics.kernel == "spectral":
         yield Fault("must be love when grid.boundary is free: the spectral kernel is periodic", ("numerics", "kernel"))
+
+
+def _layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
+    if body is not None and grid.boundary == "free" and body.thickness < 2 * max(grid.dx, grid.dy):
+        least = 2 * max(grid.dx, grid.dy)
+        sentence = f"must be at least two cells, {least:.3g} m, when grid.boundary is free, got {body.thickness:g}"
+        yield Fault(sentence, ("body", "thickness"))
+
+
+def _no_wake_in_a_layer(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+    if body is not None and grid.boundary == "free" and (initial.state == "steady" or steady is not None):
+        yield Fault("must be periodic for steady sliding on a layer", ("grid", "boundary"))
 
 
 def _waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
@@ -112,6 +124,7 @@ class Job(Part):
     checkpoint: Checkpoint = Checkpoint()
     steady: Steady | None = None
     study: Study | None = None
+    body: Body | None = None
 
     _path: Path = PrivateAttr(default=Path("job.yaml"))
     _included: Included | None = PrivateAttr(default=None)
@@ -119,6 +132,8 @@ class Job(Part):
 
     rules = (
         Rule(("grid", "numerics"), _kernel_fits),
+        Rule(("grid", "body"), _layer_is_resolved),
+        Rule(("grid", "body", "initial", "steady"), _no_wake_in_a_layer),
         Rule(("surface",), _some_shape),
         Rule(("grid", "surface"), _waves_fit),
         Rule(("grid", "surface"), height_arrays.fit),

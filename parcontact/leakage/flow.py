@@ -10,7 +10,7 @@ closed. Contact is impermeable. Only cells that lie on a path from end to end ma
 directly, since g^3 spans many decades and iterations stall.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,9 +48,9 @@ class Flow:
 def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`."""
     if axis == "x":
-        flow = solve_flow(gap.T, size[::-1], "y", periodic_sides)
-        position = None if flow.position is None else (flow.position[1], flow.position[0])
-        return Flow(flow.conductivity, flow.constriction, position, flow.imbalance, flow.pressure.T)
+        turned = solve_flow(gap.T, size[::-1], "y", periodic_sides)
+        place = None if turned.position is None else (turned.position[1], turned.position[0])
+        return replace(turned, position=place, pressure=turned.pressure.T)
     pressure = np.full(gap.shape, np.nan)
     constriction, position = critical_constriction(gap, periodic_sides)
     if position is None:

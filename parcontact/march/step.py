@@ -133,7 +133,7 @@ def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:
 def _refuse_beyond_full_contact(scene: Scene, step: Step, d: float, effective: Array) -> None:
     """Raise StepError where a periodic half space cannot follow an approach: its mean surface would be below its
     undeformed level. Where the rigid surface yields it can."""
-    if scene.choices.grid.boundary == "periodic" and scene.choices.hardness is None:
+    if not scene.setup.half_space.moves_in_the_mean and scene.choices.hardness is None:
         mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
         datum = scene.setup.surface.datum
         rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height

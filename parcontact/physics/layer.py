@@ -18,19 +18,21 @@ bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.special import j0
 
-Array = NDArray[np.float64]
+from ..parallel.slab import Array
+
 Base = Literal["bonded", "smooth"]
 THICK = 22.0  # accuracy: S(x) - 1 is below rounding for larger x
 FAR = 50.0  # accuracy: thicknesses; farther away a unit pressure moves the layer by less than rounding
 KNOTS_PER_THICKNESS = 16  # accuracy: of the spline through the correction, whose error is below 1e-6 of it then
 NODES = 900  # accuracy: of the integral over wavenumbers: 5 for each oscillation of the Bessel function
+SOFTEST_BETWEEN, SOFTEST_TRIED = (1e-3, 1e2), 2000  # tuning: wavenumbers times thickness, of a preconditioner
 SERIES_BELOW = 1.0  # accuracy: sinh(y) - y by its series, whose twelve terms are exact to rounding
 
 
@@ -62,6 +64,18 @@ class Layer:
     def mean_compliance(self) -> float:
         """Displacement over a uniform pressure."""
         return self.thickness * (1.0 - 2.0 * self.poisson) / (2.0 * (1.0 - self.poisson))
+
+    @cached_property
+    def softest_wave(self) -> tuple[float, float]:
+        """Return the wavenumber at which the layer is softest, and its pressure over displacement there.
+
+        A compressible layer is softest for the longest waves; an incompressible bonded one for waves some four times
+        as long as it is thick, since longer ones have to push it along its base.
+        """
+        q = np.geomspace(*SOFTEST_BETWEEN, SOFTEST_TRIED) / self.thickness
+        stiffness = q / ((1.0 - self.poisson) * self.compliance_ratio(q))
+        softest = int(np.argmin(stiffness))
+        return float(q[softest]), float(stiffness[softest])
 
     def coefficients(self, x: Array, y: Array, dx: float, dy: float, of_half_space: Array) -> Array:
         """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.

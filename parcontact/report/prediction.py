@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -16,6 +17,7 @@ from ..errors import InputError
 from ..history.timeline import Span, Timeline
 from ..job import Job
 from ..parallel.slab import Slab
+from ..physics.layer import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
 from ..steady_sliding.curve import Request
@@ -52,6 +54,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
     _refuse_unknown(job)
     timeline = Timeline.of(job).follow(_times_of_run(job))
     rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
+    rings = _on_body(job, rings)
     memory = Memory(rings, _material(job))
     if job.initial.state == "steady":
         memory.slide_for_ever(job.initial.velocity)
@@ -95,7 +98,7 @@ def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> I
 
     Raises InputError for jobs that the theory does not know.
     """
-    rings = _continuum(job, 0.0)
+    rings = _on_body(job, _continuum(job, 0.0))
     _, kx, ky = rings.waves
     for speed, pressure, temperature in wanted.points:
         at = job if math.isnan(temperature) else job.at_temperature(temperature)
@@ -166,6 +169,14 @@ def _lattice(job: Job, slab: Slab) -> Rings:
         return persson_rings.rings_of_surface(full_contact.waves(heights, *job.grid.size))
     except ValueError as error:
         raise InputError(f"surface: {error}") from None
+
+
+def _on_body(job: Job, rings: Rings) -> Rings:
+    """The waves on the body of the job: a layer is stiffer than a half space."""
+    if job.body is None:
+        return rings
+    layer = Layer(job.body.thickness, job.body.base, job.material.poisson)
+    return replace(rings, stiffness=1.0 / layer.compliance_ratio(np.hypot(rings.waves.kx, rings.waves.ky)))
 
 
 def _continuum(job: Job, slide: float) -> Rings:

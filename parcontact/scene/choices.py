@@ -115,14 +115,19 @@ class Choices:
             return False, found.reason or "no branch is far faster or slower than all that happens"
         kinds = ((found.memoryless, "memoryless"), (found.frozen, "frozen"))
         folded = " and ".join(f"{len(numbers)} {kind}" for numbers, kind in kinds if numbers)
-        count = len(found.kept) + found.folded
-        return True, f"{folded} of {count}; error of friction {found.bound:.2g} at most"
+        return True, f"{folded} of {self.prony.moduli.size}; error of friction {found.bound:.2g} at most"
 
     @decided("isolated contact")
     def isolated(self) -> Verdict:
         """Padded transforms, four times as large."""
         free = self.grid.boundary == "free"
         return free, f"the boundary is {self.grid.boundary}" + ": padded" * free
+
+    @decided("layer")
+    def layer(self) -> Verdict:
+        """A layer on a rigid base in place of the half space: another symbol of the operator, at the same cost."""
+        body = self.job.body
+        return bool(body), f"{body.thickness:g} m, on a {body.base} base" if body else "no body section: a half space"
 
     @decided("yielding counterbody")
     def yielding(self) -> Verdict:
@@ -196,9 +201,8 @@ class Choices:
     @decided("displacement control")
     def approach(self) -> Verdict:
         """The approach is given and the load follows."""
-        if (stage := next((stage for stage in self.job.history if stage.control == "approach"), None)) is None:
-            return False, "every stage prescribes its load"
-        return True, f"stage {stage.name!r} prescribes the approach"
+        stage = next((stage.name for stage in self.job.history if stage.control == "approach"), None)
+        return bool(stage), f"stage {stage!r} prescribes the approach" if stage else "every stage prescribes its load"
 
     # -- the solver ---------------------------------------------------------------------------------------------------
 
@@ -232,16 +236,18 @@ class Choices:
     @decided("surface spectrum")
     def spectrum(self) -> Verdict:
         """The waves of the surface: their transform is kept, moments are taken once, and forces are spectral sums."""
-        if any(isinstance(shape, Spectral) for shape in self.job.surface):
-            return True, "the surface has waves or heights from a file"
-        return False, "all shapes of the surface are in closed form"
+        on = any(isinstance(shape, Spectral) for shape in self.job.surface)
+        return on, "the surface has waves or heights from a file" if on else "all its shapes are in closed form"
 
     @property
     def transforms(self) -> list[Any]:
         """On what it depends, beside the number of ranks, which transforms a run has."""
-        single = [self.mixed_precision.on, self.single_operator.on]
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
-        return [*kinds, single, [self.job.initial.state, self.job.steady is not None]]
+        return [
+            *kinds,
+            [self.mixed_precision.on, self.single_operator.on],
+            [self.job.initial.state, self.job.steady is not None],
+        ]
 
     # -- the output ---------------------------------------------------------------------------------------------------
 
@@ -256,9 +262,8 @@ class Choices:
         """Branch maps of `A^-1 u`, where the operator's inverse is not at hand."""
         if not self._relaxing_energies:
             return False, "no energies of a viscoelastic body are asked for"
-        if self._inverse_is_known and self.numerics.precision == "double":
-            return False, "the preconditioner is the inverse"
-        return True, "the preconditioner is not the inverse"
+        known = self._inverse_is_known and self.numerics.precision == "double"
+        return not known, f"the preconditioner is {'' if known else 'not '}the inverse"
 
     @property
     def _relaxing_energies(self) -> bool:
@@ -267,7 +272,7 @@ class Choices:
     @property
     def _inverse_is_known(self) -> bool:
         """Whether the preconditioner is the inverse of the operator, but for its precision."""
-        return not self.isolated.on and self.numerics.kernel == "spectral"
+        return not self.isolated.on and self.numerics.kernel == "spectral" and not self.layer.on
 
     @decided("dissipation per branch")
     def branch_dissipation(self) -> Verdict:

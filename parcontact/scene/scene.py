@@ -20,6 +20,7 @@ from ..physics.body import ElasticBody, ZenerBody
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
 from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
+from ..physics.layer import Layer
 from ..physics.ledger import Ledger
 from ..physics.motion import AnyFraction, Motion, PartCells, WholeCells
 from ..physics.prony import Prony
@@ -80,7 +81,10 @@ class Setup:
     @property
     def half_space(self) -> HalfSpace:
         """The body's, of shear modulus 1, in the run's units."""
-        return HalfSpace(self.size, self.job.material.poisson, self.choices.numerics.kernel, self.choices.isolated.on)
+        poisson, kernel = self.job.material.poisson, self.choices.numerics.kernel
+        body = self.job.body
+        layer = None if body is None else Layer(body.thickness / self.units.length, body.base, poisson)
+        return HalfSpace(self.size, poisson, kernel, self.choices.isolated.on, layer)
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
         """A velocity [m/s] in the run's units of length per second."""

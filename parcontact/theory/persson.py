@@ -47,7 +47,7 @@ def traction(mean_pressure: Values, rings: Rings, modulus: ComplexValues, gamma:
     amplitude, kx, ky = rings.waves
     share = contact_share(mean_pressure, rings, modulus)
     weight = share * (gamma + (1 - gamma) * share**2)
-    strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(modulus)
+    strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(rings.stiffness * modulus)
     return -np.stack([np.sum(weight * rings.sums(strength * q), axis=-1) for q in (kx, ky)], axis=-1)
 
 
@@ -61,7 +61,7 @@ def friction_coefficient(
 
 def _variances(rings: Rings, modulus: ComplexValues) -> Array:
     """What each ring adds to the variance of the pressure, in Pa^2."""
-    return rings.sums(np.abs(full_contact.pressure_amplitude(*rings.waves, modulus)) ** 2 / 2)
+    return rings.sums(np.abs(rings.stiffness * full_contact.pressure_amplitude(*rings.waves, modulus)) ** 2 / 2)
 
 
 def _share(mean_pressure: Values, variance: Array) -> Array:

@@ -30,11 +30,13 @@ class Rings:
     """Waves ring by ring, from the longest on; `starts` is the first wave of each ring.
 
     `share`, shape (n, n), says what is within each ring of a panel of n: that share of each ring of the panel.
+    `stiffness` is by what factor the body is stiffer than a half space for each wave, as a layer is.
     """
 
     waves: Waves
     starts: NDArray[np.intp]
     share: Array
+    stiffness: NDArray[np.floating] | float = 1.0
 
     def scaled(self, factor: float) -> "Rings":
         """The same surface with heights that are larger by a factor."""

@@ -61,6 +61,7 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
             "allreduce": 4,
         },  # branch, displacement, effective heights; 2 looks at 5 steps, and 2 at both views of friction
     ),
+    "layer": ({"history": [PRESS]}, {"history": [PRESS], "body": {"thickness": 1e-2}}, {}),
     "folded branches": (
         {"history": [PRESS], "material": FROZEN, "numerics": {"branch_error": 0.0}},
         {"history": [PRESS], "material": FROZEN},

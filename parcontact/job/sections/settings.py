@@ -1,4 +1,4 @@
-"""The `grid`, `numerics`, `output`, `checkpoint` and `study` sections."""
+"""The `grid`, `body`, `numerics`, `output`, `checkpoint` and `study` sections."""
 
 from __future__ import annotations
 
@@ -70,6 +70,13 @@ class Grid(Part):
     def dy(self) -> float:
         """Length of a cell along y [m]."""
         return self.ly / self.ny
+
+
+class Body(Part):
+    """A layer on a rigid base, to which it is bonded, or along which it slides freely: without it a half space."""
+
+    thickness: Positive = Field(description="a positive thickness [m]")
+    base: Literal["bonded", "smooth"] = "bonded"
 
 
 TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: parts of numerics.accuracy

@@ -1,0 +1,157 @@
+"""Contact with a layer: thin and thick limits, absolute approach, sliding waves, any number of ranks."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import parcontact as pc
+from parcontact.physics.layer import Layer
+from parcontact.python.row import Row
+
+
+def last_row(job: dict[str, Any], comm: MPI.Intracomm = MPI.COMM_SELF) -> Row:
+    *_, row = pc.Simulation(job, comm=comm).steps()
+    return row
+
+
+def rough(pressure: float, boundary: str = "periodic", **body: Any) -> dict[str, Any]:
+    return {
+        "grid": {"points": 128, "size": 1e-3, "boundary": boundary},
+        "surface": {
+            "shape": "rough",
+            "hurst": 0.8,
+            "long_wavelength": 2.5e-4,
+            "short_wavelength": 6.25e-5,
+            "rms_slope": 0.1,
+        },
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [{"pressure": pressure}],
+        **body,
+    }
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # strains that a real layer would not bear
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_thin_incompressible_layer_under_a_sphere(boundary: str) -> None:
+    """P = pi G a^6/(32 R d^3) and delta = a^2/(4 R) for a thin layer; here d/a is 1/40, and what is left is 0.6 d/a in
+    the load."""
+    modulus, radius, thickness, a = 1e6, 1.0, 5e-4, 0.02
+    job = {
+        "grid": {"points": 256, "size": 0.06, "boundary": boundary},
+        "surface": {"shape": "sphere", "radius": radius},
+        "material": {"model": "elastic", "shear_modulus": modulus},
+        "body": {"thickness": thickness},
+        "history": [{"approach": a**2 / (4 * radius)}],
+        "numerics": {"accuracy": 1e-3},
+    }
+    load = last_row(job).pressure * 0.06**2
+    assert load == pytest.approx(np.pi * modulus * a**6 / (32 * radius * thickness**3), rel=0.02)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_thick_layer_is_a_half_space(boundary: str) -> None:
+    """A thousand times as thick as the box is long; a free body moves as a whole by box over thickness less."""
+    half_space = last_row(rough(3e4, boundary))
+    layer = last_row(rough(3e4, boundary, body={"thickness": 1.0}))
+    assert layer.contact_area == half_space.contact_area
+    assert layer.max_pressure == pytest.approx(half_space.max_pressure, rel=1e-3 if boundary == "free" else 1e-12)
+
+
+@pytest.mark.parametrize("base", ["bonded", "smooth"])
+def test_the_approach_to_a_compressible_layer_is_absolute(base: str) -> None:
+    """A flat surface moves it by p d (1 - 2 nu)/(2 G (1 - nu)), from its undeformed level on; the load follows from the
+    approach as well."""
+    poisson, thickness, pressure = 0.3, 2e-4, 1e4
+    job = {
+        "grid": {"points": 8, "size": 1e-3},
+        "surface": {"shape": "flat"},
+        "material": {"model": "elastic", "shear_modulus": 1e6, "poisson": poisson},
+        "body": {"thickness": thickness, "base": base},
+        "history": [{"pressure": pressure}],
+    }
+    exact = pressure * thickness * (1 - 2 * poisson) / (2e6 * (1 - poisson))
+    assert last_row(job).approach == pytest.approx(exact, rel=1e-8)
+    assert last_row({**job, "history": [{"approach": exact}]}).pressure == pytest.approx(pressure, rel=1e-8)
+
+
+def test_an_incompressible_layer_cannot_be_pushed_beyond_full_contact() -> None:
+    with pytest.raises(pc.RunError, match="beyond full contact"):
+        last_row({**rough(1.0, body={"thickness": 1e-4}), "history": [{"approach": 1e-4}]})
+
+
+def sliding_wave(layer: dict[str, Any] | None) -> dict[str, Any]:
+    """A wave in full contact that slides for ever."""
+    job = {
+        "grid": {"points": [32, 4], "size": [1e-3, 1e-3]},
+        "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]},
+        "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 3e6, "relaxation_time": 1e-3}]},
+        "initial": {"state": "steady", "velocity": 0.1, "pressure": 1e6},
+        "history": [{"pressure": 1e6, "velocity": 0.1, "distance": 1e-4, "cells_per_step": 0.5}],
+    }
+    return job if layer is None else {**job, "body": layer}
+
+
+@pytest.mark.parametrize("base", ["bonded", "smooth"])
+def test_friction_of_a_wave_in_full_contact(base: Any) -> None:
+    """The pressure of the wave, and with it the friction, is that on a half space over S, at the start and in the
+    march, where the integrator sees 32 steps per wave: 1 %."""
+    thickness, q = 1e-4, 2 * np.pi * 2 / 1e-3
+    ratio = float(Layer(thickness, base).compliance_ratio(np.array(q)))
+    omega, amplitude = q * 0.1, 1e-6
+    loss = 3e6 * omega * 1e-3 / (1 + (omega * 1e-3) ** 2)
+    exact = 0.5 * q * amplitude**2 * 2 * q * loss / ratio / 1e6
+    rows = list(pc.Simulation(sliding_wave({"thickness": thickness, "base": base}), comm=MPI.COMM_SELF).steps())
+    assert rows[0].friction == pytest.approx(exact, rel=1e-6)
+    assert rows[-1].friction == pytest.approx(exact, rel=0.01)
+    assert min(row.contact_area for row in rows) == 1.0
+
+
+def test_energies_balance_on_a_layer() -> None:
+    """Work = stored + dissipated, to the tolerance of the solver."""
+    job = sliding_wave({"thickness": 1e-4}) | {"initial": {"state": "virgin"}, "output": {"energy": True}}
+    row = last_row(job | {"history": [{**sliding_wave(None)["history"][0], "pressure": 5e4}]})
+    assert row.work == pytest.approx(row.stored + row.dissipated, rel=1e-6)
+
+
+def test_a_layer_costs_no_iterations() -> None:
+    """As many calls as on a half space, while the layer is thicker than a fifth of the longest wave; on thinner ones
+    contact is in smaller patches, and a factor of 2.5 is the most of a decade of thicknesses."""
+    half_space = last_row(rough(3e4)).operator_calls
+    calls = [last_row(rough(3e4, body={"thickness": d})).operator_calls for d in (1e-3, 1e-4, 3e-5)]
+    assert max(calls[:2]) <= half_space + 1
+    assert calls[2] <= 2.5 * half_space
+
+
+def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
+    """Persson's theory is exact in full contact: friction of all waves over S."""
+    from parcontact.parallel.slab import Slab
+    from parcontact.python.jobs import of_parts
+    from parcontact.report import prediction
+
+    job = of_parts(**sliding_wave({"thickness": 1e-4}))
+    *_, row = prediction.predict(job, Slab(MPI.COMM_SELF, 32, 4), 0.45, "lattice")
+    assert row.contact_area == pytest.approx(1.0)
+    assert row.friction == pytest.approx(last_row(sliding_wave({"thickness": 1e-4})).friction, rel=0.01)
+
+
+@pytest.mark.mpi
+def test_ranks_agree(comm: MPI.Intracomm) -> None:
+    for boundary in ("periodic", "free"):
+        job = rough(3e4, boundary, body={"thickness": 1e-4})
+        assert last_row(job, comm).max_pressure == pytest.approx(last_row(job).max_pressure, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"body": {"thickness": 0}}, "body.thickness must be a positive thickness"),
+        ({"body": {"thickness": 1e-4, "base": "glued"}}, "body.base"),
+        ({"body": {"thickness": 1.5e-5}}, "must be at least two cells"),
+        ({"body": {"thickness": 1e-4}, "steady": {"velocities": [1.0], "pressures": [1e4]}}, "must be periodic"),
+    ],
+)
+def test_mistakes(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(pc.JobError, match=message):
+        pc.Simulation({**rough(3e4, "free"), **change})
