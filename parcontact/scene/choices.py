@@ -243,11 +243,8 @@ class Choices:
     def transforms(self) -> list[Any]:
         """On what it depends, beside the number of ranks, which transforms a run has."""
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
-        return [
-            *kinds,
-            [self.mixed_precision.on, self.single_operator.on],
-            [self.job.initial.state, self.job.steady is not None],
-        ]
+        single, steady = [self.mixed_precision.on, self.single_operator.on], self.job.steady is not None
+        return [*kinds, single, [self.job.initial.state, steady]]
 
     # -- the output ---------------------------------------------------------------------------------------------------
 
@@ -285,9 +282,8 @@ class Choices:
     @decided("run on half the mesh")
     def mesh_check(self) -> Verdict:
         """The same run on half the mesh first, from which what the mesh makes wrong is seen."""
-        if not self.output.mesh_check:
-            return False, "output.mesh_check is not set"
-        return True, "output.mesh_check asks for it, an eighth to a third of the work more"
+        asked = self.output.mesh_check
+        return asked, f"output.mesh_check is {'set: an eighth to a third of the work more' if asked else 'not set'}"
 
     @decided("fields")
     def fields(self) -> Verdict:
