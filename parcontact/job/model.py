@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
 from . import extension
-from .checks import advice, imprint, limits, meaning, size
+from .checks import advice, limits, meaning, size
 from .sections import height_arrays, listing
 from .sections.geometry import OnOneMesh, Rough, Shape
 from .sections.materials import Dma, Elastic, Material, Zener, heated
@@ -218,7 +218,6 @@ class Job(Part):
             *(self.material.doubts if isinstance(self.material, Dma) else ()),
             *advice.resolution(*scene, self.numerics),
             *meaning.warnings(*scene, self.initial, self.steady),
-            *imprint.returns(*scene, self.initial),
             *size.warnings(self.grid, limits.count_steps(self.grid, self.history), self.output),
         )
 

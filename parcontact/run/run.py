@@ -10,7 +10,7 @@ from .. import scene
 from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
-from ..job.checks.sample import describe_sample
+from ..job.checks.advice import describe_sample
 from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
 from ..march import loop
 from ..march.failure import StepError
@@ -201,7 +201,8 @@ class Run:
         self._log_counts()
         for line in errors.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
             console.say(line)
-        if errors.area is not None and (text := describe_sample(self.job, slides)):
+        sample = describe_sample(self.job.grid, self.job.surface, slides)
+        if errors.area is not None and (text := sample):
             console.say(text)
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))

@@ -7,7 +7,7 @@ from typing import Any
 
 from .. import progress
 from ..effects.interface import InterfaceColumns
-from ..job.checks.sample import describe_sample
+from ..job.checks.advice import describe_sample
 from ..storage import curve_points, files, measures
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG
@@ -107,7 +107,7 @@ class CurveTable:
         if self.known:
             self._sort()
         self.warn(list(describe_missed(self._points, self._job.numerics.accuracy)))
-        if self._points and (text := describe_sample(self._job, slides=True)):
+        if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 

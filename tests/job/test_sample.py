@@ -5,12 +5,17 @@ from typing import Any
 import pytest
 
 from parcontact.job import Job
-from parcontact.job.checks.sample import describe_sample
+from parcontact.job.checks.advice import describe_sample
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 6.25e-5, "rms_slope": 0.1}
 WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-2}]}
 ROUND = {"pressure": 1e4, "velocity": 0.1, "distance": 9.5e-4, "cells_per_step": 1}
+
+
+def sample(slides: bool = True, **changes: Any) -> str:
+    found = job(**changes)
+    return describe_sample(found.grid, found.surface, slides)
 
 
 def job(slide: dict[str, Any] = ROUND, **changes: Any) -> Job:
@@ -29,14 +34,14 @@ def job(slide: dict[str, Any] = ROUND, **changes: Any) -> Job:
 def test_another_seed(grid: dict[str, Any], shares: tuple[str, str, str]) -> None:
     """It differs by the root of the number of long waves in the box; 1/4 of 24 % and 17 % with 4 x 4."""
     friction, area, waves = shares
-    text = describe_sample(job(grid=grid), slides=True)
+    text = sample(grid=grid)
     assert f"friction by about {friction} and the contact area by about {area}" in text
     assert f": {waves} of its longest waves" in text
-    assert "friction" not in describe_sample(job(grid=grid), slides=False)
+    assert "friction" not in sample(slides=False, grid=grid)
 
 
 def test_waves_have_no_seed() -> None:
-    assert describe_sample(job(surface=WAVE), slides=True) == ""
+    assert sample(surface=WAVE) == ""
 
 
 @pytest.mark.parametrize(

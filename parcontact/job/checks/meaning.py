@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any
 
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
@@ -15,12 +16,16 @@ from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.settings import Grid
 from ..sections.stages import Initial, Stage, Steady
 
-STEEP = 0.5  # rms slope: some tenths are small
-STEEPEST = 1.0  # radius of a contact over that of its sphere: beyond, slopes are not small
-SOFTEST, HARDEST = 1e3, 1e12  # Pa; shear moduli go from 1e3 (gels) to 5e11 (diamond)
-STRAIN = 1.0  # mean pressure over 2 G/(1 - nu): beyond, strains are not small
-LEAST = 1e-12  # of the modulus at once: a fluid keeps so much, for a quotient
-BEYOND = 100.0  # times slower or faster than all branches: nothing relaxes
+STEEP = 0.5  # physics: rms slope; some tenths are small
+STEEPEST = 1.0  # physics: radius of a contact over that of its sphere; beyond, slopes are not small
+SOFTEST, HARDEST = 1e3, 1e12  # physics: shear moduli [Pa] go from 1e3 (gels) to 5e11 (diamond)
+STRAIN = 1.0  # physics: mean pressure over 2 G/(1 - nu); beyond, strains are not small
+LEAST = 1e-12  # accuracy: of the modulus at once, which a fluid keeps for a quotient
+NEAR = 0.4  # accuracy: of the longest wave; as near to where it was, the surface is over its own imprint
+REMEMBERS = 0.1  # accuracy: of the time since; a branch that relaxes in less has forgotten
+ROUNDS = 1000  # tuning: through the box that are looked at
+SAME = 1e-9  # accuracy: ways this near, relatively, are the same
+BEYOND = 100.0  # physics: times slower or faster than all branches: nothing relaxes
 MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6, or unit: um in a topography"
 
 
@@ -37,6 +42,7 @@ def warnings(
     yield from _moduli(material)
     yield from _pressures(grid, material, history, initial, steady)
     yield from _band(surface, material, history, initial, steady)
+    yield from _imprints(grid, surface, material, history, initial)
     if grid.boundary == "free":
         yield from _room(grid, surface, material, history)
 
@@ -142,8 +148,10 @@ def _band(
     steady: Steady | None,
 ) -> Iterator[str]:
     """Sliding excites the angular frequencies q v of the surface's waves; branches answer around 1/relaxation time."""
-    times = [branch.relaxation_time for branch in _relaxing(material)]
-    lengths = [length for shape in surface if isinstance(shape, Rough) for length in _wavelengths(shape)]
+    branches = [one for one in getattr(material, "branches", ()) if isinstance(one, PronyBranch) or one.G0 > 0.0]
+    times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
+    rough = [shape for shape in surface if isinstance(shape, Rough)]
+    lengths = [length for shape in rough for length in (shape.long_wavelength, shape.short_wavelength)]
     speeds = [stage.speed for stage in history if stage.speed and stage.seconds]
     speeds += [math.hypot(*initial.velocity)] if any(initial.velocity) else []
     speeds += steady.velocities if steady else ()
@@ -158,16 +166,6 @@ def _band(
             f"branches, which relax at {slow:.3g} to {fast:.3g} rad/s: the body is elastic with its {modulus} modulus; "
             "are velocities in m/s, lengths in m and relaxation times in s?"
         )
-
-
-def _relaxing(material: Elastic | Zener) -> Iterator[Any]:
-    for branch in getattr(material, "branches", ()):
-        if 0.0 < branch.relaxation_time < math.inf and (isinstance(branch, PronyBranch) or branch.G0 > 0.0):
-            yield branch
-
-
-def _wavelengths(shape: Rough) -> tuple[float, float]:
-    return shape.long_wavelength, shape.short_wavelength
 
 
 # -- isolated contacts ------------------------------------------------------------------------------------------------
@@ -205,3 +203,51 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
     return float((0.75 * force * radius / modulus) ** (1 / 3))
+
+
+# -- slides that come round -------------------------------------------------------------------------------------------
+
+
+def _imprints(
+    grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...], initial: Initial
+) -> Iterator[str]:
+    """Yield a sentence about each slide, of stages of one velocity, that goes over the imprint of its own beginning.
+
+    Waves that fill the box repeat themselves on a shorter way, and mean it. A slide that begins in its own steady state
+    finds no other imprint.
+    """
+    branches = getattr(material, "branches", ())
+    times = [branch.relaxation_time for branch in branches if branch.relaxation_time < math.inf]
+    if grid.boundary != "periodic" or not times or all(isinstance(shape, Wave) for shape in surface):
+        return
+    memory = max(times) * getattr(material, "time_factor", 1.0)
+    near = NEAR * max((shape.long_wavelength for shape in surface if isinstance(shape, Rough)), default=0.0)
+    steady = (initial.velocity, initial.pressure) if initial.state == "steady" else None
+    for velocity, stages in groupby(enumerate(history), key=lambda stage: stage[1].velocity):
+        (index, first), *more = stages
+        speed = math.hypot(*velocity)
+        seconds = first.seconds + sum(stage.seconds for _, stage in more)
+        if not speed * seconds or steady == (velocity, first.load.end):
+            continue
+        start = _round_trip(grid, velocity, seconds + near / speed, near) - near
+        if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:
+            yield (
+                f"history.{index}: after {start:.3g} m of {speed * seconds:.3g} m the surface has come round the "
+                "periodic box to where this slide began, over its own imprint, which the body remembers for "
+                f"{memory:.3g} s: friction is that of the box then, and part of mu_dyn; use a shorter distance or a "
+                "larger grid.size"
+            )
+
+
+def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: float) -> float:
+    """Return the way [m] after which a slide of at `most` so many seconds is within `near` of where it began, but for
+    whole boxes; inf if it never is."""
+    along = [abs(one) for one in velocity]
+    main, other = (0, 1) if along[0] / grid.lx >= along[1] / grid.ly else (1, 0)
+    for count in range(1, ROUNDS):
+        seconds = count * grid.size[main] / along[main]
+        if seconds > most * (1.0 + SAME):
+            break
+        if abs(math.remainder(along[other] * seconds, grid.size[other])) <= near + SAME * grid.size[other]:
+            return math.hypot(*velocity) * seconds
+    return math.inf
