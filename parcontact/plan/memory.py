@@ -36,36 +36,40 @@ MOST_POINTS = 2**20  # tuning: of a small case, which gains little from several 
 SPARE = 2.0  # times the maps of steps: what a first contact or steady state on nested grids may hold besides
 
 
-@dataclass(frozen=True)
-class Holding:
-    """What one rank holds for a purpose [bytes]."""
-
-    what: str
-    bytes: int
+Points = tuple[int, int]
 
 
-@dataclass(frozen=True)
-class Maps:
-    """Maps of one type that a rank holds for a purpose, and that a checkpoint has."""
-
-    what: str
-    count: MapCount
-    dtype: DTypeLike
-
-    @property
-    def itemsize(self) -> int:
-        return np.dtype(self.dtype).itemsize
-
-
-def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> list[Holding]:
-    """All maps and transform buffers of a rank in a run of a job; by default no rank has more: the last has the most
-    of all but the surface's waves."""
-    return list(_holdings(job, ranks, ranks - 1 if rank is None else rank, _surface_spectrum(job, ranks, rank)))
+def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
+    """Bytes of all maps and transform buffers of a rank in a run of a job, by their purpose; by default no rank has
+    more: the last has the most of all but the surface's waves."""
+    part, chosen, grid = _Part(job, ranks, rank), choices(job), job.grid
+    spectrum, _ = part.transform(grid.points)
+    symbol, kept = Convolution.footprint(spectrum, grid.ny), chosen.operator_type
+    found = {"transforms": sum(part.transform(grid.points))}
+    if lengths := part.own_lengths:
+        spectrum, blocks = part.transform(lengths, kept)
+        found["padded transforms and operator"] = spectrum + blocks + Convolution.footprint(spectrum, lengths[1])
+    else:
+        found["operator"] = symbol * np.dtype(kept).itemsize // 8
+    if chosen.mixed_precision.on:
+        single, _ = part.transform(grid.points, np.float32)
+        blocks = part.transform(grid.points, np.float32, lent=True)[1]
+        found["single transforms and preconditioner"] = blocks + Convolution.footprint(single, grid.ny)
+    else:
+        found["preconditioner"] = symbol
+    tolerance, grids = job.numerics.tolerance, grids_for(grid.dx, grid.dy)
+    found["solver"] = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept)
+    if chosen.spectrum.on:
+        found["surface spectrum"] = part.surface_waves
+    for what, count, dtype in _maps(job):
+        if count.held:
+            found[what] = found.get(what, 0) + count.held * np.dtype(dtype).itemsize * part.cells(grid.points)
+    return found
 
 
 def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
     """Bytes of all of them."""
-    return sum(holding.bytes for holding in holdings(job, ranks, rank))
+    return sum(holdings(job, ranks, rank).values())
 
 
 def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool = False) -> int:
@@ -77,14 +81,26 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     """
     if not choices(job).steady_start.on:
         return 0
-    waves = _surface_spectrum(job, ranks, rank)
-    return sum(_while_steady(job, ranks, ranks - 1 if rank is None else rank, waves, sets))
+    part, points, even = _Part(job, ranks, rank), job.grid.points, not job.initial.velocity[1]
+    spectrum, blocks = part.transform(points)
+    held = SteadySolver.footprint(*points, tolerance_of(job.numerics.tolerance), ranks, part.number, sets)
+    held += 2 * 8 * part.cells(points)  # the heights and the start
+    held += spectrum + blocks + part.surface_waves
+    held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
+    if lengths := part.own_lengths:
+        padded, blocks = part.transform(lengths)
+        held += padded + blocks + Convolution.footprint(padded, lengths[1], even, is_complex=True)
+    else:
+        held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
+    for coarse in coarser_points(*points):
+        held += sum(footprint(coarse, coarse, np.float64, ranks, part.number)[:2]) + 8 * part.cells(coarse)
+    return held
 
 
 def saved(job: Job) -> int:
     """Bytes of the maps in a checkpoint, with the four of the checksum of each row."""
     nx, ny = job.grid.points
-    return sum(maps.count.saved * (nx * ny * maps.itemsize + 4 * ny) for maps in _maps(job))
+    return sum(count.saved * (nx * ny * np.dtype(dtype).itemsize + 4 * ny) for _, count, dtype in _maps(job))
 
 
 def free_bytes() -> int:
@@ -110,96 +126,56 @@ def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
     return at_once if held <= FREE_SHARE * free_bytes() else 1
 
 
-def _holdings(job: Job, ranks: int, rank: int, waves: int) -> Iterator[Holding]:
-    chosen, part = choices(job), dealt_to(job.grid.ny, ranks, rank)
-    cells = (part.stop - part.start) * job.grid.nx
-    spectrum, *_ = footprint(job.grid.points, job.grid.points, np.float64, ranks, rank)
-    symbol = Convolution.footprint(spectrum, job.grid.ny)
-    kept: type[np.floating] = chosen.operator_type
-    yield _transform("transforms", job, job.grid.points, np.float64, ranks, rank)
-    if lengths := HalfSpace(job.grid.size, free=chosen.isolated.on).own_lengths(job.grid.points):
-        yield _transform("padded transforms and operator", job, lengths, kept, ranks, rank, with_symbol=True)
-    else:
-        yield Holding("operator", symbol * np.dtype(kept).itemsize // 8)
-    if chosen.mixed_precision.on:
-        what, points = "single transforms and preconditioner", job.grid.points
-        yield _transform(what, job, points, np.float32, ranks, rank, with_symbol=True, lent=True)
-    else:
-        yield Holding("preconditioner", symbol)
-    grids = grids_for(job.grid.dx, job.grid.dy)
-    yield Holding("solver", ContactSolver.footprint(*job.grid.points, job.numerics.tolerance, ranks, rank, grids, kept))
-    if chosen.spectrum.on:
-        yield Holding("surface spectrum", waves)
-    for maps in _maps(job):
-        if maps.count.held:
-            yield Holding(maps.what, maps.count.held * maps.itemsize * cells)
+@dataclass(frozen=True)
+class _Part:
+    """What one of several ranks has of a job's grid; without a rank that which has the most."""
+
+    job: Job
+    ranks: int
+    rank: int | None
+
+    @property
+    def number(self) -> int:
+        return self.ranks - 1 if self.rank is None else self.rank
+
+    def cells(self, points: Points) -> int:
+        """Points of a map."""
+        rows = dealt_to(points[1], self.ranks, self.number)
+        return (rows.stop - rows.start) * points[0]
+
+    def transform(self, lengths: Points, dtype: DTypeLike = np.float64, lent: bool = False) -> tuple[int, int]:
+        """Bytes of the spectrum of a transform, and of its buffers; the spectrum may be `lent` by another one."""
+        return footprint(self.job.grid.points, lengths, dtype, self.ranks, self.number, lent)[:2]
+
+    @property
+    def own_lengths(self) -> Points | None:
+        """Lengths of the operator's own transforms; None if it takes those of the grid."""
+        return HalfSpace(self.job.grid.size, free=choices(self.job).isolated.on).own_lengths(self.job.grid.points)
+
+    @property
+    def surface_waves(self) -> int:
+        """Bytes of the waves of the surface."""
+        if not choices(self.job).spectrum.on:
+            return 0
+        points, waves = self.job.grid.points, highest_waves(self.job)
+        count = points[0] // 2 + 1
+        most = self.rank is None  # more ranks than columns have none
+        dealt = deal(count, min(self.ranks, count)) if most else [dealt_to(count, self.ranks, self.number)]
+        shapes = [shape_of(waves, points, columns) for columns in dealt]
+        return max(rows * columns for rows, columns in shapes) * 16
 
 
-def _while_steady(job: Job, ranks: int, rank: int, waves: int, sets: bool) -> Iterator[int]:
-    points = job.grid.points
-    even = not job.initial.velocity[1]
-    finest = _transform("", job, points, np.float64, ranks, rank).bytes
-    spectrum, *_ = footprint(points, points, np.float64, ranks, rank)
-    yield SteadySolver.footprint(*points, tolerance_of(job.numerics.tolerance), ranks, rank, sets)
-    yield 2 * _map(points, ranks, rank)  # the heights and the start
-    yield finest + waves
-    yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
-    if lengths := HalfSpace(job.grid.size, free=choices(job).isolated.on).own_lengths(points):
-        padded, *_ = footprint(points, lengths, np.float64, ranks, rank)
-        yield _transform("", job, lengths, np.float64, ranks, rank).bytes
-        yield Convolution.footprint(padded, lengths[1], even, is_complex=True)
-    else:
-        yield Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
-    for coarse in coarser_points(*points):
-        spectrum, blocks, _ = footprint(coarse, coarse, np.float64, ranks, rank)
-        yield spectrum + blocks + _map(coarse, ranks, rank)
-
-
-def _surface_spectrum(job: Job, ranks: int, rank: int | None) -> int:
-    """Bytes of the waves of the surface on a rank, or on that which has the most."""
-    if not choices(job).spectrum.on:
-        return 0
-    points, waves = job.grid.points, highest_waves(job)
-    count = points[0] // 2 + 1
-    dealt = deal(count, min(ranks, count)) if rank is None else [dealt_to(count, ranks, rank)]  # more ranks have none
-    shapes = [shape_of(waves, points, columns) for columns in dealt]
-    return max(rows * columns for rows, columns in shapes) * 16
-
-
-def _map(points: tuple[int, int], ranks: int, rank: int) -> int:
-    """Bytes of a map on a rank."""
-    rows = dealt_to(points[1], ranks, rank)
-    return (rows.stop - rows.start) * points[0] * 8
-
-
-def _transform(
-    what: str,
-    job: Job,
-    lengths: tuple[int, int],
-    dtype: DTypeLike,
-    ranks: int,
-    rank: int,
-    with_symbol: bool = False,
-    lent: bool = False,
-) -> Holding:
-    """A transform with its buffers, its spectrum perhaps `lent`, and the symbol of the operator that alone uses it."""
-    spectrum, blocks, _ = footprint(job.grid.points, lengths, dtype, ranks, rank, lent)
-    symbol = Convolution.footprint(spectrum, lengths[1]) if with_symbol else 0
-    return Holding(what, (0 if lent else spectrum) + blocks + symbol)
-
-
-def _maps(job: Job) -> Iterator[Maps]:
-    """Of everything that holds whole maps, or has them in checkpoints."""
+def _maps(job: Job) -> Iterator[tuple[str, MapCount, DTypeLike]]:
+    """Whole maps, held or in checkpoints: their purpose, count and type."""
     chosen = choices(job)
-    yield Maps("heights", MapCount(1), np.float64)
-    pressures = State.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on)
-    yield Maps("pressures", pressures, np.float64)
+    yield "heights", MapCount(1), np.float64
+    yield "pressures", State.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on), np.float64
     if chosen.viscoelasticity.on:
-        yield Maps("branches", ZenerBody.count_maps(len(chosen.folded.kept)), np.float64)
+        yield "branches", ZenerBody.count_maps(len(chosen.folded.kept)), np.float64
     else:
-        yield Maps("moved heights", ElasticBody.count_maps(chosen.slides_along_x), np.float64)
+        yield "moved heights", ElasticBody.count_maps(chosen.slides_along_x), np.float64
     if chosen.energy_memory.on:
-        yield Maps("energy memory", ElasticPressure.count_maps(chosen.prony.moduli.size), np.float64)
+        yield "energy memory", ElasticPressure.count_maps(chosen.prony.moduli.size), np.float64
     for name, effect in chosen.followers.items():
         for dtype in effect.maps(job):
-            yield Maps(name, MapCount(held=1, saved=1), dtype)
+            yield name, MapCount(held=1, saved=1), dtype

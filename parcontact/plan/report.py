@@ -29,12 +29,12 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     """Bytes that a rank holds, for what."""
     columns = [memory.holdings(job, count) for count in ranks]
     before = STEADY_STARTS if choices(job).steady_start.on else ()
-    width = max(len(what) for what in (*(holding.what for holding in columns[0]), *(what for what, _ in before)))
-    totals = [sum(holding.bytes for holding in column) for column in columns]
+    width = max(map(len, (*columns[0], *(what for what, _ in before))))
+    totals = [sum(column.values()) for column in columns]
     unit, size = unit_of(max(totals))
     yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f" {ranks_text(count):>12}" for count in ranks)
-    for row in zip(*columns, strict=True):
-        yield f"  {row[0].what:{width}}" + "".join(f"{holding.bytes / size:13.4g}" for holding in row)
+    for what in columns[0]:
+        yield f"  {what:{width}}" + "".join(f"{column[what] / size:13.4g}" for column in columns)
     yield f"  {'in all':{width}}" + "".join(f"{total / size:13.4g}" for total in totals)
     for what, sets in before:
         held = (memory.steady_start(job, count, sets=sets) / size for count in ranks)

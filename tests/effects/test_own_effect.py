@@ -118,7 +118,7 @@ def test_plan_counts_its_bytes(installed: Path, comm: MPI.Intracomm) -> None:
     planned = Job.model_validate(WEAR)
     march, _ = marched(WEAR, comm=comm)
     slab = march.scene.slab
-    held = {holding.what: holding.bytes for holding in memory.holdings(planned, comm.size, comm.rank)}
+    held = memory.holdings(planned, comm.size, comm.rank)
     assert held["wear"] == 8 * slab.shape[0] * NX
     assert sum(held.values()) == slab.tally["map bytes"]
     assert memory.saved(planned) - memory.saved(Job.model_validate(DATA)) == 8 * NX * NY + 4 * NY
