@@ -16,7 +16,7 @@ from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, row, wisdom
 from ..storage.checkpoint import Contents, Facts
-from ..storage.console import Console, Silence
+from ..storage.console import Console
 from ..storage.directory import Directory
 from ..storage.marker import Claim
 from ..storage.provenance import Link, Provenance, extended
@@ -105,7 +105,7 @@ def _find_origin(
     return origin, warnings, reason
 
 
-def _run_on_half_mesh(march: March, console: Console | Silence, options: Options) -> int:
+def _run_on_half_mesh(march: March, console: Console, options: Options) -> int:
     """Run the job on half the mesh if that is asked for, and compare the march with it; returns the exit code;
     collective.
 

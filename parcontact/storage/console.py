@@ -1,5 +1,6 @@
-"""What a run says: one line per step on root, a progress bar on a terminal, the same lines in run.log."""
+"""The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal."""
 
+import logging
 import re
 import sys
 import time
@@ -20,6 +21,7 @@ LEFT_SECONDS = 30.0  # between two lines with the time left, where there is no t
 
 
 def line(row: Row) -> str:
+    """Return the line of a step, under `HEAD`."""
     m = row.measures
     return (
         f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} "
@@ -34,48 +36,56 @@ def warnings_of(log: Path) -> list[str]:
 
 
 def always(text: str) -> bool:
-    """Every warning is shown."""
+    """Show every warning."""
     return True
 
 
-class Console:
-    """Root's voice; the other ranks have `Silence` instead, so that no caller asks who it is."""
+class LogFile(logging.FileHandler):
+    """A log with the time of each line, which no run ends for."""
 
-    def __init__(self, log: Path | None, quiet: bool, total: int) -> None:
-        self._log = log.open("ab", buffering=0) if log is not None else None
-        self._quiet, self._total = quiet, total
+    def __init__(self, path: Path) -> None:
+        """Continue the file or begin it; raises OSError."""
+        super().__init__(path, encoding="utf-8")
+        self.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+
+    def handleError(self, record: logging.LogRecord) -> None:  # the name is that of the library
+        """Go on without the line."""
+
+
+class Console:
+    """What root says to the user and to the log; that of another rank, which has no `log` and `speaks` not, is silent,
+    so that no caller asks who it is."""
+
+    def __init__(self, log: Path | None = None, quiet: bool = True, total: int = 0, speaks: bool = True) -> None:
+        self._log = LogFile(log) if log is not None else None
+        self._quiet, self._total, self._speaks = quiet, total, speaks
         self._first, self._began, self._told = 0, 0.0, 0.0
         self._bar: tqdm[None] | None = None
-        self._headed = False
 
     def say(self, text: str) -> None:
-        """A message for the user and the log."""
+        """Show a message to the user, and log it."""
         self.log(text)
         if not self._quiet:
             self._write(text)
 
     def log(self, text: str) -> None:
-        """For run.log only, which no run ends for."""
+        """Write a message to the log only."""
         if self._log is not None:
-            now = time.time()
-            stamp = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now))
-            with suppress(OSError):
-                self._log.write(f"{stamp},{int(now % 1.0 * 1000):03d} {printable(text)}\n".encode())
+            self._log.emit(logging.makeLogRecord({"msg": printable(text)}))
 
     def warn(self, text: str, shown: bool = True) -> None:
-        """A message that is shown even to those who asked for quiet, or is for run.log only."""
+        """Log a warning, and show it even to those who asked for quiet if it is to be `shown`."""
         self.log(f"{WARNING}{text}")
         if shown:
-            self._write(f"warning: {printable(text)}", sys.stderr)
+            self._write(f"{WARNING}{printable(text)}", sys.stderr)
 
     def step(self, row: Row) -> None:
-        """One line per step."""
+        """Say the line of a step, and how far the run is."""
         text = line(row)
         self.log(text)
         if self._quiet:
             return
-        if not self._headed:
-            self._headed = True
+        if not self._began:
             print(HEAD)
             self._first, self._began = row.step, time.monotonic()
             self._told = self._began
@@ -87,10 +97,10 @@ class Console:
         if self._bar is not None:
             self._bar.update(row.step - self._bar.n)
         else:
-            self._tell_time_left(row.step)
+            self._say_time_left(row.step)
 
-    def _tell_time_left(self, step: int) -> None:
-        """Now and then, if steps go on to take as long as they did."""
+    def _say_time_left(self, step: int) -> None:
+        """Say now and then how long it takes if steps go on to take as long as they did."""
         now = time.monotonic()
         if now - self._told >= LEFT_SECONDS and self._first < step < self._total:
             self._told = now
@@ -99,35 +109,21 @@ class Console:
             self._write(f"# step {step} of {self._total}, about {clock} left")
 
     def expect(self, total: int) -> None:
-        """So many steps are there to be, as far as is known by now."""
+        """Take note of how many steps there will be, as far as is known by now."""
         self._total = total
         if self._bar is not None:
             self._bar.total = total
 
     def close(self) -> None:
+        """End the bar and the log."""
         if self._bar is not None:
             self._bar.close()
         if self._log is not None:
-            self._log.close()
+            with suppress(OSError):
+                self._log.close()
 
     def _write(self, text: str, file: TextIO | None = None) -> None:
         if self._bar is not None:
             self._bar.write(text, file=file)
-        else:
+        elif self._speaks:
             print(text, file=file, flush=True)
-
-
-class Silence:
-    """The console of every other rank."""
-
-    def say(self, text: str) -> None: ...
-
-    def log(self, text: str) -> None: ...
-
-    def warn(self, text: str, shown: bool = True) -> None: ...
-
-    def step(self, row: Row) -> None: ...
-
-    def expect(self, total: int) -> None: ...
-
-    def close(self) -> None: ...

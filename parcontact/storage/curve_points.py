@@ -11,24 +11,24 @@ Point = tuple[float, float, float]  # speed [m/s], mean pressure [Pa], temperatu
 
 
 def asked(speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()) -> list[Point]:
-    """Every speed under every pressure at every temperature, in the order in which they are solved."""
+    """Return every speed under every pressure at every temperature, in the order in which they are solved."""
     order = product(temperatures or (math.nan,), pressures, speeds)
     return [(speed, pressure, temperature) for temperature, pressure, speed in order]
 
 
 def of_table(columns: Mapping[str, Sequence[float]]) -> list[Point]:
-    """The points that are in a table, given by its columns."""
+    """Return the points that are in a table, given by its columns."""
     speeds = columns["velocity"]
     degrees = columns.get("temperature", [math.nan] * len(speeds))
     return list(zip(speeds, columns["pressure"], degrees, strict=True))
 
 
 def lacking(points: Sequence[Point], there: Sequence[Point]) -> list[int]:
-    """The numbers of the points that are not there."""
+    """Return the numbers of the points that are not there."""
     return [number for number, point in enumerate(points) if not any(_same(point, other) for other in there)]
 
 
 def _same(one: Point, other: Point) -> bool:
-    """Temperatures that were not asked for are the same."""
+    """Return whether two points are the same; temperatures that were not asked for are."""
     pairs = zip(one, other, strict=True)
     return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)

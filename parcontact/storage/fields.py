@@ -71,7 +71,7 @@ class FieldsFile:
         return problem
 
     def lacks(self, step: int) -> bool:
-        """Whether the maps of the step after which it goes on are due, and were not saved then."""
+        """Return whether the maps of the step after which a run goes on are due, and were not saved then."""
         return step in self.steps and step not in self._kept
 
     def renew(self, provenance: Provenance) -> None:
@@ -169,7 +169,7 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
 
 
 class Layout:
-    """What a file of fields holds."""
+    """The maps and instants of a file of fields."""
 
     def __init__(self, file: h5py.File) -> None:
         self.names = tuple(name for name in UNITS if name in file)
@@ -180,7 +180,7 @@ class Layout:
                 raise ValueError(f"{name} has shape {file[name].shape}")
 
     def reached(self, step: int) -> list[int]:
-        """The instants that were saved, up to a step."""
+        """Return the instants that were saved, up to a step."""
         pairs = zip(self.steps, self.times, strict=True)
         return [number for number, time in pairs if number <= step and not np.isnan(time)]
 
@@ -209,7 +209,7 @@ def _found(path: Path, slab: Slab) -> tuple[Layout | None, str]:
 def xdmf(
     file: str, times: Array, steps: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]
 ) -> str:
-    """The XDMF text that describes the saved instants: maps of one layer of points in the plane z = 0.
+    """Return the XDMF text that describes the saved instants: maps of one layer of points in the plane z = 0.
 
     XDMF counts z, y, x, the fastest last. Of a mesh of two dimensions ParaView's reader takes the first for z, which
     puts it into the y-z plane; a mesh of three with one layer has no such choice. Readers show one map per time: where

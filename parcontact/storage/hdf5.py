@@ -34,12 +34,12 @@ class Part(NamedTuple):
 
 
 def write(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
-    """Every rank writes its rows; collective. `in_turn` forgoes MPI-IO."""
+    """Write the rows of every rank; collective. `in_turn` forgoes MPI-IO."""
     _move(path, slab, list(parts), True, in_turn)
 
 
 def read(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
-    """Every rank reads its rows into `part.rows`; collective. `in_turn` forgoes MPI-IO."""
+    """Read the rows of every rank into `part.rows`; collective. `in_turn` forgoes MPI-IO."""
     _move(path, slab, list(parts), False, in_turn)
 
 
@@ -101,7 +101,7 @@ def raise_first(slab: Slab, problem: str) -> None:
 
 
 def reason(error: BaseException) -> str:
-    """Why it failed, in a few words: HDF5 tells the whole story of its own calls."""
+    """Return the reason of a failure in a few words: HDF5 tells the whole story of its own calls."""
     text = str(error)
     if found := re.search(r"error message = '([^']+)'", text):
         return found.group(1)
@@ -142,7 +142,7 @@ def _place(dataset: h5py.Dataset, part: Part, slab: Slab) -> int:
 
 
 def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[int], writes: bool) -> str:
-    """One rank after the other; those without rows only wait."""
+    """Let one rank act after the other, those without rows only wait; returns what failed on this rank, or ''."""
     problem = ""
     for rank in range(slab.comm.size):
         if rank == slab.comm.rank and slab.shape[0]:
@@ -158,7 +158,7 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[in
 
 
 def _together(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[int], writes: bool) -> str:
-    """All ranks at once, by MPI-IO; who fails goes on with the rest."""
+    """Let all ranks act at once, by MPI-IO, also after a failure, which is returned."""
     problem = ""
     try:
         file = MPI.File.Open(slab.comm, str(path), MPI.MODE_RDWR if writes else MPI.MODE_RDONLY)

@@ -1,4 +1,4 @@
-"""What run.log begins with: all that one asks for when a run on another machine is not understood."""
+"""The beginning of run.log: all that one asks for when a run on another machine is not understood."""
 
 import os
 import platform
@@ -15,7 +15,7 @@ GIGABYTE = 1e9
 
 
 def lines(comm: MPI.Intracomm) -> Iterator[str]:
-    """Version, host, command, MPI, ranks, batch job, and numbers of the machine."""
+    """Yield version, host, command, MPI, ranks, batch job, and numbers of the machine."""
     words = [os.path.basename(sys.argv[0]), *sys.argv[1:]]
     yield f"{PROGRAM} on {socket.gethostname()}, process {os.getpid()}: {shlex.join(words)}"
     yield f"in {os.getcwd()}"

@@ -22,7 +22,7 @@ RESERVE = 1 << 20  # bytes: more than HDF5 writes of what is not a map; it does 
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
-    """Root makes the file with `build(file)`, after an empty `block` of bytes; collective. The name must be unused.
+    """Make the file on root with `build(file)`, after an empty `block` of bytes; collective. The name must be unused.
 
     All maps take `size` bytes. That there is room for the rest of the file, and no limit to its length, is tried first.
     """
@@ -42,7 +42,7 @@ def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: in
 
 
 def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
-    """Root changes attributes of a file, which keep their size, with `act(file)`; collective."""
+    """Change attributes of a file, which keep their size, on root with `act(file)`; collective."""
 
     def apply() -> None:
         with h5py.File(path, "r+", locking=False) as file:
@@ -62,7 +62,7 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 
 def regions(file: h5py.File) -> list[tuple[int, int]]:
-    """Where in a file its maps are, from byte to byte, in order; those next to each other as one."""
+    """Return where in a file its maps are, from byte to byte, in order; those next to each other as one."""
     names: list[str] = []
     file.visit(names.append)
     items = (file[name] for name in names)
@@ -75,7 +75,7 @@ def regions(file: h5py.File) -> list[tuple[int, int]]:
 
 
 def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterator[tuple[int, int]]:
-    """All that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
+    """Yield all that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
     for first, last in [*found, (size, size)]:
         for position in range(start, first, PIECE):
             yield position, min(position + PIECE, first)
@@ -83,7 +83,7 @@ def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterat
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:
-    """A dataset whose space is set aside at once, so that writing to it never changes the file's structure."""
+    """Add a dataset whose space is set aside at once, so that writing to it never changes the structure of the file."""
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)

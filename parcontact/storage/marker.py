@@ -22,8 +22,8 @@ SECTIONS = (*SCENE, "initial", "numerics", "steady")  # what a marker keeps of a
 
 @dataclass(frozen=True)
 class Claim:
-    """What a verb has in a directory: the `id` of its run, its job, whether it has `saved` a checkpoint, and the step
-    and time after which it has `finished`."""
+    """The part of a verb in a directory: the `id` of its run, its job, whether it has `saved` a checkpoint, and the
+    step and time after which it has `finished`."""
 
     job: dict[str, Any]
     id: str = field(default_factory=lambda: secrets.token_hex(16))
@@ -32,12 +32,12 @@ class Claim:
 
 
 def kept(data: Mapping[str, Any]) -> dict[str, Any]:
-    """What a marker keeps of a job as plain data."""
+    """Return what a marker keeps of a job as plain data."""
     return {name: data[name] for name in SECTIONS if name in data}
 
 
 def read(directory: Path) -> dict[str, Claim]:
-    """The claims of a directory by verb, none where there is no marker; raises OSError, ValueError for a bad one."""
+    """Read the claims of a directory by verb, none where there is no marker; raises OSError, or ValueError."""
     path = directory / MARKER
     try:
         with path.open("rb") as file:
@@ -65,25 +65,21 @@ def write(directory: Path, claims: Mapping[str, Claim]) -> None:
 
 
 def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:
-    """In which of the sections (`grid`) or keys (`numerics.kernel`) two jobs as plain data differ, with both values."""
+    """Yield in which of the sections (`grid`) or keys (`numerics.kernel`) two jobs as plain data differ, with both
+    values."""
+    old, new = dict(_leaves("", then)), dict(_leaves("", now))
     for name in names:
-        section, _, key = name.partition(".")
-        old, new = then.get(section), now.get(section)
-        yield from (
-            _differences(name, (old or {}).get(key), (new or {}).get(key)) if key else _differences(name, old, new)
-        )
+        for key in (key for key in {**old, **new} if f"{key}.".startswith(f"{name}.")):
+            if old.get(key) != new.get(key):
+                yield f"{key} was {old.get(key)}, is {new.get(key)}"
 
 
-def _differences(name: str, then: Any, now: Any) -> Iterator[str]:
-    if isinstance(then, dict) and isinstance(now, dict):
-        for key in [*then, *(key for key in now if key not in then)]:
-            yield from _differences(f"{name}.{key}", then.get(key), now.get(key))
-    elif _parts(then) and _parts(now) and len(then) == len(now):
-        for index, (old, new) in enumerate(zip(then, now, strict=True)):
-            yield from _differences(f"{name}.{index}", old, new)
-    elif then != now:
-        yield f"{name} was {then}, is {now}"
-
-
-def _parts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(part, dict) for part in value)
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested mappings, and of lists of these, by their keys: `surface.0.seed`."""
+    if isinstance(value, list) and value and all(isinstance(part, dict) for part in value):
+        value = dict(enumerate(value))
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _leaves(f"{name}.{key}" if name else str(key), inner)
+    else:
+        yield name, value

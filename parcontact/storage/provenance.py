@@ -1,4 +1,4 @@
-"""Where a file comes from: what an HDF5 file says about the runs that made it."""
+"""The origin of a file: what an HDF5 file says about the runs that made it."""
 
 import json
 import platform
@@ -43,7 +43,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a file is to say of its origin: the chain of runs up to the present one, the seeds of its roughness, the
+    """The origin of a file: the chain of runs up to the present one, the seeds of its roughness, the
     file that its job includes, the warnings about its scene, and the error budget of the run so far, as plain data."""
 
     chain: tuple[Link, ...]

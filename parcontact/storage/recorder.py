@@ -1,13 +1,14 @@
 """The files that grow with a run: run.log, measures.csv and fields.h5, begun or continued after a step."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from ..errors import InputError, RunError
 from ..parallel.slab import Array
 from . import fields, hdf5, measures
 from .checkpoint import Contents, Table
-from .console import Console, Silence
+from .console import Console
 from .directory import Directory
 from .fields import FieldsFile
 from .measures import MeasuresFile
@@ -17,8 +18,8 @@ from .row import Row
 
 @dataclass(frozen=True)
 class Recording:
-    """What is recorded: the dissipation of so many `branches`, the columns `added` by effects, and the `maps` of a box
-    of this `size` [m] after `every` so many steps; `total` steps of the run, about so many if it is `open_ended`."""
+    """The outputs of a run of `total` steps, about so many if it is `open_ended`: the dissipation of so many `branches`,
+    the columns `added` by effects, and the `maps` of a box of this `size` [m] after `every` so many steps."""
 
     total: int
     branches: int = 0
@@ -47,7 +48,7 @@ class Recorder:
     ) -> None:
         self.slab, self.path, self.problem = directory.slab, directory.path, ""
         self._recording = recording
-        self.console: Console | Silence = Silence()
+        self.console = Console(speaks=False)
         self._measures: MeasuresFile | None = None
         self.warnings: list[str] = []
         table, log = self.path / "measures.csv", self.path / "run.log"
@@ -98,17 +99,22 @@ class Recorder:
             self.console.expect(total)
         self.console.step(row)
         if self._measures:
-            try:
+            with self._noting_problems():
                 self._measures.write(row)
-            except OSError as error:
-                self.problem = f"cannot write {self._measures.path}: {hdf5.reason(error)}"
-        if self._fields:
-            try:
-                if self._recording.open_ended and total:
-                    self._make_place(self._fields, row.step, total)
-            except RunError as error:
-                self.problem = self.problem or str(error)
+        if self._fields and self._recording.open_ended and total:
+            with self._noting_problems():
+                self._make_place(self._fields, row.step, total)
         self._save_fields(row, field)
+
+    @contextmanager
+    def _noting_problems(self) -> Iterator[None]:
+        """Leave the first failure in `problem`; of an OSError, which root alone has, it is of measures.csv."""
+        try:
+            yield
+        except OSError as error:
+            self.problem = self.problem or f"cannot write {self.path / 'measures.csv'}: {hdf5.reason(error)}"
+        except RunError as error:
+            self.problem = self.problem or str(error)
 
     def _make_place(self, file: FieldsFile, step: int, total: int) -> None:
         """Make place for as many instants as an open-ended run has, in the end or when there are more than foreseen."""
@@ -128,10 +134,8 @@ class Recorder:
 
     def _save_fields(self, row: Row, field: Callable[[str], Array]) -> None:
         if self._fields and row.step in self._fields.steps:
-            try:
+            with self._noting_problems():
                 self._fields.save(row.step, row.time, {name: field(name) for name in self._fields.names})
-            except RunError as error:
-                self.problem = self.problem or str(error)
 
     def renew(self, provenance: Provenance) -> None:
         """Put what has changed of where they come from into the files."""
@@ -143,13 +147,11 @@ class Recorder:
 
         What cannot be written is left in `problem`, if results are lost by it, or warned of.
         """
-        try:
+        with self._noting_problems():
             sync = self._measures.sync if self._measures else lambda: None
             hdf5.on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
             if self._fields:
                 self._fields.sync(provenance)
-        except RunError as error:
-            self.problem = self.problem or str(error)
         if self._fields and self._fields.trouble:
             self.console.warn(self._fields.trouble)
 

@@ -1,4 +1,4 @@
-"""What is recorded of one instant: its numbers, and their columns and units in measures.csv."""
+"""A row of measures.csv: the numbers of one instant, their columns and units."""
 
 import math
 from collections.abc import Sequence

@@ -51,7 +51,7 @@ class SteadyMaps:
         hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
 
     def _fits(self) -> bool:
-        """Whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""
+        """Return whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""
         shape = (len(self.points), self.slab.ny, self.slab.nx)
         try:
             with h5py.File(self.path, "r") as file:

@@ -1,1 +1,1 @@
-"""What a run, a sweep or a friction curve comes to: figures, tables and references to cite."""
+"""Results of a run, a sweep or a friction curve in short: figures, tables and references to cite."""

@@ -1,4 +1,4 @@
-"""What to cite for a run: this program, the method, and the work of others behind what the job has used."""
+"""The references of a run: this program, the method, and the work of others behind what the job has used."""
 
 from contextlib import suppress
 from pathlib import Path

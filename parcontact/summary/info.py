@@ -1,6 +1,9 @@
-"""What a file of a run holds, and whether it is sound."""
+"""Descriptions of the files of a run and of output directories, and whether they are sound."""
 
 import json
+import math
+import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,21 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..job.resolved import RESOLVED, shown_job
 from ..parallel.mpi import MPI
-from ..parallel.slab import Array, Slab
-from ..storage import checkpoint, fields, hdf5
+from ..parallel.slab import Slab
+from ..storage import checkpoint, curve_points, fields, hdf5, marker, measures
+from ..storage.console import warnings_of
+from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
+from . import slide, sweep_table, theory_settings
 
 SHOWN = 20  # numbers of one name at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
 
 
 def describe(path: Path) -> tuple[str, bool]:
-    """Text about a checkpoint, a file of fields or an output directory, and whether it is sound; one rank reads it."""
+    """Describe a checkpoint, a file of fields or an output directory, and tell whether it is sound; on one rank."""
     if path.is_dir():
-        from . import info_directory  # with the columns of a run, and so with what computes them
-
-        return info_directory.describe(path)
+        return describe_directory(path)
     try:
         if checkpoint.is_one(path):
             return _checkpoint(path)
@@ -41,7 +46,7 @@ def describe(path: Path) -> tuple[str, bool]:
 
 
 def describe_all(paths: Sequence[Path]) -> tuple[str, bool]:
-    """The texts about several, one below the other, and whether all are sound; one that is nothing is told so."""
+    """Describe several, one below the other, and tell whether all are sound; of one that is nothing that is said."""
     found = []
     for path in paths:
         try:
@@ -78,7 +83,12 @@ def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
         first, last = saved[0], saved[-1]
         lines[-1] += f", t = {layout.times[first]:g} s (step {layout.steps[first]})"
         lines[-1] += f" to {layout.times[last]:g} s (step {layout.steps[last]})"
-    bad = [f"{name} after step {layout.steps[i]}" for name in layout.names for i in saved if not _finite(file[name][i])]
+    bad = [
+        f"{name} after step {layout.steps[i]}"
+        for name in layout.names
+        for i in saved
+        if not np.isfinite(file[name][i]).all()
+    ]
     lines.append(f"damaged: not finite are {', '.join(bad)}" if bad else "sound: all saved maps are finite")
     return "\n".join(lines), not bad
 
@@ -92,7 +102,7 @@ def _runs(chain: tuple[Link, ...]) -> list[str]:
 
 
 def _budget(budget: Mapping[str, Any]) -> Iterator[str]:
-    """How wrong friction and area are, by part."""
+    """Yield the estimated errors of friction and area, by part."""
     for name, parts in budget.items():
         if isinstance(parts, dict):
             yield f"  error of {name}: " + ", ".join(f"{part} {100 * value:.2g} %" for part, value in parts.items())
@@ -102,5 +112,108 @@ def _short(value: NDArray[Any]) -> str:
     return json.dumps(value.tolist()) if np.size(value) <= SHOWN else f"{np.size(value)} values"
 
 
-def _finite(values: Array) -> bool:
-    return bool(np.isfinite(values).all())
+def describe_directory(directory: Path) -> tuple[str, bool]:
+    """Describe a directory, and tell whether all of it can be read; raises InputError where nothing is."""
+    try:
+        claims = marker.read(directory)
+    except (OSError, ValueError) as error:
+        return f"{directory}: {hdf5.reason(error)}", False
+    if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
+        raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
+    lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
+    for part in (_run, _theory, _curve, _saved_states, _saved_maps, _sweep, _study):
+        try:
+            lines += part(directory, claims)
+        except InputError as error:
+            problems.append(f"  {error}")
+        except hdf5.FAILURES as error:
+            problems.append(f"  {directory}: {hdf5.reason(error)}")
+    return "\n".join([*lines, *problems]), not problems
+
+
+def _title(directory: Path) -> str:
+    """Return the title of the job, from the first of its copies that there is."""
+    cases = sorted(path.name for path in directory.glob("cases/*"))
+    of_a_case = [f"cases/{name}/job.resolved.yaml" for name in cases[:1]]
+    for name in ("job.resolved.yaml", "steady.resolved.yaml", "study.resolved.yaml", *of_a_case):
+        if (directory / name).is_file():
+            found = re.search(r"^title: (.+)$", (directory / name).read_text(errors="replace"), re.MULTILINE)
+            return found.group(1).strip("'\"") if found else "without a title"
+    return "without a job"
+
+
+def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    table = directory / "measures.csv"
+    if not table.exists():
+        return
+    columns, claim = measures.read(table), claims.get("run")
+    if not columns["step"]:
+        yield "  run: no step yet"
+        return
+    step, time = int(columns["step"][-1]), columns["time"][-1]
+    ended = claim is not None and claim.finished is not None and claim.finished[0] == step
+    how = "finished" if ended else "not finished"
+    yield f"  run: {how} after step {step}, t = {time:g} s, {len(columns['step'])} rows"
+    last = {name: columns[name][-1] for name in ("pressure", "friction", "contact_area", "approach")}
+    yield "  last row: " + ", ".join(f"{name} {value:.6g}" for name, value in last.items())
+    yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
+    if (directory / RESOLVED).exists():
+        job = shown_job(directory / RESOLVED)
+        yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
+
+
+def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    table = directory / theory_settings.TABLE
+    if table.exists():
+        told = f"  Persson's theory: {len(measures.read(table)['time'])} rows, "
+        try:
+            settings = theory_settings.read(directory)
+        except InputError:
+            yield told + "of unknown settings"
+            raise
+        yield told + (f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings")
+
+
+def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    table = directory / "steady.csv"
+    if table.exists() and (speeds := (columns := measures.read(table))["velocity"]):
+        best = int(np.argmax(columns["friction"]))
+        yield (
+            f"  friction curve: {len(speeds)} points from {min(speeds):g} to {max(speeds):g} m/s; the largest friction "
+            f"is {columns['friction'][best]:.6g} at {speeds[best]:g} m/s under {columns['pressure'][best]:g} Pa"
+        )
+        errors = {name: slide.largest(columns[name]) for name in slide.ERRORS if name in columns}
+        if errors:
+            told = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
+            numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
+            asked = f"; asked for: {100 * numerics['accuracy']:.3g} %" if "accuracy" in numerics else ""
+            yield f"  largest estimated errors of the curve: {told}{asked}"
+        yield from (f"  warning: {text}" for text in warnings_of(directory / curve_points.LOG))
+
+
+def _saved_states(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    for path in sorted(directory.glob("checkpoint/step-*.h5")):
+        contents = checkpoint.inspect(path)
+        yield f"  checkpoint after step {contents.step}, t = {contents.time:g} s"
+
+
+def _saved_maps(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    path = directory / "fields.h5"
+    if path.exists():
+        with h5py.File(path, "r") as file:
+            layout = fields.Layout(file)
+        saved = np.isfinite(layout.times).sum()
+        yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
+
+
+def _sweep(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    path = directory / sweep_table.TABLE
+    if path.exists():
+        states = Counter(str(row["state"]) for row in sweep_table.read(path))
+        told = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
+        yield f"  sweep of {states.total()} cases: {told}"
+
+
+def _study(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    if (directory / "study.txt").exists():
+        yield "  study: what settings cost is in study.txt"

@@ -1,4 +1,4 @@
-"""What a slide comes to: its highest friction, its dynamic friction, and the contact area meanwhile.
+"""Results of a slide: its highest friction, its dynamic friction, and the contact area meanwhile.
 
 The slide of a history is its last stretch at one velocity that is not zero, over all stages that have it. After the
 paper (Sec. 3.1), mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its
@@ -32,7 +32,7 @@ class Slide(NamedTuple):
 
 
 def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC) -> float:
-    """The mean of values over the last share of a distance, by trapezoids; both of shape (n,), distances ascending."""
+    """Return the mean of values over the last share of a distance, by trapezoids; both have shape (n,)."""
     x, y = np.asarray(distance, float), np.asarray(values, float)
     start = x[-1] - share * (x[-1] - x[0])
     inside = x > start
@@ -41,7 +41,7 @@ def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC
 
 
 def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Slide | None:
-    """The slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows so far.
+    """Measure the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows.
 
     None where nothing slides, or has not slid yet.
     """
@@ -56,20 +56,21 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
 
 
 def errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """The largest relative errors of friction and contact area that the rows of the slide have, or the last row where
-    nothing has slid; nan where none is known. By the names of their columns, as far as these are there."""
+    """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row if
+    nothing has slid, by their columns as far as these are there; nan where none is known."""
     rows = _during(history, np.asarray(columns["time"], float))[1:].tolist() if measure(history, columns) else [-1]
     return {name: largest(columns[name][row] for row in rows) for name in ERRORS if name in columns}
 
 
 def largest(values: Iterable[float]) -> float:
-    """Of those that are known, else nan."""
+    """Return the largest of those that are known, else nan."""
     return max((value for value in values if value == value), default=math.nan)
 
 
 def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> float:
-    """By how much friction of the row `at` is above its mean over one cell [m] around it: steps between cells meet
-    points of the grid in turn, and friction goes up and down with them. 0 where rows are a cell apart or more."""
+    """Return by how much friction of the row `at` is above its mean over one cell [m] around it, 0 for steps of a cell.
+
+    Shorter steps meet the points of the grid in turn, and friction goes up and down with them."""
     x, y = np.asarray(distance, float), np.asarray(friction, float)
     near = np.abs(x - x[at]) <= cell / 2 * (1 + SAME_INSTANT)
     if np.count_nonzero(near) < 3 or not x[near][0] < x[at] < x[near][-1]:
@@ -78,7 +79,7 @@ def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> fl
 
 
 def _within(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> str:
-    """By how much the highest friction of some rows may be wrong: its estimated error, and the ripple on which it sits;
+    """Return the error of the highest friction of some rows, as text: its estimate, and the ripple on which it sits;
     '' where none of this is known."""
     friction = np.asarray(columns["friction"], float)[rows]
     at = int(np.argmax(friction[1:])) + 1
@@ -128,7 +129,7 @@ def describe(
 
 
 def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:
-    """Whether a slide is the steady sliding with which its run began, under the same load."""
+    """Return whether a slide is the steady sliding with which its run began, under the same load."""
     if initial.state != "steady" or initial.pressure is None or rows[0] != 0:
         return False
     same = initial.velocity, Ramp(initial.pressure, initial.pressure)
@@ -136,8 +137,8 @@ def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) 
 
 
 def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error: float) -> Iterator[str]:
-    """A steady start and the slide that goes on from it are one state, found twice: tell if they differ by more than
-    they are known to."""
+    """Yield a sentence if a steady start and the slide that goes on from it, one state found twice, differ by more than
+    their errors."""
     start, known = columns["friction"][0], columns.get(ERRORS[0], [math.nan])[0]
     allowed = known * abs(start) + error * abs(mu_dyn)
     if abs(mu_dyn - start) > allowed:
@@ -151,20 +152,20 @@ _COLUMNS = ("distance", "friction", "contact_area")
 
 
 def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:
-    """How many stages have begun before the last of the times."""
+    """Return how many stages have begun before the last of the times."""
     starts = np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
     return int(np.count_nonzero(starts < times[-1] * (1.0 - SAME_INSTANT))) if len(times) else 0
 
 
 def _slide(history: Sequence[Stage]) -> range:
-    """The indices of the stages of the slide; none where nothing slides."""
+    """Return the indices of the stages of the slide; none where nothing slides."""
     last = max((index for index, stage in enumerate(history) if any(stage.velocity) and stage.seconds), default=-1)
     same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
     return range(min(same, default=0), last + 1)
 
 
 def _during(history: Sequence[Stage], time: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The rows of the slide: the last one before it begins, and those to its end."""
+    """Return the rows of the slide: the last one before it begins, and those to its end."""
     ends = np.cumsum([0.0, *(stage.seconds for stage in history)])
     slide = _slide(history)
     if not slide:

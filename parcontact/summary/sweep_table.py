@@ -27,7 +27,7 @@ FAILURE = ".failure"  # why a case has failed
 
 
 def write(directory: Path, cases: Sequence[Case]) -> None:
-    """Both tables in the directory of a sweep, from what its cases have left in theirs; root only.
+    """Write both tables in the directory of a sweep, from what its cases have left in theirs; root only.
 
     Several programs, each with a case, may do so at a time.
     """
@@ -84,7 +84,7 @@ def _row(case: Case) -> dict[str, Any]:
 
 
 def state(case: Case) -> str:
-    """How far a case has come: done | failed | begun | -"""
+    """Return how far a case has come: done | failed | begun | -"""
     directory = case.job.output.directory
     if (directory / FAILURE).is_file():
         return "failed"
@@ -100,7 +100,7 @@ def state(case: Case) -> str:
 
 
 def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
-    """Whether a friction curve has not all points that its job asks for."""
+    """Return whether a friction curve lacks points that its job asks for."""
     asked = (
         curve_points.asked(section.velocities, section.pressures or (), section.temperatures or ()) if section else ()
     )
@@ -108,8 +108,8 @@ def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]])
 
 
 def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:
-    """Mean, standard deviation of a single case, standard error of the mean, and number, over the cases that differ by
-    their seeds only."""
+    """Return the columns and rows of the means over the cases that differ by their seeds only, with the standard
+    deviation of a single case, the standard error of the mean, and the number of cases."""
     kept = [key for key in keys if key.split(".")[-1] != SEED]
     names = [name for name in COLUMNS if name in RESULTS or name.startswith("theory_")]
     groups: dict[str, list[dict[str, Any]]] = {}
@@ -149,7 +149,7 @@ def _number(text: str) -> Any:
 
 @contextmanager
 def _alone(directory: Path) -> Iterator[None]:
-    """One at a time, where the file system knows locks: the last one to write has seen what all others left."""
+    """Let one program write at a time, where the file system has locks: the last one sees what all others left."""
     directory.mkdir(parents=True, exist_ok=True)
     with (directory / ".sweep.lock").open("w") as file:
         with suppress(OSError):

@@ -19,7 +19,7 @@ from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
 from parcontact.report import prediction
-from parcontact.summary import info_directory, theory_settings
+from parcontact.summary import info, theory_settings
 from parcontact.summary.theory_settings import TheorySettings
 from parcontact.theory import full_contact
 
@@ -189,7 +189,7 @@ def test_damaged_settings_are_told_by_name(tmp_path: Path) -> None:
     damaged = f"{path} is damaged: it does not say gamma and waves"
     assert theory_settings.describe(path.parent) == f"theory of unknown settings: {damaged}"
     (path.parent / "measures.csv").write_text("")
-    told, sound = info_directory.describe(path.parent)
+    told, sound = info.describe(path.parent)
     assert not sound
     assert "  Persson's theory: 0 rows, of unknown settings\n" in told
     assert f"  {damaged}" in told.splitlines()

@@ -15,7 +15,7 @@ from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import sweep, watch
-from parcontact.summary import info_directory, sweep_table
+from parcontact.summary import info, sweep_table
 
 JOB = """\
 grid: {points: 34, size: 1.0e-3}
@@ -200,7 +200,7 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         assert float(mean["mu_dyn_sem"]) == pytest.approx((spread / 3) ** 0.5, rel=1e-9)
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
     case = here / "cases" / "001"
-    for text in ((case / "run.log").read_text(), info_directory.describe(case)[0]):
+    for text in ((case / "run.log").read_text(), info.describe(case)[0]):
         assert f"last three quarters of its 0.0005 m, is {float(rows[1]['mu_dyn']):.6g}\n" in text
 
 

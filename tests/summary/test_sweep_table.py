@@ -8,7 +8,7 @@ import pytest
 from parcontact.errors import InputError
 from parcontact.plotting import sweep
 from parcontact.report import results
-from parcontact.summary import info_directory
+from parcontact.summary import info
 
 HEAD = "case,a.velocity,state,mu_max\n"
 DAMAGED = {
@@ -29,6 +29,6 @@ def test_what_is_no_table(tmp_path: Path, name: str, read: Callable[[Path], obje
     (tmp_path / "sweep.csv").write_text(DAMAGED[name])
     with pytest.raises(InputError, match=r"sweep.csv cannot be read: .*; run the sweep again"):
         read(tmp_path)
-    told, sound = info_directory.describe(tmp_path)
+    told, sound = info.describe(tmp_path)
     assert not sound
     assert str(tmp_path / "sweep.csv") in told
