@@ -18,7 +18,7 @@ from .row import Row
 
 @dataclass(frozen=True)
 class Recording:
-    """The outputs of a run of `total` steps, about so many if it is `open_ended`: the dissipation of so many `branches`,
+    """The outputs of a run of `total` steps, or about so many if `open_ended`: the dissipation of so many `branches`,
     the columns `added` by effects, and the `maps` of a box of this `size` [m] after `every` so many steps."""
 
     total: int
