@@ -40,7 +40,6 @@ PARTS = {  # files of the program, and the tests that answer for them
     "physics/roughness.py": ("tests/physics/test_roughness.py",),
     "physics/lowest.py": ("tests/physics/test_lowest.py", "tests/scene/test_rigid_surface.py"),
     "physics/budget.py": ("tests/physics/test_budget.py", "tests/run/test_half_mesh.py"),
-    "physics/seen.py": ("tests/physics/test_budget.py",),
     "physics/time_error.py": ("tests/physics/test_budget.py",),
     "parallel/fft.py": ("tests/parallel/test_fft.py",),
     "parallel/slab.py": ("tests/parallel/test_slab.py",),

@@ -15,70 +15,70 @@ from ..history.timeline import Step
 from ..job import Cylinder, Flat, Rough, Wave
 from ..physics.body import BodyMemory, Trial, surface_of
 from ..physics.budget import ErrorBudget, estimate
-from ..physics.embedded import Embedded, Look
+from ..physics.embedded import Embedded, IntegratorDifference
 from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
-from ..physics.seen import Known, Seen
 from ..physics.slopes import friction_by_energy
-from ..physics.time_error import time_error
+from ..physics.time_error import RunProperties, StepObservation, time_error
 from ..scene import Scene, Setup
 from ..solve.contact import Contact
 
 PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
-NO_LOOK = Look(0.0, 0.0)
+NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 ALIKE_STEPS = 4  # of one stage and one length, to which one look at the embedded pair applies at most; tuning
 ALIKE_VIEWS = 5  # the same of the two views of friction; odd, as steps may be quarters of a cell
 
 
 @dataclass(frozen=True)
-class LastLook:
+class LastObservation:
     """What was seen in a step of this stage and length [s]; it stands for so many steps `so_far`."""
 
     stage: float = -1.0
     dt: float = 0.0
     so_far: float = 0.0
-    seen: tuple[float, ...] = ()
+    observed: tuple[float, ...] = ()
 
-    def once_more(self, step: Step, most: int) -> "LastLook | None":
+    def once_more(self, step: Step, most: int) -> "LastObservation | None":
         """Return it with one more step for which it stands, of so many at most; None if it does not apply to one."""
         applies = (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < most
         return replace(self, so_far=self.so_far + 1.0) if applies else None
 
     @classmethod
-    def of(cls, step: Step, *seen: float) -> "LastLook":
+    def of(cls, step: Step, *observed: float) -> "LastObservation":
         """Return what was seen in a step."""
-        return cls(float(step.stage), step.dt, 1.0, seen)
+        return cls(float(step.stage), step.dt, 1.0, observed)
 
     @property
     def numbers(self) -> list[float]:
         """What a checkpoint has of it."""
-        return [self.stage, self.dt, self.so_far, *self.seen]
+        return [self.stage, self.dt, self.so_far, *self.observed]
 
     @classmethod
-    def of_numbers(cls, numbers: list[float]) -> "LastLook":
+    def of_numbers(cls, numbers: list[float]) -> "LastObservation":
         """Return the one of a checkpoint."""
-        stage, dt, so_far, *seen = numbers
-        return cls(stage, dt, so_far, tuple(seen))
+        stage, dt, so_far, *observed = numbers
+        return cls(stage, dt, so_far, tuple(observed))
 
 
 @dataclass(frozen=True)
-class Looks:
+class Observations:
     """Memory of the last looks at the embedded pair and at the two views of friction."""
 
-    pair: LastLook = LastLook()
-    views: LastLook = LastLook()
+    pair: LastObservation = LastObservation()
+    views: LastObservation = LastObservation()
 
     def entries(self) -> dict[str, Entry]:
         """Return the entries of both; a checkpoint may lack them."""
-        looks = {PAIR: self.pair, VIEWS: self.views}
-        return {name: Entry(np.array(look.numbers), optional=True) for name, look in looks.items()}
+        observations = {PAIR: self.pair, VIEWS: self.views}
+        return {name: Entry(np.array(look.numbers), optional=True) for name, look in observations.items()}
 
     @classmethod
-    def restored(cls, saved: Saved) -> "Looks":
+    def restored(cls, saved: Saved) -> "Observations":
         """Return the looks of a checkpoint; one that it does not have is followed by a new one."""
         pair, views = (
-            LastLook.of_numbers(saved[name].tolist()) if name in saved else LastLook() for name in (PAIR, VIEWS)
+            LastObservation.of_numbers(saved[name].tolist()) if name in saved else LastObservation()
+            for name in (PAIR, VIEWS)
         )
         return cls(pair, views)
 
@@ -90,7 +90,7 @@ class Estimate:
 
     budget: ErrorBudget | None
     step: float
-    looks: Looks
+    observations: Observations
 
 
 @dataclass(frozen=True)
@@ -110,18 +110,18 @@ class Solved:
     moved_start: bool | None = None
 
 
-def estimate_errors(scene: Scene, looks: Looks, solved: Solved) -> Estimate:
+def estimate_errors(scene: Scene, observations: Observations, solved: Solved) -> Estimate:
     """Return how wrong a step is; collective."""
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
     points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
     prony = None if branches is None else branches.prony
-    known = known_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
-    looks, look = _look(scene, looks, solved)
-    looks, apart = _compare_views(scene, looks, solved)
+    run = properties_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
+    observations, look = _look(scene, observations, solved)
+    observations, apart = _compare_views(scene, observations, solved)
     if measures.contact_area == 0.0:
-        still = Seen(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
-        return Estimate(None, time_error(known, still, points), looks)
-    seen = Seen(
+        still = StepObservation(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
+        return Estimate(None, time_error(run, still, points), observations)
+    observed = StepObservation(
         certificate.complementarity,
         look.difference,
         look.order,
@@ -135,51 +135,51 @@ def estimate_errors(scene: Scene, looks: Looks, solved: Solved) -> Estimate:
         look.angle,
         apart,
     )
-    return Estimate(estimate(known, seen, points), time_error(known, seen, points), looks)
+    return Estimate(estimate(run, observed, points), time_error(run, observed, points), observations)
 
 
-def _look(scene: Scene, looks: Looks, solved: Solved) -> tuple[Looks, Look]:
+def _look(scene: Scene, observations: Observations, solved: Solved) -> tuple[Observations, IntegratorDifference]:
     """Return what the pair shows of a step, or of the one like it that was looked at last; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
     branches = scene.material.branched
     if branches is None:
-        return looks, NO_LOOK
+        return observations, NO_DIFFERENCE
     pair = Embedded(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if measures.contact_area == 0.0:
-        free = pair.look_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_LOOK
-        return replace(looks, pair=LastLook()), free
-    last = looks.pair.once_more(step, ALIKE_STEPS)
+        free = pair.look_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
+        return replace(observations, pair=LastObservation()), free
+    last = observations.pair.once_more(step, ALIKE_STEPS)
     if last is None:
         load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
         look = pair.look(step.dt, trial, solved.body, contact.p, contact.u, load, measures.contact_area)
-        last = LastLook.of(step, *astuple(look))
-    return replace(looks, pair=last), Look(*last.seen)
+        last = LastObservation.of(step, *astuple(look))
+    return replace(observations, pair=last), IntegratorDifference(*last.observed)
 
 
-def _compare_views(scene: Scene, looks: Looks, solved: Solved) -> tuple[Looks, float]:
+def _compare_views(scene: Scene, observations: Observations, solved: Solved) -> tuple[Observations, float]:
     """Return by how much friction by the slopes of the rigid surface and of the body differ; collective.
 
     Of an elastic body the latter is 0.
     """
     step, measures, grid = solved.step, solved.measures, scene.choices.grid
     if scene.material.branched is None or measures.friction == 0.0:
-        return looks, max(measures.friction - measures.friction_interface, 0.0)
-    last = looks.views.once_more(step, ALIKE_VIEWS)
+        return observations, max(measures.friction - measures.friction_interface, 0.0)
+    last = observations.views.once_more(step, ALIKE_VIEWS)
     if last is None:
         direction, own = _viscous(step.velocity, measures)
         maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.boundary == "periodic"
         other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
-        last = LastLook.of(step, abs(other * scene.units.height - own))
-    return replace(looks, views=last), last.seen[0]
+        last = LastObservation.of(step, abs(other * scene.units.height - own))
+    return replace(observations, views=last), last.observed[0]
 
 
-def known_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> Known:
+def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> RunProperties:
     """Return what is known of a job before it begins, with the bound of its `folded` branches and what relaxes."""
     job = setup.job
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
     waves += [setup.shortest] if setup.shortest is not None else []
     cells = min(waves) / max(job.grid.dx, job.grid.dy) if waves else None
-    return Known(cells, 1 in job.grid.points or _ridges(job.surface), folded, exponential, prony)
+    return RunProperties(cells, 1 in job.grid.points or _ridges(job.surface), folded, exponential, prony)
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:

@@ -22,7 +22,7 @@ from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
-from .errors import Looks
+from .errors import Observations
 from .starts import Past, StartStatistics
 
 FURTHER = 2  # pressures before the earlier one that are kept for starts, of three and of four steps ago
@@ -50,7 +50,7 @@ class State:
     energy: EnergyMemory | None
     approach: float = 0.0
     starts: StartStatistics = field(default_factory=StartStatistics)
-    looks: Looks = field(default_factory=Looks)
+    observations: Observations = field(default_factory=Observations)
     errors: ErrorSums = field(default_factory=ErrorSums)
     chosen: ChosenSteps | None = None
 
@@ -129,7 +129,7 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
         numbers = state.chosen.numbers()
         found |= {name: Entry(np.array(value), 1.0, SYMBOLS[name], optional=True) for name, value in numbers.items()}
     if scene.material.branched is not None:
-        found |= state.looks.entries()
+        found |= state.observations.entries()
     if scene.choices.further_starts.on:
         found |= state.starts.entries()
     return found | state.errors.entries()
@@ -165,7 +165,7 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         energy,
         float(saved["contact/approach"]),
         StartStatistics.restored(saved),
-        Looks.restored(saved),
+        Observations.restored(saved),
         ErrorSums.restored(saved),
         None if state.chosen is None else ChosenSteps.of(scene.job, saved),
     )

@@ -39,7 +39,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     began, calls = time.perf_counter(), scene.slab.tally["operator"]
     while True:
         solved = _solve(scene, state, step)
-        errors = estimate_errors(scene, state.looks, solved)
+        errors = estimate_errors(scene, state.observations, solved)
         verdict = None if step.judge is None else step.judge(scene.slab.agree(errors.step))
         if not isinstance(verdict, Step):
             break
@@ -66,7 +66,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         energy,
         contact.d,
         state.starts.after(solved.moved_start, contact.iterations),
-        errors.looks,
+        errors.observations,
         state.errors,
         state.chosen,
     )

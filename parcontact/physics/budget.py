@@ -41,8 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .entries import Entry, Saved
-from .seen import Known, Seen, count_spots, spot_radius
-from .time_error import share_of_area, time_error
+from .time_error import RunProperties, StepObservation, count_spots, share_of_area, spot_radius, time_error
 
 SOLVER_FRICTION, SPOTS_POWER = 1.1, 0.25  # times the complementarity, over this power of the number of spots
 SOLVER_AREA, SOLVER_AREA_POWER = 0.1, 0.7  # times this power of it
@@ -95,41 +94,43 @@ class ErrorBudget:
     area: Parts
 
 
-def estimate(known: Known, seen: Seen, points: int) -> ErrorBudget:
+def estimate(run: RunProperties, observed: StepObservation, points: int) -> ErrorBudget:
     """The budget of a step on a grid of so many points."""
-    return ErrorBudget(_friction(known, seen, points) if seen.friction > 0.0 else None, _area(known, seen, points))
+    return ErrorBudget(
+        _friction(run, observed, points) if observed.friction > 0.0 else None, _area(run, observed, points)
+    )
 
 
-def estimate_steady(known: Known, seen: Seen, points: int) -> ErrorBudget:
+def estimate_steady(run: RunProperties, observed: StepObservation, points: int) -> ErrorBudget:
     """Return the budget of steady sliding, whose friction is that by energy, on a grid of so many points."""
     friction = None
-    if seen.friction > 0.0:
-        share = min(max(1.0, 4.0 / (known.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
-        mesh = BY_ENERGY * seen.views_apart / max(seen.friction, PRESSURES * seen.slope)
-        mesh += share * _by_waves(known) + _by_spots(known, seen, points)
-        solver = SOLVER_FRICTION * seen.complementarity / count_spots(known, seen, points) ** SPOTS_POWER
-        friction = Parts(solver, 0.0, known.folded, mesh)
-    return ErrorBudget(friction, replace(_area(known, seen, points), time=0.0))
+    if observed.friction > 0.0:
+        share = min(max(1.0, 4.0 / (run.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
+        mesh = BY_ENERGY * observed.views_apart / max(observed.friction, PRESSURES * observed.slope)
+        mesh += share * _by_waves(run) + _by_spots(run, observed, points)
+        solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
+        friction = Parts(solver, 0.0, run.folded, mesh)
+    return ErrorBudget(friction, replace(_area(run, observed, points), time=0.0))
 
 
-def _friction(known: Known, seen: Seen, points: int) -> Parts:
-    spots, steep = count_spots(known, seen, points), max(1.0, seen.slope / seen.friction)
-    solver = SOLVER_FRICTION * seen.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
-    noise = NOISE * max(seen.complementarity, ROUNDING) * seen.slope / seen.friction / math.sqrt(spots)
-    mesh = seen.views_apart / seen.friction + _by_waves(known) + _by_spots(known, seen, points)
-    return Parts(max(solver, noise), time_error(known, seen, points), known.folded, mesh)
+def _friction(run: RunProperties, observed: StepObservation, points: int) -> Parts:
+    spots, steep = count_spots(run, observed, points), max(1.0, observed.slope / observed.friction)
+    solver = SOLVER_FRICTION * observed.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
+    noise = NOISE * max(observed.complementarity, ROUNDING) * observed.slope / observed.friction / math.sqrt(spots)
+    mesh = observed.views_apart / observed.friction + _by_waves(run) + _by_spots(run, observed, points)
+    return Parts(max(solver, noise), time_error(run, observed, points), run.folded, mesh)
 
 
-def _by_waves(known: Known) -> float:
+def _by_waves(run: RunProperties) -> float:
     """Return the error of friction that the cells per shortest wave make."""
-    return WAVES_FRICTION * (4.0 / known.cells_per_wave) ** WAVES_ORDER if known.cells_per_wave is not None else 0.0
+    return WAVES_FRICTION * (4.0 / run.cells_per_wave) ** WAVES_ORDER if run.cells_per_wave is not None else 0.0
 
 
-def _by_spots(known: Known, seen: Seen, points: int) -> float:
+def _by_spots(run: RunProperties, observed: StepObservation, points: int) -> float:
     """Return the error of friction that the cells per radius of the spots of contact make."""
-    radius = spot_radius(seen, points)
+    radius = spot_radius(observed, points)
     one = min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
-    return (1.0 - seen.area) * one / count_spots(known, seen, points) ** SPOTS_POWER
+    return (1.0 - observed.area) * one / count_spots(run, observed, points) ** SPOTS_POWER
 
 
 def compared_with_half_mesh(
@@ -157,15 +158,15 @@ def compared_with_half_mesh(
     return ErrorBudget(found and replace(found, mesh=friction), replace(budget.area, mesh=area))
 
 
-def _area(known: Known, seen: Seen, points: int) -> Parts:
-    open_share = 1.0 - seen.area
-    solver = SOLVER_AREA * seen.complementarity**SOLVER_AREA_POWER + PENETRATING * seen.penetrating
-    mesh = STRAIGHT_EDGES * seen.correction
-    if not known.straight:
-        mesh = EDGES * seen.correction + SMALL_SPOTS * seen.correction**2
-    mesh = max(mesh, 1.0 / (points * seen.area)) if seen.area > 0.0 else mesh  # it is counted in cells
-    time = share_of_area(known, seen) * time_error(known, seen, points)
-    return Parts(solver, time, known.folded * open_share, mesh)
+def _area(run: RunProperties, observed: StepObservation, points: int) -> Parts:
+    open_share = 1.0 - observed.area
+    solver = SOLVER_AREA * observed.complementarity**SOLVER_AREA_POWER + PENETRATING * observed.penetrating
+    mesh = STRAIGHT_EDGES * observed.correction
+    if not run.straight:
+        mesh = EDGES * observed.correction + SMALL_SPOTS * observed.correction**2
+    mesh = max(mesh, 1.0 / (points * observed.area)) if observed.area > 0.0 else mesh  # it is counted in cells
+    time = share_of_area(run, observed) * time_error(run, observed, points)
+    return Parts(solver, time, run.folded * open_share, mesh)
 
 
 def weight_of(slid: float, seconds: float) -> float:

@@ -26,7 +26,7 @@ MISSED = 0.5  # of the load, by which that of a sample is off where it does not 
 
 
 @dataclass(frozen=True)
-class Look:
+class IntegratorDifference:
     """The relative difference of the pair; the rms slope along x of the surface under the pressure, in the unit of
     heights over that of lengths; the power of the length of the step with which the difference grows; the rms of what
     the displacement changes by in the step over the standard deviation of heights, both under the pressure: in full
@@ -39,7 +39,7 @@ class Look:
 
 
 class Embedded:
-    """Looks at the steps of a relaxing body on cells of length `dx`; allocates nothing."""
+    """Observations at the steps of a relaxing body on cells of length `dx`; allocates nothing."""
 
     def __init__(self, slab: Slab, material: ZenerBody, dx: float) -> None:
         self.slab, self.material, self.dx = slab, material, dx
@@ -54,27 +54,29 @@ class Embedded:
         displacement: Array,
         load: float,
         share: float,
-    ) -> Look:
+    ) -> IntegratorDifference:
         """Look at a step, with the `memory` of the body after it: the solver's pressure, whose sum over all ranks is
         `load`, on a `share` of the points, and displacement, `A p/alpha`; one message, or two; collective."""
         seen, *sums = self._add(dt, trial, memory, pressure, displacement, self.stride(share))
         if abs(self.stride(share) * seen - load) > MISSED * load:
             seen, *sums = self._add(dt, trial, memory, pressure, displacement, 1)
         if seen <= 0.0:
-            return Look(0.0, 0.0)
+            return IntegratorDifference(0.0, 0.0)
         apart, size, rise, height, square, turned = sums
         slope = math.sqrt(rise / seen) / (2.0 * self.dx)
         variance = square / seen - (height / seen) ** 2
         angle = math.sqrt(turned / seen / variance) if variance > LEAST_VARIANCE * square / seen else 0.0
         order = self._difference(dt, trial.alpha)[2]
-        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, angle)
+        return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, angle)
 
-    def look_without_load(self, dt: float, trial: Trial, memory: BodyMemory) -> Look:
+    def look_without_load(self, dt: float, trial: Trial, memory: BodyMemory) -> IntegratorDifference:
         """Look at a step in which nothing presses, with the `memory` of the body after it: the difference over the
         displacement, both as rms; collective."""
         u = surface_of(memory)
         _, apart, size, *_ = self._add(dt, trial, memory, np.ones_like(u), u, self.stride(1.0))
-        return Look(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._difference(dt, trial.alpha)[2])
+        return IntegratorDifference(
+            math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._difference(dt, trial.alpha)[2]
+        )
 
     def stride(self, share: float) -> int:
         """From one sampled row to the next, where that share of the points is in contact."""

@@ -29,11 +29,15 @@ Backward Euler is of the first order, its error goes with the root of the differ
 more and now by less than none, has a share of the error of friction: less where little is open.
 """
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
+from .measures import SIDE
 from .prony import Prony
-from .seen import Known, Seen, radius_of
 
+ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
 PASSING_FRICTION = 0.66  # times the share of the radius of a spot that a step is, and what forces are late by
 PASSING_LOSS = 0.19  # times that share: by what the loss is wrong
 FULL_LOSS = 1.0 / 8.0  # times the square of the angle by which waves turn in a step: short ones weigh more in friction
@@ -50,34 +54,98 @@ EXPONENTIAL_AREA, EXPONENTIAL_OPEN_POWER = 0.21, 1.0 / 3.0  # of the error of fr
 EULER_AREA, EULER_OPEN_POWER = 0.18, 2.0  # of it, times this power of it, and more by what the corrected area is less
 
 
-def time_error(known: Known, seen: Seen, points: int) -> float:
+@dataclass(frozen=True)
+class RunProperties:
+    """What is known of a run before it begins.
+
+    `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
+    column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator; `prony`: what
+    relaxes, None of an elastic body.
+    """
+
+    cells_per_wave: float | None
+    straight: bool
+    folded: float
+    exponential: bool
+    prony: Prony | None = None
+
+
+@dataclass(frozen=True)
+class StepObservation:
+    """What a step has shown: the certificate's complementarity; by how much the embedded pair differs, with its order
+    in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
+    shares; by how many cells the surface slid in it, in how many seconds; the points that penetrate without pressure,
+    as a share of those in contact; by what angle a wave turned that is as high as the surface under the pressure
+    and changes as much; by how much friction by the slopes of the rigid surface and of the body differ."""
+
+    complementarity: float
+    difference: float
+    order: float
+    slope: float
+    friction: float
+    area: float
+    corrected: float
+    slid: float = 0.0
+    seconds: float = 0.0
+    penetrating: float = 0.0
+    angle: float = 0.0
+    views_apart: float = 0.0
+
+    @property
+    def correction(self) -> float:
+        """By how much the counted area is more than the corrected one, over that."""
+        return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
+
+
+def spot_radius(observed: StepObservation, points: int) -> float:
+    """Of round spots of contact, or of the gaps between them where these are the smaller, in cells; infinite where
+    there are no edges."""
+    sides = (observed.area - observed.corrected) * points / SIDE
+    return ROUND * min(observed.area, 1.0 - observed.area) * points / sides if sides > 0.0 else math.inf
+
+
+def radius_of(run: RunProperties, observed: StepObservation, points: int) -> float:
+    """Of spots, or half the width of a straight one."""
+    return spot_radius(observed, points) / (ROUND if run.straight else 1.0)
+
+
+def count_spots(run: RunProperties, observed: StepObservation, points: int) -> float:
+    """How many spots of contact there are; in full contact as many as half waves of the shortest length."""
+    radius = radius_of(run, observed, points)
+    if run.cells_per_wave is not None:
+        radius = min(radius, 0.5 * run.cells_per_wave)
+    one = 2.0 * radius if run.straight else math.pi * radius**2
+    return max(1.0, observed.area * points / one) if one > 0.0 else 1.0
+
+
+def time_error(run: RunProperties, observed: StepObservation, points: int) -> float:
     """What the length of a step adds to the error of friction, or would where something slides.
 
     In contacts the error of the exponential integrator goes with the power TIME_ORDER of the step, the difference of
     the pair with `order`.
     """
-    if not known.exponential:
-        return EULER_FRICTION * seen.difference**0.5
-    power = max(LEAST_POWER, TIME_ORDER / max(seen.order, 1.0) - 1.0)
-    fixed = 1.0 - FIXED_EDGES * seen.area**2
-    pair = fixed * EXPONENTIAL_FRICTION * seen.difference * (seen.difference / EQUAL_DIFFERENCE) ** power
-    if not seen.slid or known.prony is None:
+    if not run.exponential:
+        return EULER_FRICTION * observed.difference**0.5
+    power = max(LEAST_POWER, TIME_ORDER / max(observed.order, 1.0) - 1.0)
+    fixed = 1.0 - FIXED_EDGES * observed.area**2
+    pair = fixed * EXPONENTIAL_FRICTION * observed.difference * (observed.difference / EQUAL_DIFFERENCE) ** power
+    if not observed.slid or run.prony is None:
         return pair
-    full = seen.area**FULL_POWER
-    sliding = (1.0 - full) * _passing(known, known.prony, seen, points) + full * _turning(known.prony, seen)
+    full = observed.area**FULL_POWER
+    sliding = (1.0 - full) * _passing(run, run.prony, observed, points) + full * _turning(run.prony, observed)
     return max(sliding, (full + (1.0 - full) * PAIR_SHARE) * pair)
 
 
-def _passing(known: Known, prony: Prony, seen: Seen, points: int) -> float:
+def _passing(run: RunProperties, prony: Prony, observed: StepObservation, points: int) -> float:
     """Of friction, as edges of contact pass a point within a step: of a share x of the radius of spots."""
-    radius = radius_of(known, seen, points)
-    x = seen.slid / radius if radius > 0.0 else 0.0
-    return PASSING_FRICTION * x * (_late(prony, x, seen.seconds) + PASSING_LOSS * x)
+    radius = radius_of(run, observed, points)
+    x = observed.slid / radius if radius > 0.0 else 0.0
+    return PASSING_FRICTION * x * (_late(prony, x, observed.seconds) + PASSING_LOSS * x)
 
 
-def _turning(prony: Prony, seen: Seen) -> float:
+def _turning(prony: Prony, observed: StepObservation) -> float:
     """Of friction in full contact, as waves of the surface turn by an angle within a step."""
-    return FULL_LOSS * seen.angle**2 * (1.0 + _late(prony, seen.angle, seen.seconds))
+    return FULL_LOSS * observed.angle**2 * (1.0 + _late(prony, observed.angle, observed.seconds))
 
 
 def _late(prony: Prony, angle: float, seconds: float) -> float:
@@ -90,9 +158,9 @@ def _late(prony: Prony, angle: float, seconds: float) -> float:
     return float((lost * late).sum()) / total if total > 0.0 else 0.0
 
 
-def share_of_area(known: Known, seen: Seen) -> float:
+def share_of_area(run: RunProperties, observed: StepObservation) -> float:
     """What the error of area by the time steps is of that of friction."""
-    open_share = 1.0 - seen.area
-    if known.exponential:
+    open_share = 1.0 - observed.area
+    if run.exponential:
         return EXPONENTIAL_AREA * open_share**EXPONENTIAL_OPEN_POWER
-    return EULER_AREA * open_share**EULER_OPEN_POWER + seen.correction
+    return EULER_AREA * open_share**EULER_OPEN_POWER + observed.correction

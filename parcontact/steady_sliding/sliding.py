@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError
-from ..march.errors import known_of
+from ..march.errors import properties_of
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab, deal
 from ..physics.budget import ErrorBudget, estimate_steady
@@ -18,7 +18,7 @@ from ..physics.convolution import PARTS, Convolution, wavenumbers
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..physics.prony import Prony
-from ..physics.seen import Seen
+from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
 from ..solve.certificate import Certificate
@@ -87,7 +87,7 @@ class SteadySliding:
         finest, *coarser = nested.levels_of(setup.slab, heights)
         self.levels = [Level(setup.slab, setup.fft, finest.heights)]
         self.levels += [Level(level.slab, FFT(level.slab), level.heights) for level in coarser]
-        self._known = known_of(setup, 0.0, True, None)
+        self._known = properties_of(setup, 0.0, True, None)
         self.contact: SteadyContact | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
         self.temperature = math.nan
@@ -137,7 +137,7 @@ class SteadySliding:
         load, rise = setup.slab.sum(*slope_under(contact.p, self.levels[0].heights))
         slopes = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / (speed * measures.normal_force)
         friction = by_energy + measures.friction_interface
-        seen = Seen(
+        seen = StepObservation(
             contact.certificate.complementarity,
             difference=0.0,
             order=2.0,

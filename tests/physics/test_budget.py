@@ -9,20 +9,19 @@ import pytest
 from parcontact.physics.budget import ErrorBudget, ErrorSums, estimate, estimate_steady
 from parcontact.physics.measures import SIDE
 from parcontact.physics.prony import Prony
-from parcontact.physics.seen import Known, Seen, count_spots, spot_radius
-from parcontact.physics.time_error import time_error
+from parcontact.physics.time_error import RunProperties, StepObservation, count_spots, spot_radius, time_error
 
-KNOWN = Known(8.0, False, 1e-4, True)
-SEEN = Seen(1e-3, 4e-4, 2.0, 0.02, 0.02, 0.1, 0.095)
+KNOWN = RunProperties(8.0, False, 1e-4, True)
+SEEN = StepObservation(1e-3, 4e-4, 2.0, 0.02, 0.02, 0.1, 0.095)
 MESH = 0.25 / 19 + 0.6 / 19**2  # of the area of SEEN, corrected by a 19th
 
 
-def spots(seen: Seen, points: int) -> float:
+def spots(seen: StepObservation, points: int) -> float:
     """As many as there are, of the radius of a spot, in the contact."""
     return max(1.0, seen.area * points / (math.pi * min(spot_radius(seen, points), 4.0) ** 2))
 
 
-def by_spots(seen: Seen, points: int) -> float:
+def by_spots(seen: StepObservation, points: int) -> float:
     """What the cells per radius of the spots make, of the share that is open, averaged over the spots."""
     one = 0.13 / spot_radius(seen, points) ** 2.3
     return (1.0 - seen.area) * one / spots(seen, points) ** 0.25
@@ -59,7 +58,7 @@ def test_area_has_no_error_of_time_in_full_contact(exponential: bool) -> None:
 
 
 def test_backward_euler_is_of_the_first_order() -> None:
-    budget = estimate(Known(8.0, False, 0.0, False), SEEN, 10_000)
+    budget = estimate(RunProperties(8.0, False, 0.0, False), SEEN, 10_000)
     assert budget.friction is not None
     assert budget.friction.time == pytest.approx(1.1 * 0.02)
     assert budget.area.time == pytest.approx(1.1 * 0.02 * (0.18 * 0.9**2 + 0.005 / 0.095))
@@ -68,22 +67,22 @@ def test_backward_euler_is_of_the_first_order() -> None:
 def test_little_friction_counts_more() -> None:
     """A quarter of the slope's friction: twice the relative error; none at all: no budget."""
     one = estimate(KNOWN, SEEN, 10_000).friction
-    other = estimate(KNOWN, Seen(1e-3, 4e-4, 2.0, 0.08, 0.02, 0.1, 0.095), 10_000).friction
+    other = estimate(KNOWN, StepObservation(1e-3, 4e-4, 2.0, 0.08, 0.02, 0.1, 0.095), 10_000).friction
     assert one is not None
     assert other is not None
     assert other.solver == pytest.approx(2 * one.solver)
     assert (other.time, other.folded, other.mesh) == (one.time, one.folded, one.mesh)
-    assert estimate(KNOWN, Seen(1e-3, 4e-4, 2.0, 0.08, 0.0, 0.1, 0.095), 10_000).friction is None
+    assert estimate(KNOWN, StepObservation(1e-3, 4e-4, 2.0, 0.08, 0.0, 0.1, 0.095), 10_000).friction is None
 
 
 def test_radius_of_a_spot() -> None:
     """Of a circle of ten cells: pi r^2 cells and 8 r sides; of one hole in full contact the same."""
     points, cells, sides = 10_000, 100 * math.pi, 80
-    spot = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
-    hole = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1 - cells / points, 1 - (cells + SIDE * sides) / points)
+    spot = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
+    hole = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1 - cells / points, 1 - (cells + SIDE * sides) / points)
     assert spot_radius(spot, points) == pytest.approx(10.0)
     assert spot_radius(hole, points) == pytest.approx(10.0)
-    assert spot_radius(Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
+    assert spot_radius(StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
 
 
 def test_points_that_penetrate_are_missing_in_the_area() -> None:
@@ -96,10 +95,10 @@ def test_points_that_penetrate_are_missing_in_the_area() -> None:
 def test_spots_are_counted() -> None:
     """Four circles of ten cells; three strips of forty; in full contact those of half the shortest wave."""
     points, cells, sides = 10_000, 400 * math.pi, 4 * 80
-    four = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
-    strips = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 120 / 300, (120 - SIDE * 6) / 300)
-    full = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0)
-    bare = Known(None, False, 0.0, True)
+    four = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
+    strips = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 120 / 300, (120 - SIDE * 6) / 300)
+    full = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0)
+    bare = RunProperties(None, False, 0.0, True)
     assert count_spots(bare, four, points) == pytest.approx(4.0)
     assert count_spots(replace(bare, straight=True), strips, 300) == pytest.approx(3.0)
     assert count_spots(KNOWN, full, points) == pytest.approx(points / (16 * math.pi))
@@ -115,7 +114,7 @@ def test_spots_that_pass_within_a_step() -> None:
     """Of the module of `time_error`: a circle of ten cells passes by one; a branch that is as fast as the step, one far
     slower, one far faster. Where the pair shows more, three tenths of that count, all of it where nothing slides."""
     points, cells, dt = 10_000, 100 * math.pi, 1e-3
-    seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * 80) / points, 1.0, dt)
+    seen = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * 80) / points, 1.0, dt)
     edges = 1.0 - seen.area**4
     for tau, share in ((dt, late(1.0)), (1e6 * dt, 0.0), (1e-6 * dt, 1.0)):
         known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([tau])))
@@ -129,7 +128,7 @@ def test_branches_count_by_the_friction_they_make() -> None:
     """Of the module of `time_error`: w = G omega tau/(1 + (omega tau)^2), for spots that pass and for waves."""
     dt, moduli, times = 1e-3, np.array([1e6, 3e6]), np.array([1e-3, 1e-4])
     known = replace(KNOWN, prony=Prony(1e5, moduli, times))
-    spot = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 0.1, 0.08, 1.0, dt)
+    spot = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 0.1, 0.08, 1.0, dt)
     x = 1.0 / spot_radius(spot, 10_000)
 
     def mean(angle: float) -> float:
@@ -156,7 +155,7 @@ def test_waves_that_turn_within_a_step(z: float) -> None:
     is two thirds of the estimate: short waves weigh more in friction than in what is seen of them."""
     dt, angle = 1e-3, 0.01
     known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([dt / z])))
-    seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0, 1.0, dt, angle=angle)
+    seen = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0, 1.0, dt, angle=angle)
     share = late(z) if z > 0.1 else z / 6.0
     found = time_error(known, seen, 100)
     assert found == pytest.approx(angle**2 / 8.0 * (1.0 + share), rel=1e-6)
@@ -170,7 +169,7 @@ def test_waves_that_turn_within_a_step(z: float) -> None:
 def test_nearly_full_contact_has_edges_and_waves() -> None:
     """Of a branch that is far slower than the step; the pair counts by three tenths of what has edges, and the rest."""
     known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([1e3])))
-    seen = Seen(0.0, 0.0, 2.0, 0.0, 0.1, 0.8, 0.75, 1.0, 1e-3, angle=0.2)
+    seen = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 0.8, 0.75, 1.0, 1e-3, angle=0.2)
     full, share = 0.8**4, 1.0 / spot_radius(seen, 10_000)
     passing, turning = 0.66 * 0.19 * share**2, 0.2**2 / 8.0
     found = time_error(known, seen, 10_000)
@@ -184,8 +183,8 @@ def test_summary() -> None:
     """Without a slide means over time, of friction in proportion to it; in sentences."""
     summary = ErrorSums()
     summary = summary.plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0)
-    summary = summary.plus(estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
-    summary = summary.plus(estimate(KNOWN, Seen(5e-3, 0.0, 2.0, 0.02, 0.0, 0.1, 0.1), 10_000), 0.0, 1.0)
+    summary = summary.plus(estimate(KNOWN, StepObservation(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0)
+    summary = summary.plus(estimate(KNOWN, StepObservation(5e-3, 0.0, 2.0, 0.02, 0.0, 0.1, 0.1), 10_000), 0.0, 1.0)
     assert summary.friction is not None
     assert summary.area is not None
     one = 1.1e-3 / spots(SEEN, 10_000) ** 0.25
@@ -205,7 +204,7 @@ def test_summary() -> None:
 def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
     """A slide of 1 mm, then an hour at rest under other errors: the slide's, but for nothing."""
     summary, slide = ErrorSums(), estimate(KNOWN, SEEN, 10_000)
-    rest = estimate(KNOWN, Seen(5e-2, 0.1, 2.0, 0.02, 0.01, 0.1, 0.05), 10_000)
+    rest = estimate(KNOWN, StepObservation(5e-2, 0.1, 2.0, 0.02, 0.01, 0.1, 0.05), 10_000)
     summary = summary.plus(rest, 0.0, 1e-3)
     summary = summary.plus(slide, 0.02, 1e-2, slid=1e-3)
     summary = summary.plus(rest, 0.01, 3600.0)
@@ -221,7 +220,7 @@ def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
 def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
     """Pressures wrong by 1e-3 on slopes of 0.02 may have tangential forces of 0.4 of 2e-5 of the load where there is
     one spot, by the root of their number less where there are more."""
-    seen = Seen(1e-3, 4e-4, 2.0, 0.02, friction, 0.1, 0.095)
+    seen = StepObservation(1e-3, 4e-4, 2.0, 0.02, friction, 0.1, 0.095)
     budget = estimate(KNOWN, seen, 10_000).friction
     assert budget is not None
     assert budget.solver * friction == pytest.approx(0.4 * 2e-5 / spots(seen, 10_000) ** 0.5)
@@ -275,7 +274,7 @@ def test_summary_goes_on() -> None:
     """From the entries of another, as if there had been one; as plain data it has parts that add up."""
     other = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
     on = ErrorSums.restored({name: np.asarray(entry.value) for name, entry in other.entries().items()})
-    step = estimate(KNOWN, Seen(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0, 2e-4
+    step = estimate(KNOWN, StepObservation(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0, 2e-4
     assert on.plus(*step).facts(0.01) == other.plus(*step).facts(0.01)
     friction = on.facts(0.01)["friction"]
     assert friction.pop("total") == pytest.approx(sum(friction.values()))
@@ -286,10 +285,12 @@ def test_steps_that_last_no_time_count_where_none_does() -> None:
     """Three loads without duration: their mean; beside a step that lasts they are nothing."""
     summary = ErrorSums()
     for complementarity in (1e-3, 2e-3, 6e-3):
-        summary = summary.plus(estimate(KNOWN, Seen(complementarity, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0)
+        summary = summary.plus(
+            estimate(KNOWN, StepObservation(complementarity, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 0.0
+        )
     assert summary.friction is None
     assert summary.area is not None
     assert summary.area.solver == pytest.approx(0.1 * (1e-3**0.7 + 2e-3**0.7 + 6e-3**0.7) / 3)
-    area = summary.plus(estimate(KNOWN, Seen(8e-3, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9).area
+    area = summary.plus(estimate(KNOWN, StepObservation(8e-3, 0.0, 2.0, 0.0, 0.0, 0.1, 0.1), 10_000), 0.0, 1e-9).area
     assert area is not None
     assert area.solver == pytest.approx(0.1 * 8e-3**0.7)

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import scene
-from parcontact.march.errors import known_of
+from parcontact.march.errors import properties_of
 from parcontact.parallel.slab import Slab
 from parcontact.scene import sanity
 
@@ -36,7 +36,7 @@ def saved(path: Path, surface: dict[str, Any], points: int) -> dict[str, Any]:
 
 
 def cells(setup: scene.Setup) -> float:
-    found = known_of(setup, 0.0, True, None).cells_per_wave
+    found = properties_of(setup, 0.0, True, None).cells_per_wave
     assert found is not None
     return found
 
