@@ -24,10 +24,10 @@ from .slab import Array, Slab, allocate, deal, dealt_to, reused
 from .transpose import Leg, count_legs, legs_of, wire_points
 
 Spectrum = NDArray[np.complexfloating]
-BLOCK_BYTES = 1 << 19  # of one block of transformed rows, or columns, at most: fits a usual second-level cache
-LINE = 8  # wavenumbers in single precision in a cache line
-NARROWEST = 16  # columns in a block, which takes more than that where columns are very long
-LEAST_BYTES = 4 << 20  # of a spectrum that is worth blocks of columns: a usual last-level cache keeps a smaller one
+BLOCK_BYTES = 1 << 19  # tuning: of one block of transformed rows, or columns, at most: fits a usual second-level cache
+LINE = 8  # tuning: wavenumbers in single precision in a cache line
+NARROWEST = 16  # tuning: columns in a block, which takes more than that where columns are very long
+LEAST_BYTES = 4 << 20  # tuning: of a spectrum worth blocks of columns; a usual last-level cache keeps a smaller one
 SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
 
 
@@ -222,7 +222,7 @@ class FFT:
         return self._wave_block[: rows.stop - rows.start] if self._wave_block.size else self.spectrum[rows]
 
     def _direct(self, rows: Array, alignment: int) -> bool:
-        """Whether a transform can take these rows of a map as they are."""
+        """True if a transform can take these rows of a map as they are."""
         fits = rows.shape[1] == self.mx and rows.dtype == self.dtype and rows.flags.c_contiguous
         return fits and pyfftw.is_byte_aligned(rows, alignment)
 

@@ -11,7 +11,7 @@ INTERFACES = "pyfftw.interfaces"
 
 
 def _interfaces(name: str) -> ModuleType:
-    """What `pyfftw` does not find: its interfaces, imported now."""
+    """Import the interfaces, which `pyfftw` does not find."""
     if name == "interfaces":
         return importlib.import_module(INTERFACES)
     raise AttributeError(f"module 'pyfftw' has no attribute {name!r}")

@@ -19,7 +19,7 @@ class Groups:
 
     @property
     def root(self) -> bool:
-        """Whether this is the rank that speaks for all of them."""
+        """True on the rank that speaks for all of them."""
         return self.everyone.rank == 0
 
     def agree(self, value: T) -> T:

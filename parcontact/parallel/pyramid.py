@@ -17,7 +17,7 @@ from .regrid import fetch
 from .rows import RowsBeside
 from .slab import Slab, dealt_to
 
-FEW = 8  # times fewer cells than a rank has points: then every rank has all cells
+FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
 
 
 def steps_of(slab: Slab) -> list["Step"]:

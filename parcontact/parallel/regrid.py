@@ -6,7 +6,7 @@ import numpy as np
 
 from .slab import Array, Slab
 
-COARSEST = 32  # points: there is no coarser grid
+COARSEST = 32  # tuning: points: there is no coarser grid
 
 
 def coarser(slab: Slab) -> Slab | None:

@@ -1,4 +1,4 @@
-"""What root alone does, and every rank learns: its result, or the exception that it ended with."""
+"""Work that root alone does, and whose result, or exception, every rank learns."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def on_root(comm: MPI.Intracomm, act: Callable[[], T]) -> T:
-    """What root's `act` gives or raises, on every rank; collective.
+    """Return or raise on every rank what `act` does on root; collective.
 
     Of an exception that no other process can be sent, the others get a RunError with its text.
     """

@@ -27,5 +27,5 @@ class Tally(Counter[str]):
         weakref.finalize(owner, self.subtract, {"map bytes": array.nbytes}).atexit = False
 
     def since(self, earlier: Counter[str]) -> dict[str, int]:
-        """What was counted after `earlier = tally.copy()`."""
+        """Return the counts since `earlier = tally.copy()`."""
         return {name: count - earlier[name] for name, count in self.items() if count != earlier[name]}

@@ -12,7 +12,7 @@ from .mpi import MPI
 from .slab import Slab
 
 Waves = NDArray[np.complexfloating]
-LEGS = 4  # of an exchange, where the rows of a rank have as many times LEG_BYTES
+LEGS = 4  # tuning: of an exchange, where the rows of a rank have as many times LEG_BYTES
 LEG_BYTES = 1 << 19
 
 

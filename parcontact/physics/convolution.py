@@ -10,7 +10,7 @@ from ..parallel.fftw import pyfftw
 from ..parallel.slab import Array, deal
 
 ALL = slice(None)
-PARTS = 16  # of a spectrum, for which something is calculated at once: what it takes is small beside the whole
+PARTS = 16  # tuning: of a spectrum, for which something is calculated at once: what it takes is small beside the whole
 
 
 class Convolution:

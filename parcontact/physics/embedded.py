@@ -20,9 +20,9 @@ from ..parallel.slab import Array, Slab
 from . import loops
 from .body import BodyMemory, Trial, ZenerBody, coefficients, surface_of
 
-SAMPLED_ROWS = 8  # at least, of a map with as many: the difference is then within some 5 % of that on all rows
-LEAST_VARIANCE = 1e-6  # of heights, over their mean square: less is rounding
-MISSED = 0.5  # of the load, by which that of a sample is off where it does not stand for all rows
+SAMPLED_ROWS = 8  # accuracy: at least, if a map has as many: the difference is then within 5 % of that on all rows
+LEAST_VARIANCE = 1e-6  # accuracy: of heights, over their mean square: less is rounding
+MISSED = 0.5  # accuracy: of the load, by which that of a sample is off where it does not stand for all rows
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Embedded:
         return self.slab.sum(*loops.embedded(*maps, *trial.heights.parts, -self.slab.rows.start % stride, stride))
 
     def _difference(self, dt: float, alpha: float) -> tuple[Array, float, float]:
-        """What h_k and du weigh in e, over alpha, and the order of the latter's part; those of the last dt are kept."""
+        """The weights of h_k and du in e, over alpha, and the order of the latter; those of the last dt are kept."""
         if self._apart is None or self._apart[0] != dt:
             material = self.material
             decay, gain = self._pair(dt)
@@ -106,7 +106,7 @@ class Embedded:
         return decay, gain
 
     def _order(self, dt: float, gain: float) -> float:
-        """Of `gain du` in dt, du being proportional to dt: 2 where all branches are slow, 1 where some are as fast as
-        the step is short, however short it is."""
+        """The order of `gain du` in dt, du being proportional to dt: 2 where all branches are slow, 1 where some are as
+        fast as the step is short, however short it is."""
         shorter = float(self._pair(0.5 * dt)[1][self.material.moving].sum())
         return 1.0 + math.log2(gain / shorter) if dt > 0.0 and gain > 0.0 and shorter > 0.0 else 2.0

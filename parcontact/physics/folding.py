@@ -50,9 +50,9 @@ from ..parallel.slab import Array
 from .body import coefficients
 from .prony import Integrator, Prony, complex_modulus, relaxation
 
-LENGTHS, DIRECTIONS = 13, 64  # of a band that are looked at
-PER_DECADE = 4  # lengths of growing steps that are looked at
-MEMORYLESS_SHARE = 0.5  # of the error is for memoryless branches: which they are must not depend on how long a job is
+LENGTHS, DIRECTIONS = 13, 64  # accuracy: of a band that are looked at
+PER_DECADE = 4  # accuracy: lengths of growing steps that are looked at
+MEMORYLESS_SHARE = 0.5  # tuning: of the error for memoryless branches, which must not depend on how long a job is
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Band:
 
 @dataclass(frozen=True)
 class FoldedBranches:
-    """What becomes of each branch, by its number in the material; plain data.
+    """The role of each branch, by its number in the material; plain data.
 
     `bound` is the largest relative error of friction (where the body rests: of the modulus) that all folded branches
     make together, at most `allowed`. `memoryless_errors` and `frozen_errors` are what each branch would add to it.
@@ -190,7 +190,7 @@ def _errors(
 
 @dataclass(frozen=True)
 class _Past:
-    """What the waves of a band have gone through so far, shape (lengths, directions).
+    """History of the waves of a band so far, shape (lengths, directions).
 
     `omega` [rad/s] is the frequency at which they pass now; `seen` [s] is what the integral of a wave's u is at most;
     `held` [Pa], with an axis of branches, is what |h/u| is at most.
@@ -212,7 +212,7 @@ class _Waves:
     ky: Array
 
     def errors(self, phases: Sequence[Phase], start: tuple[float, float] | None) -> Iterator[tuple[Array, Array]]:
-        """Of each branch in each phase, as a memoryless and as a frozen one; as `fold_branches` says."""
+        """The error of each branch in each phase, as a memoryless and as a frozen one; as `fold_branches` says."""
         past = self.before(start)
         for phase in phases:
             as_memoryless: Array = np.zeros(self.prony.moduli.size)
@@ -244,13 +244,13 @@ class _Waves:
         return _Past(omega, held, seen, past.time + phase.duration)
 
     def memoryless_error(self, past: _Past, phase: Phase) -> Array:
-        """What a step of the phase may be wrong by without what a branch remembers."""
+        """The largest error of a step of the phase without the memory of a branch."""
         omega, held = self.frequency(phase.velocity), self.most(past, phase)
         return np.max([self.share(omega, self.step(dt)[0] * held, self.modulus(dt)) for dt in phase.steps], axis=0)
 
     @np.errstate(over="ignore")  # infinitely many relaxation times are all right
     def frozen_error(self, past: _Past) -> Array:
-        """What a branch has relaxed by."""
+        """The error of a branch that has relaxed."""
         tau = self.prony.relaxation_times
         relaxed = -np.expm1(-past.time / tau)
         wrong = self.prony.moduli * np.minimum(past.seen[..., None] / tau, relaxed)

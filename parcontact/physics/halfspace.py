@@ -93,7 +93,7 @@ class HalfSpace:
         return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
-        """Of the transform that an operator makes for itself on so many points; None where it uses that of the maps."""
+        """Lengths of the transform of an operator of its own on so many points; None where it uses that of the maps."""
         return padded_lengths(*points) if self.free else None
 
     def operator(self, fft: FFT) -> Convolution:

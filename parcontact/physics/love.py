@@ -14,7 +14,7 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Array
 from .convolution import ALL, wavenumbers
 
-NEAR = 4.0  # cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
+NEAR = 4.0  # accuracy: cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
 GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.legendre.leggauss(6))
 
 

@@ -10,13 +10,13 @@ from ..parallel.fft import FFT, Spectrum
 
 
 def shape_of(waves: tuple[int, int], lengths: tuple[int, int], columns: slice) -> tuple[int, int]:
-    """Of the lowest waves, those of at most `waves` in the box along x and y, among the columns of a rank."""
+    """Return the shape of the lowest waves, at most `waves` in the box along x and y, among the columns of a rank."""
     count = min(waves[0], lengths[0] // 2) + 1
     return min(2 * waves[1] + 1, lengths[1]), max(0, min(count, columns.stop) - columns.start)
 
 
 def rows_of(count: int, my: int) -> NDArray[np.int64]:
-    """Which rows of a spectrum of `my` the lowest `count` are."""
+    """Return the rows of a spectrum of `my` that are the lowest `count`."""
     return np.concatenate([np.arange((count + 1) // 2), np.arange(my - count // 2, my)])
 
 

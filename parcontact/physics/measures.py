@@ -1,9 +1,9 @@
-"""What one instant of a contact is in numbers; it loads nothing, so that tables are read at once."""
+"""Measures of one instant of a contact; the module loads nothing, so that tables are read at once."""
 
 import math
 from dataclasses import astuple, dataclass
 
-SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # cells counted too many per side of a cell on the edge of contact
+SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per side of a cell on the edge of contact
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Measures:
 
     @property
     def finite(self) -> bool:
-        """Whether all of them are numbers."""
+        """True if all of them are finite."""
         return all(map(math.isfinite, astuple(self)))
 
     @property

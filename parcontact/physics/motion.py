@@ -7,7 +7,7 @@ from .body import Heights
 from .surface import Surface
 
 Vector = tuple[float, float]
-PARTS = 10**9  # of a cell: nearer positions are the same, as those whole cells apart are but for their rounding
+PARTS = 10**9  # accuracy: of a cell: nearer positions are the same but for rounding, as those whole cells apart
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
@@ -16,7 +16,7 @@ def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
 
 
 def are_whole(cells: Vector) -> bool:
-    """Whether a displacement is one of whole cells."""
+    """True for a displacement of whole cells."""
     return all(abs(moved - round(moved)) <= SAME_PLACE for moved in cells)
 
 

@@ -18,9 +18,9 @@ from ..parallel.slab import Array
 from .convolution import wavenumbers
 from .lowest import rows_of
 
-BEYOND = 0.01  # of the mean square slope, to which friction is in proportion: waves that are shorter do not count
-BIN = 0.01  # of the logarithm of a wavenumber: a shortest wave is known to half of that
-EDGE = 1.0 - 1e-9  # wavenumbers equal to a limit up to round-off are taken as equal to it
+BEYOND = 0.01  # accuracy: of the mean square slope, to which friction is proportional: shorter waves do not count
+BIN = 0.01  # accuracy: of the logarithm of a wavenumber: a shortest wave is known to half of that
+EDGE = 1.0 - 1e-9  # accuracy: wavenumbers equal to a limit up to round-off are taken as equal to it
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Roughness:
         return np.asarray(waves * (self._amplitude(square_height, square_slope, size) * fft.mx * fft.my))
 
     def _amplitude(self, square_height: float, square_slope: float, size: tuple[float, float]) -> float:
-        """What a surface of C = area 1 m^4, whose mean squares are given, is multiplied with."""
+        """The factor of a surface of C = area 1 m^4 with the given mean squares."""
         if self.rms_slope is not None:
             return float(self.rms_slope / np.sqrt(square_slope))
         if self.rms_height is not None:
@@ -73,7 +73,7 @@ class Roughness:
         raise ValueError("one of rms_slope, rms_height and psd_constant is needed")
 
     def _key(self, index_x: int) -> list[int]:
-        """Of the stream of the waves with one wavenumber along x; a seed of more than 64 bits is hashed with it."""
+        """Seed of the waves with one wavenumber along x; a seed of more than 64 bits is hashed with it."""
         if self.seed < 2**64:
             return [self.seed, index_x]
         return np.random.SeedSequence([self.seed, index_x]).generate_state(2, np.uint64).tolist()
@@ -117,7 +117,7 @@ class Moments:
 
     @property
     def rms_slope(self) -> float:
-        """Of the gradient's length, both directions together."""
+        """The rms of the gradient's length, both directions together."""
         return float(np.sqrt(2.0 * self.m2))
 
     @property

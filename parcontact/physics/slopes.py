@@ -21,7 +21,7 @@ from ..compiled import loop
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 
-WIDTH = 4  # points on each side of a difference
+WIDTH = 4  # accuracy: points on each side of a difference
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 
 

@@ -123,7 +123,7 @@ class Surface:
 
     @cached_property
     def _slope_symbols(self) -> tuple[Array, Array]:
-        """What stands for the wavenumber in a slope; 0 at the Nyquist wavenumber, whose slope vanishes on the grid."""
+        """Symbols in place of the wavenumber in a slope; 0 at that of Nyquist, whose slope vanishes on the grid."""
         symbols = []
         for (q, nyquist), step in zip(self._wavenumbers, self.cell, strict=True):
             symbol = np.sin(q * step) / step if self.differences else q.copy()

@@ -26,5 +26,5 @@ class Units:
 
     @property
     def pressure(self) -> float:
-        """Of pressures [Pa]: what moves the half space by `height` over `length`."""
+        """Unit of pressures [Pa]: one that moves the half space by `height` over `length`."""
         return self.modulus * self.height / self.length

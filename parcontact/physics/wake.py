@@ -20,10 +20,10 @@ from .prony import CreepSpectrum
 
 Vector = tuple[float, float]
 GAUSS = np.polynomial.legendre.leggauss(6)
-LOCAL = 1e-4  # a creep length below this share of a cell is taken as 0: the body has crept before it has moved
-NEAR = 2.0  # cells: closer than this the edge of the loaded cell is felt
-FAR = 16.0  # cells: from here on two terms of the expansion in the size of the cell are good to 1e-7
-DECAYED = 40.0  # creep lengths after which the memory is over, exp(-40)
+LOCAL = 1e-4  # accuracy: a creep length below this share of a cell is 0: the body has crept before it has moved
+NEAR = 2.0  # accuracy: cells: closer than this the edge of the loaded cell is felt
+FAR = 16.0  # accuracy: cells: from here on two terms of the expansion in the size of the cell are good to 1e-7
+DECAYED = 40.0  # accuracy: creep lengths after which the memory is over, exp(-40)
 
 
 def wake(x: Array, y: Array, dx: float, dy: float, velocity: Vector, creep: CreepSpectrum) -> Array:

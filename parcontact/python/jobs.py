@@ -15,7 +15,7 @@ from .. import job as jobs
 from ..errors import InputError, JobError
 from ..history.timeline import Timeline
 from ..job import Job
-from ..parallel.meeting import meet
+from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..scene import Setup, sanity
@@ -61,7 +61,7 @@ def agree(comm: MPI.Intracomm, given: object, changes: object = None) -> None:
     """Raise JobError unless all ranks give the same; collective."""
     if comm.size == 1:
         return
-    meet(comm, "gives a job")
+    wait_for_all(comm, "gives a job")
     own = dict([*_flat(given, ""), *_flat(changes, "set")])
     if len(set(comm.allgather(blake2b(repr(own).encode(errors="replace"), digest_size=16).digest()))) == 1:
         return

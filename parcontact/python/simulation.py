@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..job import Job, identity
 from ..job.text.yamltext import parse
 from ..march.loop import March
-from ..parallel.meeting import meet
+from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
@@ -68,7 +68,7 @@ class Simulation:
             yield self.row
         steps = march.steps(timeline)
         while True:
-            self._meet(f"makes step {march.row.step + 1}")
+            self._wait_for_all(f"makes step {march.row.step + 1}")
             if (step := next(steps, None)) is None:
                 return
             march.advance(step)
@@ -88,7 +88,7 @@ class Simulation:
             return self.row
         if self._march_made is not None and self._began:
             raise InputError("run() writes the files of a whole run: it must come before the first of steps()")
-        self._meet("runs")
+        self._wait_for_all("runs")
         at = str(self._saved.path if self._saved is not None else path_of(restart))
         with _in_a_file(self.job, self._slab) as job:
             ended = runner.run_to_end(job, self._slab, Options(quiet, at))
@@ -126,7 +126,7 @@ class Simulation:
         """
         if name not in UNITS:
             raise InputError(f"there is no field {name!r}; there are {', '.join(UNITS)}")
-        self._meet(f"takes the map {name}")
+        self._wait_for_all(f"takes the map {name}")
         return self._march.field(name)
 
     def gather(self, name: str) -> Array | None:
@@ -152,7 +152,7 @@ class Simulation:
         path.
         """
         file, march, slab = path_of(path), self._march, self._slab
-        self._meet(f"saves {file}")
+        self._wait_for_all(f"saves {file}")
         plain = on_root(self.comm, lambda: identity.plain_job(self.job))
         last = ",".join(measures.texts(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
@@ -190,16 +190,16 @@ class Simulation:
     def _march(self) -> March:
         """The march, made when it is first asked for."""
         if self._march_made is None:
-            self._meet("begins")
+            self._wait_for_all("begins")
             saved = self._saved
             wisdom.recall(choices(self.job).transforms, self._slab, saved.numbers.get("plans/all") if saved else None)
             self._march_made = start.first(self.job, self._slab, saved=saved)
             warn_of(self.job, self._march_made.scene.setup)
         return self._march_made
 
-    def _meet(self, what: str) -> None:
+    def _wait_for_all(self, what: str) -> None:
         """Wait for all ranks to do `what`; collective. Raises RunError if one does something else or has ended."""
-        meet(self.comm, f"{what} of {self!r}")
+        wait_for_all(self.comm, f"{what} of {self!r}")
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(

@@ -1,4 +1,4 @@
-"""What pressures are admissible, and the conditions of contact that go with them.
+"""Admissible pressures, and the conditions of contact that go with them.
 
 `Constraint` is all that the solvers ask. `NonNegative` is contact without adhesion: it is only here that pressures are
 known not to be negative. Another law is another class with these methods (`bounded`).

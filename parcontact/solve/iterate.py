@@ -10,8 +10,8 @@ from ..parallel.slab import Array, Slab
 from .certificate import Certificate
 from .constraint import Constraint
 
-LEAST_SHARE = 0.1  # of the mean displacement under pressure: gaps are never compared with less
-LEAST_HEIGHT = 1e-9  # of the height of the surface, the same: for displacements that are only rounding
+LEAST_SHARE = 0.1  # accuracy: of the mean displacement under pressure: gaps are never compared with less
+LEAST_HEIGHT = 1e-9  # accuracy: of the height of the surface, the same: for displacements that are only rounding
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Iterate:
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load, free_gaps=rest)
 
     def length(self, height: float) -> float:
-        """What gaps are compared with (`Certificate`): at most the surface's height, at least LEAST_HEIGHT of it."""
+        """The length that gaps are compared with (`Certificate`), from LEAST_HEIGHT of the surface's height to all."""
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least

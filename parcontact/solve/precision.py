@@ -8,9 +8,9 @@ precision has.
 
 import numpy as np
 
-VERY_LOOSE = 1e-3  # tolerance with which displacements may have the digits of single precision: certificates of solves
-# with such an operator end at 1e-6 to 1e-4, more where displacements are far larger than they vary within the contact
-LOOSE = 1e-5  # tolerance on a certificate with which they are in single precision
+VERY_LOOSE = 1e-3  # accuracy: tolerance with which displacements may have the digits of single precision; certificates
+# of such solves end at 1e-6 to 1e-4, more where displacements are far larger than they vary within the contact
+LOOSE = 1e-5  # accuracy: tolerance on a certificate with which they are in single precision
 
 
 def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.floating]:

@@ -29,7 +29,7 @@ from . import full_contact
 from .arrays import Array, ComplexValues, Values
 from .persson_rings import Rings
 
-GAMMA = 0.45
+GAMMA = 0.45  # physics: the empirical factor of the paper
 
 
 def contact_share(mean_pressure: Values, rings: Rings, modulus: ComplexValues) -> Array:
@@ -60,7 +60,7 @@ def friction_coefficient(
 
 
 def _variances(rings: Rings, modulus: ComplexValues) -> Array:
-    """What each ring adds to the variance of the pressure, in Pa^2."""
+    """Contribution of each ring to the variance of the pressure, in Pa^2."""
     return rings.sums(np.abs(rings.stiffness * full_contact.pressure_amplitude(*rings.waves, modulus)) ** 2 / 2)
 
 

@@ -25,7 +25,7 @@ from . import full_contact, persson
 from .arrays import Array, ComplexArray
 from .persson_rings import Rings
 
-CHUNK = 1_000_000  # transfer moduli that are held at a time, of 16 bytes; some ten arrays of that size are needed
+CHUNK = 1_000_000  # tuning: transfer moduli held at a time, of 16 bytes; some ten arrays of that size are needed
 
 
 class Leg(NamedTuple):
@@ -50,7 +50,7 @@ class Outcome(NamedTuple):
 
 
 class Memory:
-    """What the body remembers of each wave, m_j: shape (waves, terms)."""
+    """Memory m_j of each wave in the body: shape (waves, terms)."""
 
     def __init__(self, rings: Rings, material: Prony) -> None:
         """A body that is touched for the first time."""
@@ -86,7 +86,7 @@ class Memory:
 
 
 def follow(memory: Memory, legs: Iterable[Leg], gamma: float = persson.GAMMA) -> Iterator[Outcome]:
-    """What happens at the instants of each leg, one after the other; `memory` goes along."""
+    """Follow the instants of each leg, one after the other, with the `memory`."""
     for leg in legs:
         count = max(1, CHUNK // max(1, len(memory.shares)))
         starts = range(0, max(1, leg.instants.size), count)

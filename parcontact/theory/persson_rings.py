@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .full_contact import Waves
 
-EQUAL = 1e-9  # wave numbers that differ by less than this share of the largest are equal
-PANEL_POINTS = 10  # of Gauss' rule
-HALVINGS = 14  # of panels towards the longest wave
-PANEL_LOGARITHM = 1.0  # of the wave numbers at the ends of a panel: at most this far apart
-PANEL_PHASE = 12.0  # rad by which the phases of waves at the ends of a panel may differ
-MAX_PHASE = 400.0  # rad by which the shortest wave may move: 64 000 waves; after longer slides sums err by 4e-5
-QUADRANT_ANGLES = 24  # of waves whose phases all agree
-ANGLES_STEP = 8  # more of them come by so many
+EQUAL = 1e-9  # accuracy: wave numbers that differ by less than this share of the largest are equal
+PANEL_POINTS = 10  # accuracy: of Gauss' rule
+HALVINGS = 14  # accuracy: of panels towards the longest wave
+PANEL_LOGARITHM = 1.0  # accuracy: of the wave numbers at the ends of a panel: at most this far apart
+PANEL_PHASE = 12.0  # accuracy: rad by which the phases of waves at the ends of a panel may differ
+MAX_PHASE = 400.0  # accuracy: rad by which the shortest wave may move (64 000 waves); then sums err by 4e-5
+QUADRANT_ANGLES = 24  # accuracy: of waves whose phases all agree
+ANGLES_STEP = 8  # accuracy: more of them come by so many
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def _two_quadrants(count: int) -> tuple[Array, Array, Array]:
 
 
 def _partial_shares(nodes: Array, weights: Array) -> Array:
-    """Of each point's part of an integral over a panel, that up to each of the points; shape (points, points)."""
+    """Weights of the integrals over a panel from its start to each of its points; shape (points, points)."""
     legendre = np.polynomial.legendre
     coefficients = np.linalg.inv(legendre.legvander(nodes, nodes.size - 1))  # of the polynomials that are 1 at a point
     return np.asarray(legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T / weights)

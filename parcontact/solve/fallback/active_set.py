@@ -20,9 +20,9 @@ from .. import kernels
 from ..contact import Contact, ContactSolver
 from ..problem import Problem
 
-SETS = 40  # guesses after which to give up
-BUDGET = 4  # times max_iterations, for all sets together: nothing is left to be tried after this
-SHARE = 0.1  # of the tolerance: the largest gap on a set to which its linear problem is solved
+SETS = 40  # tuning: guesses after which to give up
+BUDGET = 4  # tuning: times max_iterations, for all sets together: nothing is left to be tried after this
+SHARE = 0.1  # tuning: of the tolerance: the largest gap on a set to which its linear problem is solved
 
 
 def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:

@@ -13,8 +13,8 @@ from .. import nested
 from ..contact import ContactSolver
 from ..problem import Operators, Problem
 
-LOOSE = 0.03  # tolerance on the coarse grids, whose pressure is only a start
-WORTHWHILE = 256 * 256  # points: on fewer, making coarser grids takes longer than what they save
+LOOSE = 0.03  # tuning: tolerance on the coarse grids, whose pressure is only a start
+WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes longer than what they save
 
 SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # of the same body on a grid, with a tolerance
 

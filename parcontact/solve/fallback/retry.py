@@ -1,4 +1,4 @@
-"""What is tried when a contact solve has failed: an operator in double precision, if it was not, shorter steps from
+"""Further attempts when a contact solve has failed: an operator in double precision, if it was not, shorter steps from
 where it stands, a cold start on nested grids, and guesses of where contact is.
 
 Nothing here is made or called for a solve that succeeds. What is tried depends on the failed solve alone, so that all
@@ -16,7 +16,7 @@ from ..problem import Operators, Problem
 from . import active_set
 from .cold_start import SolverOn, start_on_coarse_grids
 
-SHORT = 0.5  # length of a safeguarded step over the exact one
+SHORT = 0.5  # tuning: length of a safeguarded step over the exact one
 
 
 def again(

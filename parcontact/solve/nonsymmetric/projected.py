@@ -73,7 +73,7 @@ class Projected:
         self._keep_change(x, u)
 
     def _keep_change(self, x: Array, u: Array) -> None:
-        """Of x and its image, whose old values are in the last maps of t and w."""
+        """Keep the change of x and of its image, whose old values are in the last maps of t and w."""
         for kept, new in ((self.t, x), (self.w, u)):
             np.subtract(new, kept[2], out=kept[2])
             kept[1], kept[2] = kept[2], kept[1]

@@ -20,12 +20,12 @@ from ..problem import Operator
 from .steady import SteadyContact, SteadySolver
 
 Symbol = NDArray[np.inexact]
-PULL = 1.0
-SHARE, MOST = 0.1, 0.5  # of the certificate, which is the tolerance of the next contact; up to MOST where that fails,
-# which is then tried again
-LEAST = 0.3  # of the tolerance asked for, the same: more digits are not needed
-MAX_STEPS_TO_HALVE = 20  # in which the certificate must halve
-MOST_STEPS = 3  # times the steps that one contact may take, in all
+PULL = 1.0  # tuning: S over |A|
+SHARE, MOST = 0.1, 0.5  # tuning: of the certificate, as the tolerance of the next contact; up to MOST where that fails
+# and is tried again
+LEAST = 0.3  # tuning: of the tolerance asked for, the same: more digits are not needed
+MAX_STEPS_TO_HALVE = 20  # tuning: in which the certificate must halve
+MOST_STEPS = 3  # tuning: times the steps that one contact may take, in all
 
 
 def pull(symbol: Symbol) -> Symbol:

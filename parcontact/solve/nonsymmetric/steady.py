@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled import loop
 from ...parallel.slab import Array, Slab, dealt_to
 from .. import kernels
 from ..certificate import Certificate
@@ -33,15 +32,15 @@ from ..problem import Operator
 from .gcr import Directions, gaps_on
 from .projected import DIRECTIONS, Projected, extension_on
 
-MAX_STEPS_TO_HALVE = 20  # projected steps in which the certificate must halve
-FAR, FEW = 0.3, 4  # while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
-WAYS = 2 * ((3, 0.005), (1, 0.05))  # rounds of linear steps on a set, and what they reduce its residual to
-MAX_DIRECTIONS = 10  # of the linear steps on a set
-LOST = 1.0 / float(np.finfo(np.float64).eps)  # a guess with which no digit of the load is left
-LOOSE = 1.5e-3  # tolerance with which those beyond the projected steps' are in single precision: with a smaller one
-# rounded directions took up to half as many steps more where a body is a thousand times as stiff at once as in the end
-KAPPA = 0.1  # times the stiffness of a point
-MAX_STALLED_SETS = 25  # changes of the set without coming nearer to a solution after which sets have stalled
+MAX_STEPS_TO_HALVE = 20  # tuning: projected steps in which the certificate must halve
+FAR, FEW = 0.3, 4  # tuning: while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
+WAYS = 2 * ((3, 0.005), (1, 0.05))  # tuning: rounds of linear steps on a set, and what they reduce its residual to
+MAX_DIRECTIONS = 10  # tuning: of the linear steps on a set
+LOST = 1.0 / float(np.finfo(np.float64).eps)  # accuracy: a guess with which no digit of the load is left
+LOOSE = 1.5e-3  # accuracy: tolerance with which directions beyond the projected steps' are in single precision: with a
+# smaller one rounded directions took up to half as many steps more where a body is a thousand times as stiff at once
+KAPPA = 0.1  # tuning: times the stiffness of a point
+MAX_STALLED_SETS = 25  # tuning: changes of the set without coming nearer to a solution after which sets have stalled
 
 
 @dataclass(frozen=True)
@@ -158,8 +157,9 @@ class SteadySolver:
         guess, best, since, sets, steps = np.inf, np.inf, 0, 0, 0
         (rounds, reduction), *others = WAYS
         while True:
-            total, members = slab.sum(*_restrict(working, x))
-            _add(working, (mean * slab.points - total) / members, x)
+            np.copyto(x, 0.0, where=~working)
+            total, members = slab.sum(kernels.total(x), float(np.count_nonzero(working)))
+            np.add(x, (mean * slab.points - total) / members, out=x, where=working)
             self.operator.apply(x, u)
             limit = FEW if guess > FAR else linear.count
             for _ in range(1 if guess > FAR else rounds):
@@ -218,7 +218,7 @@ class SteadySolver:
     def _take_in(self, h: Array, gap: float) -> None:
         """Add the points to the set that are at most this far from the surface."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
-        _add_near(self._u, h, gaps / count + gap, self._working)
+        self._working |= self._u - h <= gaps / count + gap
 
     def _admit(self, x: Array, mean: float) -> None:
         """Make x admissible: not negative, under the load; and u its image."""
@@ -233,33 +233,3 @@ class SteadySolver:
         certificate = found[-1]
         self._length = certificate.length
         return iterate.d, certificate
-
-
-@loop
-def _restrict(working, x):
-    """Put 0 outside the set; returns the sum of x and the points of the set."""
-    total, count = 0.0, 0.0
-    for j in range(x.shape[0]):
-        row_total, row_count = 0.0, 0.0
-        for i in range(x.shape[1]):
-            x[j, i] = x[j, i] if working[j, i] else 0.0
-            row_total += x[j, i]
-            row_count += 1.0 if working[j, i] else 0.0
-        total += row_total
-        count += row_count
-    return total, count
-
-
-@loop
-def _add(working, value, x):
-    for j in range(x.shape[0]):
-        for i in range(x.shape[1]):
-            x[j, i] += value if working[j, i] else 0.0
-
-
-@loop
-def _add_near(u, h, d, working):
-    """Mark points where `u - h <= d`, too."""
-    for j in range(u.shape[0]):
-        for i in range(u.shape[1]):
-            working[j, i] |= u[j, i] - h[j, i] <= d

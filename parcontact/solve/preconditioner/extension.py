@@ -24,8 +24,8 @@ from ...parallel import pyramid
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
 
-FLOOR = 0.3  # of the points of a cell: so many count as having the value of the larger cell
-LONG = 16.0  # times its width: with points further apart along one direction, square cells are worse than none
+FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
+LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none
 Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 
 
@@ -180,7 +180,7 @@ def _interpolate(cells, beside, above, known, points):
 
 @loop
 def _interpolate_back(known, known_beside, points, beside, above, cells):
-    """What points bring to cells: `1 - known` times their values, by the weights of the interpolation."""
+    """Add points to cells: `1 - known` times their values, by the weights of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
     line = np.zeros(2 * columns + 2, cells.dtype)
     for j in range(cells.shape[0]):

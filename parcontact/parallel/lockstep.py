@@ -1,7 +1,7 @@
-"""Ranks meet before they do something together: one that does something else, or has ended, does not hang the others.
+"""Ranks wait for each other before a common call: one that does something else, or has ended, hangs none of them.
 
 Every rank tells the others what it is about to do, as a checksum of 16 bytes, and waits until all have. A rank that
-ends goes on to meet the others until all have ended. One that ends with an exception, while others wait for it within
+ends goes on to answer the others until all have ended. One that ends with an exception, while others wait for it within
 a step, ends them all.
 """
 
@@ -18,17 +18,17 @@ import numpy as np
 from ..errors import RunError
 from .mpi import MPI
 
-WAIT_SECONDS = 5.0  # for which a rank that ended with an exception waits for the others
-TELL_SECONDS = 60.0  # of waiting for the others, after which a rank says so
-SPIN_SECONDS, NAP_SECONDS = 1e-3, 1e-3  # others mostly come at once; after that, other processes may have the core
+WAIT_SECONDS = 5.0  # tuning: for which a rank that ended with an exception waits for the others
+TELL_SECONDS = 60.0  # tuning: of waiting for the others, after which a rank says so
+SPIN_SECONDS, NAP_SECONDS = 1e-3, 1e-3  # tuning: others mostly come at once; later, they may have the core
 ENDED = "has ended the program"
 ADVICE = "every rank must make the same calls and as many steps: see 'From several ranks' in parcontact manual python"
 
-_met: list[MPI.Intracomm] = []
+_known: list[MPI.Intracomm] = []
 
 
 class _Exchange:
-    """What this rank does, sent to all of a communicator, and what they do."""
+    """The call of this rank, sent to all of a communicator, and their calls."""
 
     def __init__(self, comm: MPI.Intracomm, what: str) -> None:
         self.comm, self.what = comm, what
@@ -40,21 +40,21 @@ class _Exchange:
         return bool(self._request.Test())
 
     def found(self) -> list[str]:
-        """What each rank does, once all have told; collective."""
+        """The call of each rank, once all have told; collective."""
         return [self.what] if (self._all == self._own).all() else self.comm.allgather(self.what)
 
 
-def meet(comm: MPI.Intracomm, what: str) -> None:
+def wait_for_all(comm: MPI.Intracomm, what: str) -> None:
     """Wait until all ranks of `comm` are about to do `what`, like "makes step 3"; collective.
 
     Raises RunError on all ranks if one of them is about to do something else, or has ended the program.
     """
     if comm.size == 1:
         return
-    if not _met:
+    if not _known:
         atexit.register(_leave)
-    if not any(known is comm for known in _met):
-        _met.append(comm)
+    if not any(known is comm for known in _known):
+        _known.append(comm)
     exchange, began, told = _Exchange(comm, what), time.monotonic(), False
     while not exchange.done():
         waited = time.monotonic() - began
@@ -81,7 +81,7 @@ def _leave() -> None:
     """Meet the others, at the end of the program, until all have ended."""
     error = getattr(sys, "last_value", None)  # what has not been caught
     what = ENDED + (f" with {type(error).__name__}: {str(error)[:200]}" if error is not None else "")
-    exchanges = [_Exchange(comm, what) for comm in _met if comm != MPI.COMM_NULL]
+    exchanges = [_Exchange(comm, what) for comm in _known if comm != MPI.COMM_NULL]
     deadline = time.monotonic() + WAIT_SECONDS
     while exchanges:
         for number, exchange in enumerate(exchanges):
