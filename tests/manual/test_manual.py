@@ -20,7 +20,6 @@ from pydantic import TypeAdapter
 from parcontact import __main__, job
 from parcontact.command.arguments import parse_arguments
 from parcontact.effects.interface import InterfaceColumns
-from parcontact.errors import InputError
 from parcontact.job import keys
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
@@ -28,7 +27,7 @@ from parcontact.report import prediction
 from parcontact.steady_sliding import table as steady_table
 from parcontact.storage import fields, row
 from parcontact.study import outcome
-from parcontact.summary import citations, sweep_table
+from parcontact.summary import sweep_table
 
 PAGES = texts.names()
 NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
@@ -232,26 +231,6 @@ def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
     assert "--velocities" in capsys.readouterr().out
     assert __main__.main(["manual", "output"]) == 2
     assert "did you mean outputs?" in capsys.readouterr().err
-
-
-def test_what_to_cite(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds no run"):
-        citations.describe(tmp_path)
-    data = {**WHOLE, "grid": {**WHOLE["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}}
-    (tmp_path / "job.yaml").write_text(yamltext.dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
-    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    elastic = citations.describe(tmp_path)
-    assert "Love" in elastic
-    assert "Bugnicourt" not in elastic
-    assert "Persson" not in elastic
-    (tmp_path / "theory.csv").touch()
-    (tmp_path / "job.yaml").write_text(yaml.safe_dump(WHOLE))
-    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    rubber = citations.describe(tmp_path)
-    assert "Love" not in rubber
-    assert "Bugnicourt" in rubber
-    assert "Persson" in rubber
-    assert "Taylor" in rubber
 
 
 # -- gallery ---------------------------------------------------------------------------------------------------------

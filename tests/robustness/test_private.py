@@ -11,13 +11,8 @@ from pathlib import Path
 
 import pytest
 from conftest import outside
-from mpi4py import MPI
 
 from parcontact import private
-from parcontact.job import load
-from parcontact.parallel.slab import Slab
-from parcontact.scene import choices
-from parcontact.storage import wisdom
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
 ROOT = Path(__file__).parents[2]
@@ -191,27 +186,6 @@ def test_code_that_somebody_prepared_is_not_loaded(common: Path) -> None:
     assert second.returncode == 0, second.stderr
     assert second.stdout == "None None\n"
     assert not payload.exists()
-
-
-@as_others
-def test_plans_in_a_directory_of_others_are_not_read(cache: Path, tmp_path: Path) -> None:
-    (tmp_path / "job.yaml").write_text(JOB)
-    job, slab = load(tmp_path / "job.yaml"), Slab(MPI.COMM_SELF, 16, 4)
-    wisdom.keep(choices(job).transforms, slab)
-    (kept,) = (cache / "parcontact" / "plans").iterdir()
-    assert wisdom._place(choices(job).transforms, slab) == kept
-    os.chown(kept.parent, NOBODY, NOBODY)
-    assert wisdom._place(choices(job).transforms, slab) is None
-    wisdom.keep(choices(job).transforms, slab)
-    assert [path.name for path in kept.parent.iterdir()] == [kept.name]
-
-
-def test_plans_are_those_of_a_precision(cache: Path, tmp_path: Path) -> None:
-    """An operator in single precision has transforms of its own."""
-    (tmp_path / "job.yaml").write_text(JOB)
-    slab, mixed = Slab(MPI.COMM_SELF, 16, 4), "numerics.precision=mixed"
-    jobs = [load(tmp_path / "job.yaml", [mixed, f"numerics.tolerance={size}"]) for size in ("1e-3", "1e-4")]
-    assert len({wisdom._place(choices(job).transforms, slab) for job in jobs} - {None}) == 2
 
 
 def test_mpirun_without_a_home() -> None:

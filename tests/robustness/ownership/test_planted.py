@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from parcontact.storage import files
-
 from .jobs import BAD_INPUT, DONE, Main, contents
 
 
@@ -20,21 +18,6 @@ def test_planted_picture(main: Main, tmp_path: Path) -> None:
     assert main("plot", "out")[0] == DONE
     assert (tmp_path / "precious").read_text() == "years of work"
     assert (tmp_path / "out" / "picture.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_names_of_unfinished_files_cannot_be_guessed(tmp_path: Path) -> None:
-    """Two in a row differ, and what is there already is never opened."""
-    path = tmp_path / "table"
-    assert files.unused(path) != files.unused(path)
-    with files.replaced(path) as file:
-        file.write(b"new")
-        part = next(tmp_path.iterdir())
-        with pytest.raises(FileExistsError):
-            part.open("xb")
-    assert [found.name for found in tmp_path.iterdir()] == ["table"]
-    with pytest.raises(ZeroDivisionError), files.replaced(path) as file:
-        file.write(b"half" * (1 // 0))
-    assert (path.read_bytes(), len(list(tmp_path.iterdir()))) == (b"new", 1)
 
 
 # -- fields that cannot be read ---------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import pytest
 
 import parcontact as pc
 from parcontact import __main__
-from parcontact.storage import files
 
 from .jobs import DONE, JOB, write_job
 
@@ -88,22 +87,3 @@ def test_by_python(tmp_path: Path) -> None:
     assert pc.Simulation.restore(path).row.step == 0
     assert [found.name for found in sorted(tmp_path.iterdir())] == ["mine.h5", "mine.h5.aside"]
     assert path.with_name("mine.h5.aside").read_text() == MINE
-
-
-def test_links_and_directories_too(tmp_path: Path) -> None:
-    """What a link leads to is not asked: the link itself is a user's. An error leaves all as it was."""
-    marked = tmp_path / "marked"
-    marked.write_text(files.MARK)
-    link, directory = tmp_path / "link", tmp_path / "directory"
-    link.symlink_to(marked)
-    directory.mkdir()
-    for path in (link, directory):
-        with pytest.raises(ZeroDivisionError), files.replaced(path, files.is_marked):
-            raise ZeroDivisionError
-        assert not list(tmp_path.glob("*.aside"))
-        with files.replaced(path, files.is_marked) as file:
-            file.write(b"new")
-        assert path.read_text() == "new"
-        path.with_name(f"{path.name}.aside").rename(tmp_path / f"kept {path.name}")
-    assert (tmp_path / "kept link").readlink() == marked
-    assert (tmp_path / "kept directory").is_dir()

@@ -1,8 +1,6 @@
 """Nothing is replaced or removed in a directory that was not proved to be of the same run."""
 
-import fcntl
 import json
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -139,22 +137,3 @@ def test_another_job_that_left_no_checkpoint(main: Main, tmp_path: Path) -> None
     assert contents(out) == before
     assert main("job.yaml", "--out", "out")[0] == DONE
     assert steps(out) == list(range(STEPS + 1))
-
-
-# -- two at once ------------------------------------------------------------------------------------------------------
-
-
-def test_second_run_is_refused(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It writes nothing; of a directory that it has made itself nothing is left when its job is refused."""
-    monkeypatch.setattr("parcontact.storage.directory.MAX_SECONDS_TO_RELEASE", 0.1)
-    out = tmp_path / "out"
-    code, said = main("job.yaml", "--out", "out/deep", "--restart", "absent.h5")
-    assert (code, out.exists()) == (BAD_INPUT, False)
-    out.mkdir()
-    handle = os.open(out / ".lock", os.O_RDWR | os.O_CREAT)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    code, said = main("job.yaml", "--out", "out")
-    os.close(handle)
-    assert code == BAD_INPUT
-    assert "out is in use by another run" in said
-    assert [path.name for path in out.iterdir()] == [".lock"]
