@@ -32,7 +32,7 @@ def find_effects() -> dict[str, Any]:
 
 
 def effects_of(sections: Iterable[str]) -> dict[str, Any]:
-    """The effects that have registered one of some sections, by the name of the section.
+    """Return the effects that have registered one of some sections, by the name of the section.
 
     Raises ValidationError for one that cannot be used.
     """

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from ..errors import InputError
 from .sections.geometry import Topography
-from .sections.part import Context
+from .sections.part import Origin
 from .sections.values import FROM_SURFACE
 from .text.places import UNREADABLE, Source
 from .text.python_data import is_array
@@ -19,14 +19,14 @@ READER = EntryPoint("extent", "parcontact.road.extent:of", "")  # what reads map
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
 
-def take_grid(source: Source, context: Context) -> None:
+def take_grid(source: Source, origin: Origin) -> None:
     """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
     wanted = [key for key in KEYS if isinstance(grid, dict) and grid.get(key) == FROM_SURFACE]
     if not isinstance(grid, dict) or not wanted:
         return
     try:
-        points, size = _extent(source.data.get("surface"), None if "size" in wanted else grid.get("size"), context)
+        points, size = _extent(source.data.get("surface"), None if "size" in wanted else grid.get("size"), origin)
         if size is None and "size" in wanted:
             raise InputError("a measured map is needed; an array has points, but no size")
         found = {"points": points, "size": size}
@@ -37,7 +37,7 @@ def take_grid(source: Source, context: Context) -> None:
         grid.update(dict.fromkeys(wanted, UNREADABLE))
 
 
-def _extent(surface: Any, box: Any, context: Context) -> Extent:
+def _extent(surface: Any, box: Any, origin: Origin) -> Extent:
     """Points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
     InputError."""
     shapes = surface if isinstance(surface, list) else [surface]
@@ -50,7 +50,7 @@ def _extent(surface: Any, box: Any, context: Context) -> Extent:
             raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
         return tuple(arrays[0].shape[::-1]), None
     try:
-        part = Topography.model_validate(maps[0], context=context)
+        part = Topography.model_validate(maps[0], context=origin)
     except ValidationError:
         raise InputError("the surface has mistakes") from None
     found: Extent = READER.load()(part, box)

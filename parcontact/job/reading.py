@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from ..errors import InputError, JobError
 from .measured import take_grid
-from .model import Job, Origin
-from .sections.part import Context
+from .model import Job
+from .sections.part import Origin
 from .text.fault import faults_of, shorten
 from .text.overrides import read_job
 from .text.places import NOWHERE, UNREADABLE, Mistake, Place, Source
@@ -104,10 +104,13 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
     source, included, sweep = read_job(path, changes, index, source_of(given) if from_python else None)
     if source.data is UNREADABLE:
         return None, source.mistakes, sweep
-    context = Context(path.absolute(), included, numbers_as_texts=from_python or isinstance(overrides, Mapping))
-    take_grid(source, context)
+    output = source.data.get("output") if isinstance(source.data, dict) else None
+    names_directory = isinstance(output, dict) and output.get("directory") is not None
+    texts = from_python or isinstance(overrides, Mapping)
+    origin = Origin(path.absolute(), included, not from_python, texts, names_directory)
+    take_grid(source, origin)
     try:
-        job = Job.model_validate(source.data, context=context)
+        job = Job.model_validate(source.data, context=origin)
     except ValidationError as error:
         return None, [*source.mistakes, *_mistakes(source, error)], sweep
     if job.numerics.strict:
@@ -115,8 +118,7 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
         source.mistakes += [Mistake(place, f"{text} ({STRICT})") for text in job.warnings]
     if source.mistakes:
         return None, source.mistakes, sweep
-    names_directory = bool(source.data.get("output")) and source.data["output"].get("directory") is not None
-    return _case(job.of(Origin(not from_python, names_directory)), index, sweep), [], sweep
+    return _case(job, index, sweep), [], sweep
 
 
 def _refuse_no_job(given: Any, overrides: Any) -> None:

@@ -222,4 +222,4 @@ def _in_a_file(job: Job, slab: Slab) -> Iterator[Job]:
         path = Path(directory, "job.yaml")
         if slab.root:
             path.write_text(job.resolved())
-        yield job.of(job.origin, path)
+        yield job.of(job.origin._replace(path=path))

@@ -46,7 +46,7 @@ def job_on_half_mesh(job: Job) -> Job:
     data["title"] = f"{job.title or job.path.stem}, on half the mesh"
     for section in ("steady", "study"):
         data.pop(section, None)
-    return Job.model_validate(data).of(job.origin, job.path)
+    return Job.model_validate(data).of(job.origin)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import pytest
 from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
 from mpi4py import MPI
 
+from parcontact.job.sections.part import Origin
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
 from parcontact.run.run import Options
@@ -22,8 +23,7 @@ def run(tmp_path: Path) -> Callable[..., Path]:
 
     def go(name: str, **changes: Any) -> Path:
         output = {**changes.pop("output", {}), "directory": str(tmp_path / name)}
-        planned = job(history=[PRESS], output=output, **changes)
-        planned._path = tmp_path / "job.yaml"
+        planned = job(history=[PRESS], output=output, **changes).of(Origin(tmp_path / "job.yaml"))
         planned.path.write_text(planned.resolved())
         assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), Options(quiet=True)) == 0
         return tmp_path / name

@@ -1,19 +1,106 @@
-"""How many steps a history has, and which loads a counterbody bears."""
+"""What must fit together in a job: loads and material, surface and mesh, histories and what a run can make."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
+from ..sections.geometry import OnOneMesh, Rough
+from ..sections.height_arrays import HeightArray
 from ..sections.materials import AnyMaterial
-from ..sections.settings import Grid
+from ..sections.settings import Body, Grid, Numerics, Output
 from ..sections.stages import AUTO, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
+from .advice import SAME_LENGTH
 
 MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
 
 
-def of_hardness(
+def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
+    if grid.boundary == "free" and numerics.kernel == "spectral":
+        yield Fault("must be love when grid.boundary is free: the spectral kernel is periodic", ("numerics", "kernel"))
+
+
+def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
+    if body is not None and grid.boundary == "free" and body.thickness < 2 * max(grid.dx, grid.dy):
+        least = 2 * max(grid.dx, grid.dy)
+        sentence = f"must be at least two cells, {least:.3g} m, when grid.boundary is free, got {body.thickness:g}"
+        yield Fault(sentence, ("body", "thickness"))
+
+
+def no_wake_in_a_layer(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+    if body is not None and grid.boundary == "free" and (initial.state == "steady" or steady is not None):
+        yield Fault("must be periodic for steady sliding on a layer", ("grid", "boundary"))
+
+
+def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
+    """Check that no wave is shorter than two cells (Nyquist), and that the shortest one fits into the box."""
+    cell = max([step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1], default=0.0)
+    for index, shape in enumerate(surface):
+        if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - SAME_LENGTH):
+            sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), got {shape.short_wavelength!r}"
+            yield Fault(sentence, ("surface", index, "short_wavelength"))
+        if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):
+            sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
+            yield Fault(sentence, ("surface", index, "short_wavelength"))
+        for axis, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
+            if abs(waves) > n / 2:
+                sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
+                yield Fault(sentence, ("surface", index, "waves", axis))
+
+
+def half_mesh_fits(grid: Grid, surface: tuple[Any, ...], output: Output) -> Iterator[Fault]:
+    """Check that the same scene can be made on half of the mesh."""
+    key = ("output", "mesh_check")
+    if not output.mesh_check or next(waves_fit(grid, surface), None):
+        return
+    if any(n % 2 for n in grid.points if n > 1):
+        yield Fault(f"needs even numbers of grid.points, got {list(grid.points)}", key)
+    for index, shape in enumerate(surface):
+        if isinstance(shape, OnOneMesh):
+            yield Fault(f"the heights of surface.{index} are given on one mesh, and cannot be put on half of it", key)
+    half = grid.model_copy(update={"points": tuple(max(n // 2, 1) for n in grid.points)})
+    for fault in waves_fit(half, surface):
+        yield Fault(f"on half the mesh {'.'.join(map(str, fault.path))} {fault.predicate}", key)
+
+
+def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
+    if not surface:
+        yield Fault("needs at least one shape; shape: flat is one", ("surface",))
+
+
+def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
+    if not history and steady is None:
+        yield Fault("needs at least one stage, unless there is a steady section", ("history",))
+    known = steady is None or steady.pressures is not None or None in history
+    if not known and not any(stage.control != "approach" and stage.load.end > 0.0 for stage in history):
+        sentence = "is missing; it must be positive pressures [Pa] when no stage of the history has a pressure or force"
+        yield Fault(sentence, ("steady", "pressures"))
+
+
+def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
+    if not history or None in history or initial.pressure or any(stage.approach for stage in history):
+        return
+    if not any(stage.load.start or stage.load.end for stage in history):
+        yield Fault("must not be zero in every stage: nothing would ever touch", ("history", 0, history[0].control))
+
+
+def steady_at_rest(initial: Initial, material: AnyMaterial) -> Iterator[Fault]:
+    if initial.state == "steady" and not any(initial.velocity) and material.long_modulus == 0:
+        sentence = "must not be zero: the material has no long-term modulus, and a fluid at rest no steady contact"
+        yield Fault(sentence, ("initial", "velocity"))
+
+
+def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
+    """Check that arrays have the shape of the grid."""
+    for index, shape in enumerate(surface):
+        if isinstance(shape, HeightArray) and shape.heights.shape != (grid.ny, grid.nx):
+            sentence = f"has shape {shape.heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}"
+            yield Fault(sentence, ("surface", index, "heights"))
+
+
+def loads_are_borne(
     grid: Grid, material: AnyMaterial, history: tuple[Stage | None, ...], initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
     """Check that the counterbody bears the mean pressures, and that no steady sliding is asked of one that yields."""
@@ -32,7 +119,7 @@ def of_hardness(
             yield Fault(f"{sentence}: there is no equilibrium", ("history", index, stage.control))
 
 
-def of_steps(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
     """Check how many steps the stages have together."""
     total = 0.0
     for index, stage in enumerate(history):

@@ -48,7 +48,7 @@ def warnings(
 
 
 def steep(slope: float) -> str:
-    """What to say of an rms slope, if it is too large."""
+    """Return what to say of an rms slope, if it is too large."""
     if slope <= STEEP:
         return ""
     return (
@@ -61,7 +61,7 @@ READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights only a loo
 
 
 def says_all(surface: tuple[Any, ...]) -> bool:
-    """Whether the slopes of a surface follow from the job, without its heights."""
+    """Return whether the slopes of a surface follow from the job, without its heights."""
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
@@ -97,7 +97,7 @@ def contact_modulus(material: Elastic | Zener) -> float:
 
 
 def _mean(stage: Stage, load: float, grid: Grid) -> float:
-    """The mean pressure of a stage that prescribes a load [Pa]; nothing for an approach."""
+    """Return the mean pressure of a stage that prescribes a load [Pa]; nothing for an approach."""
     if stage.control == "approach":
         return 0.0
     return load / (grid.lx * grid.ly) if stage.control == "force" else load
@@ -198,7 +198,7 @@ def _room(grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, histo
 
 
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
-    """The radius of contact at the end of a stage [m] by Hertz (1882), a lower bound for a body that creeps."""
+    """Return the radius of contact at the end of a stage [m] by Hertz (1882), a lower bound for a body that creeps."""
     if stage.control == "approach":
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly

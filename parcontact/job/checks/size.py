@@ -30,7 +30,7 @@ def warnings(grid: Grid, count: int, output: Output) -> Iterator[str]:
 
 
 def beyond_memory(grid: Grid) -> str:
-    """What to say if no run of a grid can fit into the memory of the machines it runs on, or ''."""
+    """Return what to say if no run of a grid can fit into the memory of the machines it runs on, or ''."""
     needed = (MAPS_FREE if grid.boundary == "free" else MAPS) * 8.0 * grid.nx * grid.ny
     each, count = _memory(), machines()
     if needed <= each * count:
@@ -47,7 +47,7 @@ def beyond_memory(grid: Grid) -> str:
 
 
 def beyond_file(count: int, output: Output) -> str:
-    """What to say if one file cannot hold so many instants of fields, or ''."""
+    """Return what to say if one file cannot hold so many instants of fields, or ''."""
     saved = -(-count // output.every)
     if not output.fields or saved <= MOST_INSTANTS:
         return ""

@@ -22,7 +22,7 @@ FILE_KINDS = (".npy", ".h5", ".txt")
 
 
 def _ordered(name: str, than: str) -> Rule:
-    """Refuses a wavelength `name` that is longer than `than`."""
+    """Refuse a wavelength `name` that is longer than `than`."""
 
     def check(shorter: float, longer: float) -> Iterator[Fault]:
         if shorter > longer:
@@ -99,7 +99,7 @@ class Wave(Part):
 
 
 def _surface_file(path: Path, info: ValidationInfo) -> Path:
-    """The absolute path of a file of heights; relative ones start at the job file."""
+    """Return the absolute path of a file of heights; relative ones start at the job file."""
     if path.suffix not in FILE_KINDS:
         refuse(Fault(f"must end in {' or '.join(FILE_KINDS)}, got {str(path)!r}"))
     return existing_file(path, info)
@@ -155,7 +155,7 @@ CHOSEN = chosen("shape", KINDS)
 
 
 def _shape(data: Any, info: ValidationInfo) -> Any:
-    """A rough surface is measured, or follows from a few numbers: its keys tell which."""
+    """Return a rough surface is measured, or follows from a few numbers: its keys tell which."""
     if isinstance(data, dict) and data.get("shape") == "rough" and data.get("spectrum") is not None:
         return RoughSpectrum.model_validate(data, context=info.context)
     return data if isinstance(data, RoughSpectrum) else CHOSEN(data, info)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
@@ -11,7 +10,6 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from ..text.fault import Fault, quote, refuse
 from ..text.python_data import is_array
 from .part import Part
-from .settings import Grid
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +22,7 @@ class Heights:
     """A map of heights [m], read only. Where a job is sent to other ranks, `values` stay behind: root deals them."""
 
     def __init__(self, given: Any) -> None:
-        """Raises TypeError or ValueError for what is no map of finite real numbers."""
+        """Raise TypeError or ValueError for what is no map of finite real numbers."""
         import numpy as np  # slow to import, and jobs in files do without
 
         found = np.asanyarray(given)
@@ -99,11 +97,3 @@ def with_shapes(surface: Any) -> Any:
     if len(shapes) > 1 and all(isinstance(shape, list | int | float) for shape in shapes):
         return [{"shape": "array", "heights": surface}]
     return [{"shape": "array", "heights": shape} if is_array(shape) else shape for shape in shapes]
-
-
-def fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
-    """Arrays have the shape of the grid."""
-    for index, shape in enumerate(surface):
-        if isinstance(shape, HeightArray) and shape.heights.shape != (grid.ny, grid.nx):
-            sentence = f"has shape {shape.heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}"
-            yield Fault(sentence, ("surface", index, "heights"))

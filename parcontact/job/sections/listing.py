@@ -13,7 +13,7 @@ from .stages import Ramp
 
 
 def plain(value: Any) -> Any:
-    """A value of a job as the plain data it was written as; keys without a value are left out."""
+    """Return a value of a job as the plain data it was written as; keys without a value are left out."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
@@ -26,12 +26,12 @@ def plain(value: Any) -> Any:
 
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
-    """The keys of a part that have a value, as they are written in a job."""
+    """Return the keys of a part that have a value, as they are written in a job."""
     return ((name, value) for name, value in part if value is not None)
 
 
 def unit(part: Part, key: str) -> str:
-    """The unit of a key, from the brackets in its description; '' for numbers without one and for words."""
+    """Return the unit of a key, from the brackets in its description; '' for numbers without one and for words."""
     found = re.search(r"\[([^\],]+)\]", type(part).model_fields[key].description or "")
     return found.group(1) if found and found.group(1) != "-" else ""
 
@@ -50,13 +50,13 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
 
 
 def line(part: Part) -> str:
-    """A part in one line."""
+    """Return a part in one line."""
     pairs = [(key, value, "" if isinstance(value, Part) else unit(part, key)) for key, value in items(part)]
     return ", ".join(f"{key} {text(value)} {unit}".rstrip() for key, value, unit in pairs)
 
 
 def text(value: Any) -> str:
-    """A value in the few digits that a reader wants."""
+    """Return a value in the few digits that a reader wants."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

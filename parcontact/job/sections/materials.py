@@ -64,7 +64,7 @@ class PronyBranch(Part):
 
 
 def _branch(data: Any, info: ValidationInfo) -> ZenerBranch | PronyBranch:
-    """The form of a branch follows from its keys."""
+    """Return the form of a branch follows from its keys."""
     if isinstance(data, ZenerBranch | PronyBranch):
         return data
     forms = f"{', '.join(ZenerBranch.words())} or {', '.join(PronyBranch.words())}"
@@ -179,7 +179,7 @@ class Dma(Part):
     _doubts: tuple[str, ...] = PrivateAttr(default=())
 
     def model_post_init(self, context: Any) -> None:
-        """Fits the compound."""
+        """Fit the compound."""
         try:
             found = compound.fitted(self.path, self.poisson, self.reference, self.shift, self.error, self.weight)
         except InputError as error:
@@ -212,7 +212,7 @@ class Dma(Part):
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
-    """A material at another temperature [deg C]. Raises InputError where nothing says how it depends on it."""
+    """Return a material at another temperature [deg C]. Raises InputError where nothing says how it depends on it."""
     body = material.fitted if isinstance(material, Dma) else material
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
@@ -31,18 +30,22 @@ from ..text.overrides import Included
 from .values import from_home
 
 
-@dataclass(frozen=True)
-class Context:
-    """What a section may need to know about the job: its absolute path, the file of its material if it includes one,
-    and whether it comes from Python, where PyYAML's own `safe_load` leaves texts for some numbers: 1.0e6, 1e-3."""
+class Origin(NamedTuple):
+    """Where a job comes from: its absolute path, and the file of its material if it includes one.
 
-    path: Path
+    `numbers_as_texts`: PyYAML's own `safe_load` leaves texts for some numbers, 1.0e6 and 1e-3. `names_directory`: the
+    job says itself where its results go.
+    """
+
+    path: Path = Path("job.yaml")
     included: Included | None = None
+    from_file: bool = True
     numbers_as_texts: bool = False
+    names_directory: bool = False
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
-    """The absolute path of a file that a job names; relative ones start at the job file."""
+    """Return the absolute path of a file that a job names; relative ones start at the job file."""
     found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
     if found.exists() and not (found.is_file() or found.is_dir()):
         refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
@@ -69,7 +72,7 @@ class Part(BaseModel):
     rules: ClassVar[tuple[Rule, ...]] = ()
 
     @classmethod
-    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Return `data` with the defaults that depend on other keys or on the job file."""
         return data
 

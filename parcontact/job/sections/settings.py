@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..text.fault import Fault
-from .part import Context, Part, Rule
+from .part import Origin, Part, Rule
 from .values import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, Whole, both, from_home, listed
 
 Integrator = Literal["exponential", "backward-euler"]
@@ -100,7 +100,7 @@ class Numerics(Part):
     strict: Flag = False
 
     @classmethod
-    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Fill in the tolerance and the error of folded branches, which are shares of the accuracy."""
         accuracy = data.get("accuracy")
         if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
@@ -140,7 +140,7 @@ class Checkpoint(Part):
     at_most_one = (("every", "minutes"),)
 
     @classmethod
-    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Save every 10 minutes unless told otherwise."""
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
 

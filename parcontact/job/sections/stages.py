@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, ValidationInfo, create_model
 
 from ..text.fault import Fault, quote, refuse
-from .part import Context, Part, Rule
+from .part import Origin, Part, Rule
 from .temperature import Celsius
 from .values import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 
@@ -36,7 +36,7 @@ class Ramp:
         return self.start == self.end
 
     def at(self, fraction: float) -> float:
-        """The load at a fraction (0 to 1) of the stage; exact at both ends."""
+        """Return the load at a fraction (0 to 1) of the stage; exact at both ends."""
         return (1 - fraction) * self.start + fraction * self.end
 
 
@@ -86,7 +86,7 @@ def _stepping(
     time_step: float | GeometricStep | Auto | None,
     cells_per_step: float | None,
 ) -> Iterator[Fault]:
-    """A stage that does not last must have no steps."""
+    """Yield a stage that does not last must have no steps."""
     lasts = duration is not None or distance is not None
     if not lasts and (time_step or cells_per_step):
         key = "time_step" if time_step else "cells_per_step"
@@ -130,7 +130,7 @@ class Stage(Part):
     )
 
     @classmethod
-    def filled(cls, data: dict[str, Any], context: Context | None) -> dict[str, Any]:
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Let a stage that lasts and does not say in which steps choose them itself."""
         lasts, given = data.keys() & {"duration", "distance"}, data.keys() & {"time_step", "cells_per_step"}
         return {**data, "time_step": AUTO} if lasts and not given else data

@@ -41,12 +41,12 @@ def both(value: Any) -> Any:
 
 
 def along_x(value: Any) -> Any:
-    """A number is the x component of a vector."""
+    """Return a number is the x component of a vector."""
     return value if isinstance(value, list | tuple) else (value, 0.0)
 
 
 def listed(value: Any) -> Any:
-    """A single value is a list of one."""
+    """Return a single value is a list of one."""
     return value if isinstance(value, list | tuple) else (value,)
 
 

@@ -28,7 +28,7 @@ class Fault(NamedTuple):
 
 
 def refuse(*faults: Fault) -> NoReturn:
-    """Raises the faults in the form in which pydantic collects them."""
+    """Raise the faults in the form in which pydantic collects them."""
     raise ValidationError.from_exception_data("job", [_line(fault) for fault in faults])
 
 
@@ -38,7 +38,7 @@ def _line(fault: Fault) -> InitErrorDetails:
 
 
 def faults_of(error: ValidationError) -> Iterator[Fault]:
-    """The faults inside an error that `refuse` raised."""
+    """Yield the faults inside an error that `refuse` raised."""
     for line in error.errors():
         yield Fault(line["msg"], line["loc"], line["type"] == AT_KEY)
 
@@ -49,7 +49,7 @@ def shorten(text: str, most: int = 200) -> str:
 
 
 def quote(value: Any) -> str:
-    """A value as it is shown after "got"."""
+    """Return a value as it is shown after "got"."""
     if value is None or isinstance(value, dict):
         return "nothing" if value is None else "a mapping"
     text = str(value).lower() if isinstance(value, bool) else BOUNDED.repr(value)
@@ -57,12 +57,12 @@ def quote(value: Any) -> str:
 
 
 def choices(words: Iterable[str]) -> str:
-    """The words to choose from."""
+    """Return the words to choose from."""
     return " | ".join(words)
 
 
 def did_you_mean(word: Any, words: Iterable[str]) -> str:
-    """The ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
+    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
     if len(str(word)) > MAX_WORD:
         return ""
     known = {candidate.lower(): candidate for candidate in words}

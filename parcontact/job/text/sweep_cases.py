@@ -42,11 +42,11 @@ class Sweep:
         self.axes, self.place = axes, place
 
     def __len__(self) -> int:
-        """The number of cases; 0 if the job has no sweep."""
+        """Return the number of cases; 0 if the job has no sweep."""
         return math.prod(map(len, self.axes)) if self.axes else 0
 
     def case(self, index: int) -> tuple[Setting, ...]:
-        """What distinguishes a case."""
+        """Return what distinguishes a case."""
         moves = next(itertools.islice(itertools.product(*self.axes), index, None))
         return tuple(itertools.chain(*moves))
 
@@ -84,7 +84,7 @@ def _axes(section: Any, source: Source) -> Iterator[Axis]:
 
 
 def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, Place]) -> list[Setting]:
-    """All values of one key; an empty list, and a mistake in `source`, if they are none."""
+    """Return all values of one key; an empty list, and a mistake in `source`, if they are none."""
     at = source.locate((*path, name))
     place, key_place = at.place, at.key_place
     settings: list[Setting] = []
@@ -109,12 +109,12 @@ def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, P
 
 
 def _overlap(one: str, other: str) -> bool:
-    """Whether one key is the other or within it."""
+    """Return whether one key is the other or within it."""
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 
 def refuse_overrides(sweep: Sweep, overrides: list[tuple[str, Place]], source: Source) -> None:
-    """A mistake for each override of a key that is swept."""
+    """Return a mistake for each override of a key that is swept."""
     names = {setting.name for axis in sweep.axes for setting in axis[0]}
     for name, place in overrides:
         if found := next((swept for swept in names if _overlap(swept, name)), ""):

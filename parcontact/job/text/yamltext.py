@@ -184,7 +184,7 @@ class _Reader:
         return self.refuse(node, f"{shorten(node.tag.replace(YAML_TAG, '!!'))} does not belong in a job")
 
     def mapping(self, node: yaml.MappingNode, path: Key) -> PlacedDict:
-        """What `<<` merges comes last, and only where the mapping has no such key."""
+        """Return what `<<` merges comes last, and only where the mapping has no such key."""
         found = PlacedDict()
         merged: list[yaml.Node] = []
         for key, child in node.value:
