@@ -12,155 +12,101 @@ both are means over several random surfaces. Another first seed, and velocities 
 make other cases than those by which the estimates were found.
 """
 
-import argparse
-from typing import Any
-
+import campaign
 import numpy as np
-from mpi4py import MPI
-from numpy.typing import NDArray
+from runs import Json, begun, marched
+from sample_scenes import SOLID, cylinder, rough, slide, sphere
 
-from parcontact import job as jobs
-from parcontact import scene
-from parcontact.march import loop
-from parcontact.march.loop import March
-from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import Parts
-from parcontact.storage.row import Row
+from parcontact.job import Numerics
 
-Json = dict[str, Any]
 SMALL = 1e-4
 COUNTS = 1e-3  # errors that are smaller matter little
 PARTS = ("solver friction", "time friction", "solver area", "time area")
-BRANCHES = [{"modulus": 2e6 * 3.0**-k, "relaxation_time": 1e-6 * 10.0**k} for k in range(5)]
-RUBBER = {"model": "zener", "modulus_inf": 1e5, "branches": BRANCHES}
-SOLID = {"model": "zener", "modulus_inf": 0.275e6, "branches": [{"modulus": 2.475e6, "relaxation_time": 1e-3}]}
+DWELL = {"duration": 1e-2, "time_step": {"first": 1e-6, "growth": 1.5}}
+COLUMNS = {"friction": "friction", "area": "contact_area_corrected"}
 
 
-def rough(points: int, pressure: float, velocity: float, material: Json = RUBBER) -> Json:
-    wave = min(16.0 / points * 1e-3, 1.25e-4)  # 16 cells where the box has room for two such waves in its longest
-    surface = {"shape": "rough", "hurst": 0.9, "long_wavelength": 2.5e-4, "short_wavelength": wave, "rms_slope": 0.02}
-    stage = {"pressure": pressure, "velocity": velocity, "distance": 32e-3 / points, "cells_per_step": 1}
-    return {"grid": {"points": points, "size": 1e-3}, "surface": surface, "material": material, "history": [stage]}
+def scenes(points: int, faster: float, cells: float) -> dict[str, Json]:
+    """All slide by 32 cells."""
 
+    def on(velocity: float, box: float = 1e-3) -> Json:
+        return {**slide(faster * velocity, 32 * box / points), "cells_per_step": cells}
 
-def sphere(points: int, velocity: float) -> Json:
-    ball = {"shape": "sphere", "radius": 1e-2, "center": [2e-3, 3e-3]}
-    stage = {"force": 0.15, "velocity": velocity, "distance": 32 * 6e-3 / points, "cells_per_step": 1}
-    grid = {"points": points, "size": 6e-3, "boundary": "free"}
-    return {"grid": grid, "surface": ball, "material": SOLID, "history": [stage]}
-
-
-def change(data: Json, seed: int, faster: float, cells: float) -> Json:
-    """A scene with another rough surface, and other velocities and steps."""
-    surface = {**data["surface"], "seed": seed} if data["surface"]["shape"] == "rough" else data["surface"]
-    stages = [
-        {**s, "velocity": s["velocity"] * faster, "cells_per_step": cells} if "velocity" in s else s
-        for s in data["history"]
-    ]
-    return {**data, "surface": surface, "history": stages}
-
-
-def scenes(points: int) -> dict[str, Json]:
-    cylinder = {"shape": "cylinder", "radius": 1e-2, "center": [1.5e-3, 0.0]}
-    stage = {"pressure": 2e4, "velocity": 0.1, "distance": 32 * 4e-3 / (4 * points), "cells_per_step": 1}
-    line = {"grid": {"points": [4 * points, 1], "size": [4e-3, 1e-3]}, "surface": cylinder, "history": [stage]}
-    slow = rough(points, 1e4, 0.1)
-    slow["history"].insert(0, {"pressure": 1e4, "duration": 1e-2, "time_step": {"first": 1e-6, "growth": 1.5}})
     return {
-        "sphere": sphere(points, 0.046765),
-        "cylinder": {**line, "material": SOLID},
-        "rough, very light": rough(points, 1e2, 1.0),
-        "rough, light": rough(points, 2e3, 1.0),
-        "rough": rough(points, 2e4, 1.0),
-        "rough, heavy": rough(points, 1e5, 1.0),
-        "rough, nearly full contact": rough(points, 2.5e5, 1.0),
-        "rough, one branch": rough(points, 2e4, 0.1, SOLID),
-        "rough, dwell and slide": slow,
+        "sphere": sphere(points, on(0.046765, 6e-3)),
+        "cylinder": cylinder(points, on(0.1)),
+        "rough, very light": rough(points, 1e2, on(1.0)),
+        "rough, light": rough(points, 2e3, on(1.0)),
+        "rough": rough(points, 2e4, on(1.0)),
+        "rough, heavy": rough(points, 1e5, on(1.0)),
+        "rough, nearly full contact": rough(points, 2.5e5, on(1.0)),
+        "rough, one branch": rough(points, 2e4, on(0.1), material=SOLID),
+        "rough, dwell and slide": rough(points, 1e4, DWELL, on(0.1)),
     }
 
 
-def march(data: Json, tolerance: float | None, fine: int, integrator: str) -> list[Row]:
-    numerics = {"integrator": integrator, "branch_error": 0.0, **({"tolerance": tolerance} if tolerance else {})}
-    history = [_finer(stage, fine) for stage in data["history"]]
-    job = jobs.Job.model_validate({**data, "history": history, "numerics": numerics})
-    rows: list[Row] = []
-    loop.run(March(scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points))), [lambda now: rows.append(now.row)])
-    return rows
-
-
-def _finer(stage: Json, fine: int) -> Json:
+def finer(stage: Json, times: int) -> Json:
     if "cells_per_step" in stage:
-        return {**stage, "cells_per_step": stage["cells_per_step"] / fine}
-    step = stage["time_step"]
-    return {**stage, "time_step": {"first": step["first"] / fine, "growth": step["growth"] ** (1.0 / fine)}}
+        return {**stage, "cells_per_step": stage["cells_per_step"] / times}
+    first, growth = stage["time_step"].values()
+    return {**stage, "time_step": {"first": first / times, "growth": growth ** (1.0 / times)}}
 
 
-def series(rows: list[Row], times: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-    """Of a measure, at some instants."""
-    return np.interp(times, [row.time for row in rows], [getattr(row.measures, name) for row in rows])
-
-
-def compare(data: Json, integrator: str, finer: int) -> dict[str, tuple[float, float]]:
-    """Estimated and true relative error by part and measure."""
-    tolerance = jobs.Numerics().tolerance
-    own, exact, finest = (
-        march(data, tolerance * share, fine, integrator) for share, fine in ((1.0, 1), (SMALL, 1), (SMALL, finer))
-    )
-    late = [row for row in own if row.time > 0.35 * own[-1].time and row.errors and row.errors.friction]
-    times = np.array([row.time for row in late])
-    found = {}
-    for measure, name in (("friction", "friction"), ("area", "contact_area_corrected")):
-        a, b, c = (series(rows, times, name) for rows in (own, exact, finest))
-        size = np.sqrt(np.mean(c**2))
-        true = {
-            "solver": np.sqrt(np.mean((a - b) ** 2)) if measure == "friction" else np.mean(abs(a - b)),
-            "time": abs(np.mean(b - c)) if measure == "friction" else np.mean(abs(b - c)),
-        }
-        for part, error in true.items():
-            parts: list[Parts] = [getattr(row.errors, measure) for row in late if row.errors]
-            estimate = np.mean([getattr(one, part) * v for one, v in zip(parts, a, strict=True)]) / np.mean(a)
-            found[f"{part} {measure}"] = float(estimate), float(error / size)
+def compare(data: Json, integrator: str, times: int) -> list[tuple[float, float]]:
+    """Estimated and true relative error of each part."""
+    runs = []
+    for share, fine in ((1.0, 1), (SMALL, 1), (SMALL, times)):
+        numerics = {"integrator": integrator, "branch_error": 0.0, "tolerance": Numerics().tolerance * share}
+        history = [finer(stage, fine) for stage in data["history"]]
+        runs.append(marched(begun({**data, "history": history, "numerics": numerics}))[0])
+    late = [row for row in runs[0] if row.time > 0.35 * runs[0][-1].time and row.errors and row.errors.friction]
+    found = []
+    for name, column in COLUMNS.items():
+        own, exact, finest = (
+            np.interp(
+                [row.time for row in late], *zip(*((r.time, getattr(r.measures, column)) for r in rows), strict=True)
+            )
+            for rows in runs
+        )
+        size, parts = np.sqrt(np.mean(finest**2)), [getattr(row.errors, name) for row in late]
+        solver, steps = own - exact, exact - finest
+        true = np.sqrt(np.mean(solver**2)), abs(np.mean(steps))
+        if name == "area":
+            true = np.mean(abs(solver)), np.mean(abs(steps))
+        for part, error in zip(("solver", "time"), true, strict=True):
+            weights = [getattr(one, part) * value for one, value in zip(parts, own, strict=True)]
+            found.append((float(np.mean(weights) / np.mean(own)), float(error / size)))
     return found
 
 
-def mean_over(surfaces: list[dict[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:
-    """Of estimates and of true errors."""
-    return {
-        part: (float(np.mean([one[part][0] for one in surfaces])), float(np.mean([one[part][1] for one in surfaces])))
-        for part in PARTS
-    }
-
-
-def main(points: int, finer: int, surfaces: int, seed: int, velocity: float, cells: float) -> None:
+def main() -> None:
+    options = campaign.parser(
+        __doc__,
+        trials=4,
+        what="surfaces",
+        points=(64, "along x and y"),
+        finer=(8, "times as fine are the time steps of the reference"),
+        velocity=(1.0, "times as fast"),
+        cells=(1.0, "per step"),
+    )
+    asked = options.parse_args()
     print(f"{'estimated/true':32}" + "".join(f"{part:>24}" for part in PARTS))
-    honest: dict[str, list[tuple[float, float]]] = {part: [] for part in PARTS}
+    table = []
     for integrator in ("exponential", "backward-euler"):
-        for name, data in scenes(points).items():
-            seeds = range(seed, seed + (surfaces if data["surface"]["shape"] == "rough" else 1))
-            found = mean_over([compare(change(data, one, velocity, cells), integrator, finer) for one in seeds])
-            print(f"{name + ', ' + integrator[:3]:32}", end="")
-            for part in PARTS:
-                estimate, true = found[part]
-                honest[part].append((estimate, true))
-                ratio = f"{estimate / true:6.2g}" if true > 0.0 else "     -"
-                print(f"{estimate:9.1e}/{true:7.1e} {ratio}", end="")
-            print(flush=True)
-    for part, pairs in honest.items():
+        for name, data in scenes(asked.points, asked.velocity, asked.cells).items():
+            surfaces = [data]
+            if data["surface"]["shape"] == "rough":
+                seeds = range(asked.seed, asked.seed + asked.trials)
+                surfaces = [{**data, "surface": {**data["surface"], "seed": seed}} for seed in seeds]
+            found = np.mean([compare(one, integrator, asked.finer) for one in surfaces], axis=0)
+            table.append(found)
+            cells = (f"{a:9.1e}/{b:7.1e} {f'{a / b:6.2g}' if b else '     -'}" for a, b in found)
+            print(f"{name + ', ' + integrator[:3]:32}" + "".join(cells), flush=True)
+    for part, pairs in zip(PARTS, np.swapaxes(table, 0, 1), strict=True):
         for least, which in ((0.0, "the true errors"), (COUNTS, f"those above {100 * COUNTS:g} %")):
-            ratios = [estimate / true for estimate, true in pairs if true > least]
-            if ratios:
+            if ratios := [a / b for a, b in pairs if b > least]:
                 print(f"{part}: estimates are {min(ratios):.2g} to {max(ratios):.2g} times {which}")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for name, kind, given in (
-        ("points", int, 64),
-        ("finer", int, 8),
-        ("surfaces", int, 4),
-        ("seed", int, 0),
-        ("velocity", float, 1.0),
-        ("cells", float, 1.0),
-    ):
-        parser.add_argument(f"--{name}", type=kind, default=given)
-    main(**vars(parser.parse_args()))
+    main()

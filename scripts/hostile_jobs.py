@@ -64,7 +64,7 @@ BOMB = "\n".join(["b0: &b0 [x]", *(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 9)
 
 def write_job(dice: Random, directory: Path) -> Path:
     """A job file somewhere in a directory, and what it needs."""
-    make = dice.choice([changed_text, changed_values, changed_file, changed_map])
+    make = dice.choice([changed_text, changed_values, changed_file])
     return make(dice, directory)
 
 
@@ -82,21 +82,15 @@ def changed_text(dice: Random, directory: Path) -> Path:
     text = yamltext.dump(_base(dice))
     for _ in range(dice.choice([1, 1, 2, 4])):
         place, size = dice.randrange(len(text) + 1), dice.randint(0, 20)
-        kind = dice.choice(
-            ["cut", "put", "double", "swap", "bomb"] if dice.random() < 0.1 else ["cut", "put", "double", "swap"]
-        )
-        if kind == "cut":
-            text = text[:place] + text[place + size :]
-        elif kind == "put":
-            text = text[:place] + dice.choice(SPLICES) + text[place:]
-        elif kind == "double":
-            text = text[: place + size] + text[place:]
-        elif kind == "bomb":
-            text = text.rstrip("\n") + "\n" + BOMB + "\n"
-        else:
-            text = (
-                text[:place] + chr(dice.choice([dice.randrange(32, 127), dice.randrange(0xD7FF)])) + text[place + 1 :]
-            )
+        character = chr(dice.choice([dice.randrange(32, 127), dice.randrange(0xD7FF)]))
+        changes = {
+            "cut": text[:place] + text[place + size :],
+            "put": text[:place] + dice.choice(SPLICES) + text[place:],
+            "double": text[: place + size] + text[place:],
+            "swap": text[:place] + character + text[place + 1 :],
+            "bomb": text.rstrip("\n") + "\n" + BOMB + "\n",
+        }
+        text = dice.choices(list(changes.values()), [10, 10, 10, 10, 1])[0]
     return _write(directory, text)
 
 
@@ -113,7 +107,7 @@ def changed_values(dice: Random, directory: Path) -> Path:
     data = _base(dice)
     for _ in range(dice.choice([1, 1, 1, 2, 3])):
         *way, last = dice.choice(list(leaves(data)))
-        node = data
+        node: Any = data
         for key in way:
             node = node[key]
         old = node[last]
@@ -126,99 +120,41 @@ def changed_values(dice: Random, directory: Path) -> Path:
             node[str(last) + "x"] = node.pop(last)
         else:
             node[last] = dice.choice(EXTREME)
-    text = yamltext.dump(data) if dice.random() < 0.8 else yaml.safe_dump(data)
-    return _write(directory, text)
+    return _write(directory, dice.choice([yamltext.dump, yaml.safe_dump])(data))
 
 
 def changed_file(dice: Random, directory: Path) -> Path:
-    """A surface file, mostly; sometimes the job itself."""
+    """A file of heights that is damaged, of another type or length, or no file; sometimes the job itself."""
     if dice.random() < 0.1:
-        return odd_file(dice, directory, directory / "job.yaml")
-    data = _base(dice)
-    nx, ny = (
-        (data["grid"]["points"], data["grid"]["points"])
-        if isinstance(data["grid"]["points"], int)
-        else data["grid"]["points"]
-    )
-    kind = dice.choice(["npy", "h5", "h5", "txt"])
-    path = directory / f"road.{kind}"
-    data["surface"] = {"shape": "file", "path": path.name, "scale": dice.choice([1.0, 1e-6])}
-    if kind == "h5":
-        data["surface"]["dataset"] = dice.choice(
-            ["heights", "soft", "one", "out", "deep/map", "time", "raw", "", "/", "."]
-        )
-    job = _write(directory, yamltext.dump(data))
-    if dice.random() < 0.1:
-        odd_file(dice, directory, path)
-        return job
-    heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((ny, nx))
-    heights = dice.choice(
-        [heights, heights, heights * 1e300, heights * 1e-310, heights.T, heights[0], heights.astype("S8")]
-    )
-    if dice.random() < 0.1 and heights.dtype == float:
-        heights.flat[dice.randrange(heights.size)] = dice.choice([np.nan, np.inf, 1e308])
-    write_heights(path, heights)
+        return odd_file(dice, directory / "job.yaml")
+    path = directory / f"road.{dice.choice(['npy', 'txt', 'xyz', 'h5', 'x3p'])}"
+    named = {".npy": {"shape": "file"}, ".txt": {"shape": "file"}, ".h5": {"shape": "file", "dataset": "heights"}}
+    part = {"path": path.name, **named.get(path.suffix, {"shape": "topography", "unit": "m", "size": [1e-3, 1e-3]})}
+    job = _write(directory, yamltext.dump({**_base(dice), "surface": part}))
+    heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((16, 16))
+    odd = (heights * 1e300, heights * 1e-310, heights[:12], heights[0], heights.astype("S8"), heights * 1j)
+    heights = dice.choice([*6 * [heights], *odd])
+    if path.suffix == ".npy":
+        np.save(path, heights)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file["heights"] = heights
+    elif path.suffix == ".x3p" and heights.dtype == float and heights.ndim == 2:
+        Topography(heights, (1e-3, dice.choice([1e-3, 0.0, np.nan, 1e-300])), unit="m").to_x3p(str(path))
+    elif dice.random() < 0.8:
+        np.savetxt(path, np.atleast_1d(heights), fmt="%s")
+    else:
+        return odd_file(dice, path) and job
     if dice.random() < 0.5:
-        damage(dice, path)
+        content = bytearray(path.read_bytes())
+        for _ in range(dice.choice([1, 5, 50]) if content else 0):
+            content[dice.randrange(len(content))] = dice.randrange(256)
+        path.write_bytes(content[: dice.randrange(len(content) + 1)] if dice.random() < 0.3 else content)
     return job
 
 
-def changed_map(dice: Random, directory: Path) -> Path:
-    """A measured map that is damaged, of another type, with odd positions or lengths, or much larger than the box."""
-    kind = dice.choice(["npy", "xyz", "x3p", "gwy"])
-    path, step = directory / f"road.{kind}", 1e-4
-    part: dict[str, Any] = {"shape": "topography", "path": path.name}
-    heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((16, 16))
-    if kind == "npy":
-        part |= {"unit": "m", "size": [16 * step, 16 * step]}
-        types = (heights * 1j, heights > 0.0, heights.astype("M8[s]"), heights.view([("z", "f8")]), heights * 1e-302)
-        if dice.random() < 0.2:  # more than any memory holds
-            with path.open("wb") as file:
-                shape = (10 ** dice.choice([6, 9, 18]), 10**6)
-                np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
-        else:
-            np.save(path, dice.choice([heights, *types]))
-    elif kind == "xyz":
-        part |= {"unit": "m"}
-        y, x = np.indices(heights.shape)
-        table = np.stack([x.ravel() * step, y.ravel() * step, heights.ravel()], axis=1)
-        table[dice.randrange(len(table)), dice.randrange(3)] = dice.choice([np.inf, np.nan, 10.0, -1e9, 1e300, 1e-300])
-        np.savetxt(path, table)
-    else:
-        size = dice.choice([16 * step, 16 * step, 0.0, np.nan, np.inf, 1e-300])
-        made = Topography(heights, (16 * step, size), unit="m")
-        (made.to_x3p if kind == "x3p" else made.to_gwy)(str(path))
-    if dice.random() < 0.3:
-        damage(dice, path)
-    size = dice.choice([1e-3, 1e-3, 1e-6, 1e-300, [1e-3, 1e-6]])
-    return _write(directory, yamltext.dump({**BASES[0], "surface": part, "grid": {"points": 16, "size": size}}))
-
-
-def write_heights(path: Path, heights: Any) -> None:
-    if path.suffix == ".npy":
-        np.save(path, heights)
-    elif path.suffix == ".txt":
-        np.savetxt(path, np.atleast_1d(heights), fmt="%s")
-    else:
-        with h5py.File(path, "w") as file:
-            file["heights"] = file["deep/map"] = heights
-            file["soft"], file["one"] = h5py.SoftLink("/deep/map"), h5py.SoftLink("/one")
-            file["out"] = h5py.ExternalLink(str(path.with_name("pipe")), "/heights")
-            space = h5py.h5s.create_simple(np.atleast_1d(heights).shape)
-            h5py.h5d.create(file.id, b"time", h5py.h5t.UNIX_D32LE, space)
-            file.create_dataset("raw", heights.shape, "f8", external=[("raw.bin", 0, h5py.h5f.UNLIMITED)])
-        os.mkfifo(path.with_name("pipe"))
-
-
-def damage(dice: Random, path: Path) -> None:
-    content = bytearray(path.read_bytes())
-    for _ in range(dice.choice([1, 5, 50])):
-        if content:
-            content[dice.randrange(len(content))] = dice.randrange(256)
-    path.write_bytes(content[: dice.randrange(len(content) + 1)] if dice.random() < 0.3 else content)
-
-
-def odd_file(dice: Random, directory: Path, path: Path) -> Path:
+def odd_file(dice: Random, path: Path) -> Path:
+    """No regular file that can be read, or nothing at all."""
     kind = dice.choice(["pipe", "device", "directory", "sparse", "missing", "loop", "unreadable"])
     if kind == "pipe":
         os.mkfifo(path)
@@ -226,12 +162,11 @@ def odd_file(dice: Random, directory: Path, path: Path) -> Path:
         path.symlink_to(dice.choice(["/dev/zero", "/dev/random", "/dev/full"]))
     elif kind == "directory":
         path.mkdir()
-    elif kind == "sparse":
-        with path.open("wb") as file:
-            file.truncate(10_000_000_000)
     elif kind == "loop":
         path.symlink_to(path.name)
+    elif kind == "sparse":
+        path.touch()
+        os.truncate(path, 10_000_000_000)
     elif kind == "unreadable":
-        path.write_text("")
-        path.chmod(0)
+        path.touch(0)
     return path

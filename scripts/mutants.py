@@ -2,10 +2,10 @@
 
     .venv/bin/python scripts/mutants.py [--count 40] [--seed 0] [--list] [part ...]
 
-A part is a file of the program beside the tests that answer for it (PARTS below). In each a place is drawn at random in
-a function: an operator, a comparison, a sign, a number or a limit is changed to a wrong one. No line of the source is
-named here, so that the code may be written anew. Some changes alter nothing that matters (a limit that is never met, a
-guard against what cannot happen): of all, at least `SEEN` must be seen. Works on a copy of the last commit in a
+A part is a file of the program that has tests of its own (tests/ROOM/test_NAME*.py). In each a place is drawn at random
+in a function: an operator, a comparison, a sign, a number or a limit is changed to a wrong one. No line of the source
+is named here, so that the code may be written anew. Some changes alter nothing that matters (a limit that is never met,
+a guard against what cannot happen): of all, at least `SEEN` must be seen. Works on a copy of the last commit in a
 temporary directory. Some ten seconds a change.
 """
 
@@ -21,77 +21,40 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+HOUSE, TESTS = ROOT / "parcontact", ROOT / "tests"
+ROOMS = ("physics", "parallel", "solve", "march", "scene", "storage", "plan", "effects", "history")
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
-SURFACE = ("tests/physics/test_surface.py", "tests/physics/test_surface_forces.py")
-CONTACT = tuple(f"tests/solve/test_contact{part}.py" for part in ("", "_symmetries", "_cost", "_failures"))
-VISCOELASTIC = ("tests/scenarios/test_viscoelastic.py", "tests/scenarios/test_viscoelastic_scales.py")
-SLIDING = tuple(f"tests/scenarios/test_sliding_{part}.py" for part in ("waves", "runs", "examples", "cost"))
-PARTS = {  # files of the program, and the tests that answer for them
-    "physics/body.py": ("tests/physics/test_material.py", *VISCOELASTIC),
-    "physics/energy.py": ("tests/physics/test_energy.py",),
-    "physics/wake.py": ("tests/physics/test_wake.py",),
-    "physics/folding.py": ("tests/physics/test_folding.py", "tests/effects/test_folded_branches.py"),
-    "physics/ledger.py": ("tests/physics/test_ledger.py",),
-    "physics/loops.py": ("tests/physics/test_loops.py", "tests/physics/test_embedded.py", *SURFACE),
-    "physics/embedded.py": ("tests/physics/test_embedded.py",),
-    "physics/halfspace.py": ("tests/physics/test_halfspace.py", "tests/physics/test_love.py"),
-    "physics/surface.py": (*SURFACE, "tests/physics/test_sliding.py"),
-    "physics/roughness.py": ("tests/physics/test_roughness.py",),
-    "physics/lowest.py": ("tests/physics/test_lowest.py", "tests/scene/test_rigid_surface.py"),
-    "physics/budget.py": ("tests/physics/test_budget.py", "tests/run/test_half_mesh.py"),
-    "physics/time_error.py": ("tests/physics/test_budget.py",),
-    "parallel/fft.py": ("tests/parallel/test_fft.py",),
-    "parallel/slab.py": ("tests/parallel/test_slab.py",),
-    "solve/contact.py": (*CONTACT, "tests/robustness/test_descent.py"),
-    "solve/constraint.py": ("tests/solve/test_constraint.py", *CONTACT),
-    "solve/kernels.py": ("tests/solve/test_kernels.py", *CONTACT),
-    "solve/nonsymmetric/steady.py": ("tests/steady_sliding/test_sliding.py",),
-    "solve/nonsymmetric/projected.py": ("tests/solve/test_projected.py", "tests/steady_sliding/test_sliding.py"),
-    "solve/local_load.py": ("tests/solve/test_local_load.py",),
-    "solve/nonsymmetric/gcr.py": ("tests/solve/test_gcr.py",),
-    "solve/fallback/active_set.py": ("tests/solve/test_active_set.py", "tests/march/test_step.py"),
-    "march/choosing.py": (
-        "tests/march/test_choosing.py",
-        "tests/history/test_chosen.py",
-        "tests/march/test_step_after_a_jump.py",
-    ),
-    "march/starts.py": ("tests/march/test_starts.py",),
-    "march/state.py": ("tests/march/test_state.py", "tests/march/test_starts.py"),
-    "march/errors.py": (
-        "tests/scenarios/test_sliding_waves.py",
-        "tests/history/test_chosen.py",
-        "tests/run/test_half_mesh.py",
-    ),
-    "march/step.py": (*VISCOELASTIC, *SLIDING, "tests/march/test_step.py"),
-    "march/rest.py": ("tests/march/test_rest.py",),
-    "history/timeline.py": ("tests/history/test_timeline.py", *VISCOELASTIC),
-    "history/chosen.py": ("tests/history/test_chosen.py", "tests/march/test_choosing.py"),
-    "storage/checkpoint.py": ("tests/storage/test_checkpoint.py",),
-    "plan/memory.py": ("tests/plan/test_memory.py", "tests/steady_sliding/test_start.py"),
+FEWEST = 8  # places to break in a part
+SCENARIOS = {  # whole scenes that answer for a part, too
+    "march/step.py": "test_viscoelastic.py test_viscoelastic_scales.py test_sliding_waves.py test_sliding_runs.py",
+    "march/errors.py": "test_sliding_waves.py",
+    "physics/body.py": "test_viscoelastic.py",
 }
-SWAPS: dict[type[ast.AST], type[ast.AST]] = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.Lt: ast.GtE,
-    ast.GtE: ast.Lt,
-    ast.Gt: ast.LtE,
-    ast.LtE: ast.Gt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.And: ast.Or,
-    ast.Or: ast.And,
-}
+PAIRS = ((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE), (ast.Eq, ast.NotEq))
+SWAPS: dict[type[ast.AST], type[ast.AST]] = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}
+SWAPS |= {ast.And: ast.Or, ast.Or: ast.And}
 NAMES = {"max": "min", "min": "max", "expm1": "exp", "exp": "expm1", "sin": "cos", "cos": "sin", "abs": "float"}
 Change = tuple[str, Callable[[], None]]  # what is done, and doing it to the tree
 
 
+def tests_of(part: str) -> tuple[str, ...]:
+    """The tests that answer for a file of the program: `tests/ROOM/test_NAME*.py`, and some scenarios."""
+    own = sorted((TESTS / part).parent.glob(f"test_{Path(part).stem}*.py"))
+    own += [TESTS / "scenarios" / name for name in SCENARIOS.get(part, "").split()]
+    return tuple(str(path.relative_to(ROOT)) for path in own)
+
+
+def parts() -> list[str]:
+    """Files of the program that can be broken in many places, and whose tests are known by their names."""
+    files = [path for room in ROOMS for path in sorted((HOUSE / room).rglob("*.py"))]
+    found = [path for path in files if len(list(changes(ast.parse(path.read_text())))) >= FEWEST]
+    return [name for name in (str(path.relative_to(HOUSE)) for path in found) if tests_of(name)]
+
+
 def changes(tree: ast.Module) -> Iterator[Change]:
     """Every change that can be made in the functions of a module; annotations, messages and indices stay."""
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    for function in functions:
+    for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
         for statement in function.body:
             for node in ast.walk(statement):
                 yield from _of(node, function.name)
@@ -170,7 +133,7 @@ def try_out(part: str, text: str, tree: Path) -> str:
     before = path.read_text()
     path.write_text(text)
     try:
-        return first_failure(tree, PARTS[part])
+        return first_failure(tree, tests_of(part))
     finally:
         path.write_text(before)
 
@@ -180,11 +143,11 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=40, help="changes that are tried")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--list", action="store_true", help="only say what would be changed")
-    parser.add_argument("parts", nargs="*", metavar="part", choices=[[], *PARTS], help="files of the program")
+    parser.add_argument("parts", nargs="*", metavar="part", help="files of the program, like solve/contact.py")
     chosen = parser.parse_args()
     chance = random.Random(chosen.seed)
-    parts = chosen.parts or list(PARTS)
-    drawn = [(part, *draw(part, chance)) for part in (parts[k % len(parts)] for k in range(chosen.count))]
+    some = chosen.parts or parts()
+    drawn = [(part, *draw(part, chance)) for part in (some[k % len(some)] for k in range(chosen.count))]
     if chosen.list:
         print("\n".join(f"{part} {what}" for part, what, _ in drawn))
         return 0
@@ -193,7 +156,7 @@ def main() -> int:
         tree = Path(place)
         copy(tree)
         for part in dict.fromkeys(part for part, *_ in drawn):
-            if failure := first_failure(tree, PARTS[part]):
+            if failure := first_failure(tree, tests_of(part)):
                 print(f"{part} as it is: {failure}", flush=True)
                 return 1
         for part, what, text in drawn:

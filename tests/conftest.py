@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 WORLD = MPI.COMM_WORLD
 REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
 UNSEEN = io.StringIO()  # what pytest says on the other ranks
-outside = load_script("outside")
+outside = load_script("runs")
 MOST_RANKS = 4  # that scripts/test starts
 MAX_SECONDS_APART = 20.0  # seconds in which the other ranks must end a test that failed here
 

@@ -1,6 +1,6 @@
 """Jobs as dictionaries or worked examples, marched in this process."""
 
-import importlib.util
+import importlib
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -29,17 +29,12 @@ JOBS = ROOT / "jobs"
 
 
 def load_script(name: str) -> ModuleType:
-    """A script of scripts/, as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
+    """A script of scripts/, or a part of one like `bench.meter`, as a module."""
     sys.path.insert(0, str(ROOT / "scripts"))  # where it finds its neighbours, as when it runs
     try:
-        spec.loader.exec_module(script)
+        return importlib.import_module(name)
     finally:
         sys.path.remove(str(ROOT / "scripts"))
-    return script
 
 
 def example(name: str, *overrides: str) -> Job:

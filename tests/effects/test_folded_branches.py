@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 import yaml
-from marching import begun, column, load_script, marched
+from marching import begun, column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -147,15 +147,6 @@ def test_a_steady_start_freezes_nothing() -> None:
     )
     assert (fewer.scene.folded.memoryless, fewer.scene.folded.frozen) == ((0,), ())
     assert_array_equal(fewer.state.body.branches, whole.state.body.branches[1:])
-
-
-def test_script() -> None:
-    """What scripts/folded_branches.py marches, on a grid so small that it says nothing about friction."""
-    script = load_script("folded_branches")
-    runs = [script.sliding(64, allowed, 1e-1) for allowed in (0.0, 1e-3)]
-    assert [len(rows) for rows in script.together(runs)] == [33, 33]
-    assert [len(run.scene.folded.kept) for run in runs] == [12, 5]
-    assert script.memory_pass(runs[0]) > 0.0
 
 
 # -- restarts ----------------------------------------------------------------------------------------------------------

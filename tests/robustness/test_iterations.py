@@ -47,7 +47,7 @@ def test_last_gap_between_points(side: float) -> None:
     x, y = (np.cos(2 * np.pi * (np.arange(points) + 0.3) / points) for points in (37, 31))
     heights = x[None, :] * y[:, None]
     solving = load_sweep.solver(heights, 1e-10)
-    waves = solving.preconditioner.apply(heights - heights.mean(), np.empty_like(heights))
+    waves = solving[1].preconditioner.apply(heights - heights.mean(), np.empty_like(heights))
     counts = []
     for exponent in range(-1, -17, -1):
         mean = -waves.min() * (1.0 + side * 10.0**exponent)

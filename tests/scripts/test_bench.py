@@ -19,12 +19,12 @@ from parcontact.solve.preconditioner import extension
 
 @pytest.fixture(scope="module")
 def meter() -> ModuleType:
-    return load_script("bench_meter")
+    return load_script("bench.meter")
 
 
 @pytest.fixture(scope="module")
 def peers() -> ModuleType:
-    return load_script("bench_peers")
+    return load_script("bench.peers")
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_a_transform_by_its_bytes(meter: ModuleType) -> None:
 
 def test_what_memory_lets_two_ranks_do() -> None:
     """Nothing passes through memory: twice as fast; all of it at the rate of one rank: as fast as one."""
-    scale = load_script("bench_scale")
+    scale = load_script("bench.scaling")
     one = scale.Run(3.0, {"transform": 2.0, "exchange": 0.0, "everything else": 1.0}, 0.0, 0.0, 0.0)
     assert scale.best_ratio(one, scale.Run(2.0, {}, 0.0, 0.0, 0.0), 1.0, 10.0) == 2.0
     assert scale.best_ratio(one, scale.Run(2.0, {}, 20.0, 10.0, 0.0), 1.0, 10.0) == 1.0
@@ -80,7 +80,7 @@ def test_the_loosest_tolerance_is_found(peers: ModuleType, begins: float, needs:
     """A program whose error is its tolerance, and which takes a second for each digit."""
     code = "def attempt(tolerance):\n    return -float(np.log10(tolerance)), tolerance"
     given = {"heights": np.zeros((2, 2)), "load": 1.0, "wanted": needs * (1.0 + 1e-12)}
-    found = peers._search(Path(sys.executable), peers.Task("it", code, begins), given)
+    found = peers.search(Path(sys.executable), peers.Task("it", code, begins), given)
     assert found.reached
     assert found.seconds == pytest.approx(3.0)
     assert found.error == pytest.approx(1e-3)
@@ -89,14 +89,14 @@ def test_the_loosest_tolerance_is_found(peers: ModuleType, begins: float, needs:
 def test_a_program_that_is_too_slow(peers: ModuleType) -> None:
     """What its last try took at least counts, or a longer one before."""
     first = [{"began": 0.0}, {"seconds": 100.0, "error": 1e-5}, {"began": 120.0}]
-    assert peers._judge(first, 1e-7).seconds == peers.LIMIT - 120.0
-    assert not peers._judge(first, 1e-7).reached
-    assert peers._judge([*first[:2], {"began": 400.0}], 1e-7).seconds == 100.0
+    assert peers.judge(first, 1e-7).seconds == peers.LIMIT - 120.0
+    assert not peers.judge(first, 1e-7).reached
+    assert peers.judge([*first[:2], {"began": 400.0}], 1e-7).seconds == 100.0
 
 
 def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
     """Also past the length of the box, whose surface comes round again."""
-    slide = load_script("bench_scale").Slide(64, MPI.COMM_SELF)
+    slide = load_script("bench.work").Slide(64)
     for _ in range(66):
         slide.step()
     assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load

@@ -1,4 +1,4 @@
-"""Scenes of `scripts/coverage.py`: a reference on a finer grid is of the same surface."""
+"""Scenes of `scripts/error_coverage.py`: a reference on a finer grid is of the same surface."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from parcontact import job as jobs
 from parcontact import scene
 from parcontact.parallel.slab import Slab
 
-coverage_scenes = load_script("coverage_scenes")
+coverage_scenes = load_script("error_coverage.scenes")
 
 
 def sampled(number: int, finer: int, directory: Path) -> np.ndarray:

@@ -1,18 +1,12 @@
-"""Parts `fft` and `solve` of scripts/bench.py: a transform, and cold elastic solves, ours and those of others."""
+"""What is measured: transforms, cold elastic solves of one surface, and slides over another."""
 
-import argparse
-import statistics
-import time
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
 
 import numpy as np
-from bench_lines import Line, Map, compare, interleave
-from bench_peers import ASPHER_COLD, TAMAAS_COLD, Task, compare_peers
 from mpi4py import MPI
+from runs import Json, begun
 
-from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
-from parcontact.parallel.fftw import pyfftw
+from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
@@ -22,37 +16,15 @@ from parcontact.solve.fallback import cold_start
 from parcontact.solve.problem import MeanPressure, Operators, Problem
 from parcontact.solve.workspace import Workspace
 
+from .table import Map
+
 LOAD = 0.05  # mean pressure over E*, for 11 % of contact at a slope of 1
 MODULUS = 4.0  # E* of shear modulus 1 and Poisson's ratio 1/2
-ERROR = 1e-7  # of pressures
-Solver = tuple[ContactSolver, Operators]  # of a contact
+Solver = tuple[ContactSolver, Operators]
 EXACT = 1e-11  # a tolerance whose pressures others are compared with
-PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
 TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.25)]
-
-
-def fft(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    heights, out = (pyfftw.zeros_aligned((points, points), "float64", n=64) for _ in range(2))
-    waves = pyfftw.zeros_aligned((points, points // 2 + 1), "complex128", n=64)
-    forward = pyfftw.FFTW(heights, waves, (0, 1), "FFTW_FORWARD", ("FFTW_MEASURE",))
-    backward = pyfftw.FFTW(waves, out, (0, 1), "FFTW_BACKWARD", ("FFTW_MEASURE", "FFTW_DESTROY_INPUT"))
-    heights[...] = np.random.default_rng(1).random(heights.shape)
-    bare = {"FFTW alone": lambda: (forward.execute(), backward.execute())}
-    ours = {name: pair(Slab(MPI.COMM_SELF, points, points), name) for name in ("float64", "float32")}
-    yield from compare("fft", interleave({**bare, **ours}, rounds), "FFTW alone")
-    yield from planning(points)
-
-
-def planning(points: int) -> Iterator[Line]:
-    """Of both transforms: the first time on a machine, and with FFTW's wisdom of that time, which runs keep."""
-    before = export_wisdom()
-    pyfftw.forget_wisdom()
-    for name in ("the first time", "again"):
-        began = time.process_time()
-        FFT(Slab(MPI.COMM_SELF, points, points))
-        yield Line("fft", f"planning, {name}", 1e3 * (time.process_time() - began), "ms")
-        import_wisdom(export_wisdom())  # forgets plans, too: those of the next run are made from what is kept
-    import_wisdom(before)
+WARM = 12  # first steps of a slide, which are not like the others
+ENDLESS = 1_000_000  # steps: more than anybody asks for; the surface comes round again and again
 
 
 def pair(slab: Slab, dtype: str) -> Callable[[], object]:
@@ -60,6 +32,10 @@ def pair(slab: Slab, dtype: str) -> Callable[[], object]:
     transform, heights, out = FFT(slab, dtype=dtype), slab.empty(dtype), slab.zeros(dtype)
     heights[...] = np.random.default_rng(1).random(slab.shape)
     return lambda: transform.backward(transform.forward(heights), out)
+
+
+def distance(p: Map, reference: Map) -> float:
+    return float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
 
 
 class Cold:
@@ -75,10 +51,10 @@ class Cold:
         self.heights: Map = np.asarray(fft.backward(waves, self.slab.zeros()), dtype=np.float64)
         low, high = self.slab.reduce((), [-float(self.heights.min()), float(self.heights.max())])
         self.height, self.fft = low + high, fft
-        self.reference: Map | None = None  # the solution to EXACT, when it has been asked for
+        self.reference: Map | None = None  # the solution to EXACT, once it has been asked for
 
     def solver(self, tolerance: float, single: bool = False, slab: Slab | None = None) -> Solver:
-        """With K in single precision, or for a coarser grid; and the operators."""
+        """A solver with its preconditioner in single precision, or for a coarser grid."""
         fft = self.fft if slab is None else FFT(slab, measured=False)
         other = FFT(fft.slab, dtype=np.float32, measured=fft.measured) if single else fft
         half = HalfSpace(self.size)
@@ -89,13 +65,13 @@ class Cold:
         return Problem(*operators, self.heights, NonNegative(), MeanPressure(self.load * MODULUS))
 
     def start(self, solver: Solver) -> Map:
-        """From nested grids."""
+        """The pressure from nested grids."""
         start, (own, operators) = np.zeros_like(self.heights), solver
         cold_start.prepare(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
         return start
 
     def go_on(self, solver: Solver, start: Map) -> Contact:
-        """From a start that becomes the solution."""
+        """Solve from a start, which becomes the solution."""
         own, operators = solver
         return own.solve(self.problem(operators), start)
 
@@ -103,7 +79,7 @@ class Cold:
         return np.asarray(self.go_on(solver, self.start(solver)).p)
 
     def loosest(self, error: float, single: bool = False) -> tuple[Solver, float]:
-        """With the loosest tolerance by which the pressure is wrong by so much or less, and how wrong it is."""
+        """The solver with the loosest tolerance by which the pressure is wrong by at most `error`, and its error."""
         if self.reference is None:
             self.reference = self.solve(self.solver(EXACT))
         for tolerance in TOLERANCES:
@@ -113,22 +89,30 @@ class Cold:
         return solver, found
 
 
-def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
-    surface = Cold(points)
-    ways: dict[str, Callable[[], object]] = {}
-    for name, single in (("double", False), ("mixed", True)):
-        solver, error = surface.loosest(ERROR, single)
-        calls = surface.slab.tally["operator"]
-        surface.solve(solver)
-        yield Line("solve", f"{name}: operator calls", surface.slab.tally["operator"] - calls, "")
-        yield Line("solve", f"{name}: pressure error", error, "")
-        ways[name] = partial(surface.solve, solver)
-    times = interleave(ways, rounds)
-    yield from compare("solve", times, "double")
-    if asked.peers is not None and surface.reference is not None:
-        given = {"heights": surface.heights, "reference": surface.reference / MODULUS, "load": LOAD, "wanted": ERROR}
-        yield from compare_peers(asked.peers, "solve", PEERS, given, statistics.median(times["double"]))
+def sliding_job(points: int, steps: int, tolerance: float = 5e-3) -> Json:
+    """Sliding with twelve branches, by one cell a step."""
+    rough = {"hurst": 0.9, "long_wavelength": 2.5e-4, "short_wavelength": min(1.6e-2 / points, 1e-4)}
+    return {
+        "grid": {"points": points, "size": 1e-3},
+        "surface": {"shape": "rough", **rough, "rms_slope": 0.02, "seed": 1},
+        "material": {"include": "synthetic_tyre"},
+        "history": [{"pressure": 1e5, "velocity": 0.3, "distance": steps * 1e-3 / points, "cells_per_step": 1}],
+        "numerics": {"tolerance": tolerance},
+    }
 
 
-def distance(p: Map, reference: Map) -> float:
-    return float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
+class Slide:
+    """An endless slide, step by step."""
+
+    def __init__(self, points: int, comm: MPI.Intracomm = MPI.COMM_SELF) -> None:
+        self.march = begun(sliding_job(points, ENDLESS), comm=comm)
+        self._steps = self.march.steps()
+
+    def step(self) -> None:
+        """Collective."""
+        self.march.advance(next(self._steps))
+
+    def warm_up(self) -> None:
+        """Make the first steps; collective."""
+        for _ in range(WARM):
+            self.step()

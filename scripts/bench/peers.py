@@ -1,4 +1,4 @@
-"""Other programs on the work of scripts/bench.py, each in an environment of its own, to the same measured error."""
+"""Other programs on the same work, each in an environment of its own, to the same measured error."""
 
 import json
 import os
@@ -7,13 +7,13 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from bench_lines import Line
+
+from .table import Line
 
 LIMIT = 420  # CPU seconds of one program, all tolerances together
 HEADERS = "cmeel-eigen"  # has the headers that aspher is compiled with
@@ -94,8 +94,7 @@ def attempt(tolerance):
 """
 
 
-@dataclass(frozen=True)
-class Task:
+class Task(NamedTuple):
     """Work for a program: its `code` defines `attempt(tolerance) -> (seconds, error)`, with what is `given` to it; the
     search begins at the tolerance `10**exponent`."""
 
@@ -104,8 +103,7 @@ class Task:
     exponent: float
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """What a program took [s] by the loosest tolerance with which its error was small enough; or, if it did not get
     there, the longest try."""
 
@@ -114,44 +112,37 @@ class Found:
     error: float
 
 
-def compare_peers(
-    directory: Path, part: str, tasks: tuple[Task, ...], given: Mapping[str, Any], ours: float
-) -> Iterator[Line]:
+def compare_peers(directory: Path, tasks: tuple[Task, ...], given: Mapping[str, Any], ours: float) -> Iterator[Line]:
     """CPU seconds of each to the error `given["wanted"]`, over `ours`; one that fails is left out."""
     for task in tasks:
         try:
-            found = _search(_installed(directory, task.program), task, given)
+            found = search(_installed(directory, task.program), task, given)
         except (subprocess.CalledProcessError, OSError) as failure:
-            print(f"{part}: {task.program} is left out: {_last_line(failure)}")
+            said = getattr(failure, "stderr", None) or str(failure)
+            print(f"{task.program} is left out: {said.strip().splitlines()[-1:]}")
             continue
         least = "" if found.reached else ", error not reached in time: more than"
         if found.reached:
-            yield Line(part, f"{task.program}: error", found.error, "")
-        yield Line(part, f"{task.program}{least}", 1e3 * found.seconds, "ms")
-        yield Line(part, f"{task.program} over ours{least}", found.seconds / ours, "")
+            yield Line(f"{task.program}: error", found.error)
+        yield Line(f"{task.program}{least}", 1e3 * found.seconds, "ms")
+        yield Line(f"{task.program} over ours{least}", found.seconds / ours)
 
 
-def _last_line(failure: subprocess.CalledProcessError | OSError) -> str:
-    said = (getattr(failure, "stderr", None) or str(failure)).strip().splitlines()
-    return said[-1] if said else str(failure)
-
-
-def _search(python: Path, task: Task, given: Mapping[str, Any]) -> Found:
-    """At smaller and smaller tolerances until the error is reached, or larger and larger ones until it is not."""
+def search(python: Path, task: Task, given: Mapping[str, Any]) -> Found:
+    """Try smaller and smaller tolerances until the error is reached, or larger and larger ones until it is not."""
     with tempfile.TemporaryDirectory() as where:
         file = Path(where, "given.npz")
         np.savez(file, exponent=task.exponent, **given)
         words = [str(python), "-c", SEARCH.format(attempt=task.code, limit=LIMIT), str(file)]
-        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        done = subprocess.run(words, capture_output=True, text=True, env=environment)
+        done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
     if done.returncode not in (0, -signal.SIGXCPU):
         raise subprocess.CalledProcessError(done.returncode, task.program, done.stdout, done.stderr)
-    return _judge([json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")], given["wanted"])
+    return judge([json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")], given["wanted"])
 
 
-def _judge(said: list[dict[str, float]], wanted: float) -> Found:
-    good = [one for one in said if one.get("error", np.inf) <= wanted]
-    if good:
+def judge(said: list[dict[str, float]], wanted: float) -> Found:
+    """The cheapest try that was good enough; else the longest one, of which the last may not have ended in time."""
+    if good := [one for one in said if one.get("error", np.inf) <= wanted]:
         cheapest = min(good, key=lambda one: one["seconds"])
         return Found(True, cheapest["seconds"], cheapest["error"])
     tries = [one["seconds"] for one in said if "seconds" in one]
@@ -160,37 +151,26 @@ def _judge(said: list[dict[str, float]], wanted: float) -> Found:
     return Found(False, max(tries + unfinished, default=LIMIT), np.inf)
 
 
-# -- environments ------------------------------------------------------------------------------------------------------
-
-
 def _installed(directory: Path, program: str) -> Path:
     """The Python of a program's own environment, which is made if it is not there."""
-    place = directory / program
-    python, done = place / "bin" / "python", place / "installed"
+    python, done = directory / program / "bin" / "python", directory / program / "installed"
     if not done.exists():
-        _call(sys.executable, "-m", "venv", "--clear", place)
-        INSTALL[program](python)
+        _call(sys.executable, "-m", "venv", "--clear", directory / program)
+        with tempfile.TemporaryDirectory() as where:
+            more = _eigen(python, Path(where)) if program == "aspher" else {}
+            _call(python, "-m", "pip", "install", "-q", program, more=more)
         done.touch()
     return python
 
 
-def _install_tamaas(python: Path) -> None:
-    _call(python, "-m", "pip", "install", "-q", "tamaas")
-
-
-def _install_aspher(python: Path) -> None:
-    """From source, with headers that another package has."""
-    with tempfile.TemporaryDirectory() as where:
-        _call(python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS)
-        zipfile.ZipFile(next(Path(where).glob("*.whl"))).extractall(where)
-        include = Path(where, "cmeel.prefix", "include", "eigen3")
-        found = {"CPATH": str(include), "CMAKE_ARGS": f"-DFETCHCONTENT_SOURCE_DIR_EIGEN3_SRC={include}"}
-        _call(python, "-m", "pip", "install", "-q", "aspher", more=found)
+def _eigen(python: Path, where: Path) -> dict[str, str]:
+    """What aspher is built with from source: headers that another package has."""
+    _call(python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS)
+    zipfile.ZipFile(next(where.glob("*.whl"))).extractall(where)
+    include = where / "cmeel.prefix" / "include" / "eigen3"
+    return {"CPATH": str(include), "CMAKE_ARGS": f"-DFETCHCONTENT_SOURCE_DIR_EIGEN3_SRC={include}"}
 
 
 def _call(*words: object, more: Mapping[str, str] | None = None) -> None:
     command = list(map(str, words))
     subprocess.run(command, check=True, capture_output=True, text=True, env={**os.environ, **(more or {})})
-
-
-INSTALL: dict[str, Callable[[Path], None]] = {"tamaas": _install_tamaas, "aspher": _install_aspher}

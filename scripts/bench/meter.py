@@ -1,4 +1,4 @@
-"""What a call of the program consists of, for scripts/bench.py: seconds by part, bytes by loop, flops of transforms.
+"""What a call of the program consists of: seconds by part, bytes by loop, flops of transforms.
 
 While a `Meter` is in place, FFTW's plans, compiled loops and exchanges between ranks tell it of each call. Bytes are
 those of every array that a loop reads, and those of every array that it writes, once each however often it does: the
@@ -26,7 +26,6 @@ from parcontact.parallel.slab import Slab
 TRANSFORM, EXCHANGE, OTHER = "transform", "exchange", "everything else"
 EXCHANGES = [(transpose.Leg, name) for name in ("post", "to_columns", "to_rows", "collect")]
 EXCHANGES += [(Slab, "reduce"), (pyramid, "fetch"), (pyramid.RowsBeside, "fetch")]
-Reads = dict[str, int]  # how many times the bytes of each parameter pass: read, written, or both
 
 
 class Meter:
@@ -47,9 +46,9 @@ class Meter:
 
     @contextmanager
     def in_place(self) -> Iterator["Meter"]:
-        """Of all plans that are made inside, and all loops and exchanges."""
+        """Meter all plans that are made inside, and all loops and exchanges."""
         with ExitStack() as stack:
-            stack.enter_context(patch.object(pyfftw, "FFTW", _metered_plans(self)))
+            stack.enter_context(patch.object(pyfftw, "FFTW", self._metered_plans()))
             for owner, name in EXCHANGES:
                 stack.enter_context(patch.object(owner, name, self._timed(EXCHANGE, getattr(owner, name))))
             for module, name, function in _loops():
@@ -78,36 +77,29 @@ class Meter:
 
         return wrapper
 
+    def _metered_plans(self) -> type:
+        meter, original = self, pyfftw.FFTW
 
-def _metered_plans(meter: Meter) -> type:
-    original = pyfftw.FFTW
+        class Metered:
+            """A plan of FFTW that tells of its executions; flops as FFTW's authors count them, half for real data."""
 
-    class Metered:
-        """A plan of FFTW that tells of its executions."""
+            def __init__(self, source: Any, target: Any, axes: tuple[int], *rest: Any) -> None:
+                self._plan = original(source, target, axes, *rest)
+                self._execute = meter._timed(TRANSFORM, self._plan.execute)
+                self._bytes = source.nbytes + target.nbytes
+                field = source if np.isrealobj(source) else target
+                each = 2.5 if np.isrealobj(field) else 5.0
+                self._flops = each * field.size * float(np.log2(field.shape[axes[0]]))
 
-        def __init__(self, source: Any, target: Any, axes: tuple[int], *rest: Any) -> None:
-            self._plan = original(source, target, axes, *rest)
-            self._execute = meter._timed(TRANSFORM, self._plan.execute)
-            self._bytes = source.nbytes + target.nbytes
-            self._flops = flops(source if np.isrealobj(source) else target, axes[0])
+            def execute(self) -> None:
+                meter.bytes[TRANSFORM] += self._bytes
+                meter.flops += self._flops
+                self._execute()
 
-        def execute(self) -> None:
-            meter.bytes[TRANSFORM] += self._bytes
-            meter.flops += self._flops
-            self._execute()
+            def __getattr__(self, name: str) -> Any:
+                return getattr(self._plan, name)
 
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._plan, name)
-
-    return Metered
-
-
-def flops(field: Any, axis: int) -> float:
-    """Of a transform along one axis, as FFTW's authors count them: 5 n log2 n of n complex numbers, half for real."""
-    return (2.5 if np.isrealobj(field) else 5.0) * field.size * float(np.log2(field.shape[axis]))
-
-
-# -- loops -------------------------------------------------------------------------------------------------------------
+        return Metered
 
 
 def _loops() -> Iterator[tuple[Any, str, Any]]:
@@ -118,57 +110,46 @@ def _loops() -> Iterator[tuple[Any, str, Any]]:
         yield from ((module, name, value) for name, value in found.items() if name not in inner)
 
 
-def passes_of(function: Callable[..., Any]) -> Reads:
+def passes_of(function: Callable[..., Any]) -> dict[str, int]:
     """How often a loop passes over each parameter: 1 where it reads or writes, 2 where it does both."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     names = list(inspect.signature(function).parameters)
-    views = _views(tree, {name: {name} for name in names})
+    views = _Views(tree, names)
     seen: set[tuple[str, str]] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node not in views.definitions:
-            ways = ["write"] if isinstance(node.ctx, ast.Store) else ["read"]
-            seen |= {(name, way) for name in views.of.get(node.value.id, ()) for way in ways}
+            kind = "write" if isinstance(node.ctx, ast.Store) else "read"
+            seen |= {(name, kind) for name in views.parameters.get(node.value.id, ())}
         if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Subscript):
-            base = node.target.value
-            seen |= {(name, "read") for name in views.of.get(getattr(base, "id", ""), ())}
-    return {name: sum((name, way) in seen for way in ("read", "write")) for name in names}
+            base = getattr(node.target.value, "id", "")
+            seen |= {(name, "read") for name in views.parameters.get(base, ())}
+    return {name: sum((name, kind) in seen for kind in ("read", "write")) for name in names}
 
 
 class _Views:
-    """Names that stand for rows of parameters, and the expressions that make them, which read nothing."""
+    """Which parameters a local name is a row of, and the expressions that make such rows, which read nothing."""
 
-    def __init__(self, of: dict[str, set[str]]) -> None:
-        self.of, self.definitions = of, set[ast.AST]()
+    def __init__(self, tree: ast.AST, names: list[str]) -> None:
+        self.parameters, self.definitions = {name: {name} for name in names}, set[ast.AST]()
+        subscripts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Subscript)]
+        used = {value.id for value in subscripts if isinstance(value, ast.Name)}
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Assign):
+                continue
+            target, value = node.targets[0], node.value
+            both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            for left, right in zip(target.elts, value.elts, strict=True) if both else [(target, value)]:
+                if isinstance(left, ast.Name) and left.id in used and (sources := self._sources(right)):
+                    self.parameters.setdefault(left.id, set()).update(sources)
 
-
-def _views(tree: ast.AST, of: dict[str, set[str]]) -> _Views:
-    views = _Views(of)
-    used = {node.value.id for node in ast.walk(tree) if isinstance(node, ast.Subscript) and _is_name(node.value)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Assign):
-            for target, value in _pairs(node.targets[0], node.value):
-                if _is_name(target) and target.id in used and (sources := _sources(value, views)):
-                    of.setdefault(target.id, set()).update(sources)
-    return views
-
-
-def _pairs(target: Any, value: Any) -> list[tuple[Any, Any]]:
-    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-        return list(zip(target.elts, value.elts, strict=True))
-    return [(target, value)]
-
-
-def _sources(value: Any, views: _Views) -> set[str]:
-    """Parameters whose rows an expression is: `map[j]`, `row if above else map[j]`, `_row(map, beside, j)`."""
-    if isinstance(value, ast.IfExp):
-        return _sources(value.body, views) | _sources(value.orelse, views)
-    if isinstance(value, ast.Subscript) and _is_name(value.value):
-        views.definitions.add(value)
-        return views.of.get(value.value.id, set())
-    if isinstance(value, ast.Call) and _is_name(value.func):
-        return set[str]().union(*(views.of.get(part.id, set()) for part in value.args if isinstance(part, ast.Name)))
-    return views.of.get(value.id, set()) if isinstance(value, ast.Name) else set()
-
-
-def _is_name(node: Any) -> bool:
-    return isinstance(node, ast.Name)
+    def _sources(self, value: Any) -> set[str]:
+        """Parameters whose rows an expression is: `map[j]`, `row if above else map[j]`, `_row(map, beside, j)`."""
+        if isinstance(value, ast.IfExp):
+            return self._sources(value.body) | self._sources(value.orelse)
+        if isinstance(value, ast.Subscript) and isinstance(value.value, ast.Name):
+            self.definitions.add(value)
+            return self.parameters.get(value.value.id, set())
+        if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
+            given = [part.id for part in value.args if isinstance(part, ast.Name)]
+            return set[str]().union(*(self.parameters.get(name, set()) for name in given))
+        return self.parameters.get(value.id, set()) if isinstance(value, ast.Name) else set()

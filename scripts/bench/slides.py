@@ -1,0 +1,155 @@
+"""Parts `slide`, `folded`, `steady` and `memory`: sliding step by step and directly, and what a run holds.
+
+The slide beside peers has eight branches and backward Euler, as tamaas can do it too: relaxation times from 1e-4 to
+1e3, moduli of 2 each over a long-term modulus of 1, in a box of length 1 at a velocity of 1, by one cell a step.
+Friction is judged, and a step is timed, over the second half of FIRST steps of others and of LATER ones of ours: tamaas
+starts each solve from nothing, so that its later steps take as long as its first ones. Ours are solved in mixed
+precision, and timed in the mean: for some the start does, which take half as long as others.
+"""
+
+import argparse
+import statistics
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from runs import ROOT, Json, begun, marched
+
+import parcontact as pc
+from parcontact import scene
+from parcontact.job import load
+from parcontact.parallel.slab import Slab
+from parcontact.plan import memory
+from parcontact.steady_sliding.sliding import SteadySliding
+
+from .peers import TAMAAS_SLIDING, Task, compare_peers
+from .table import Line, Map, interleave
+from .work import pair, sliding_job
+
+DEFAULT, EXACT = 5e-3, 5e-5  # tolerances of a job that gives none, and of one to compare with
+LARGER = (0.1, 0.05, 0.02, 0.01)
+ERROR = 1e-3  # of friction
+FEWEST = 8  # steps: the first ones are not like the others
+FOLDED = (0.0, 1e-5, 1e-4, 1e-3, 1e-2)  # errors of friction that are allowed
+FIRST, LATER = 12, 48  # steps beside peers
+PRESSURE = 0.165  # beside peers, for 7 to 9 % of contact
+RELAXATION_TIMES = [10.0**k for k in range(-4, 4)]
+MODULUS = 2.0
+EXACT_BESIDE_PEERS = 1e-7
+TOLERANCES = [1e-2, 5e-3, 2e-3, 1e-3, 5e-4]
+PEERS = (Task("tamaas", TAMAAS_SLIDING, -3.0),)
+
+
+def slide(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
+    """Means over the second half of the steps: at the default tolerance, and at the largest one with which friction is
+    nowhere wrong by more than ERROR; with eight branches beside peers."""
+    steps = max(4 * rounds, FEWEST)
+    half = steps // 2
+    exact = _friction(sliding_job(points, steps, EXACT))[half:]
+    for tolerance in (DEFAULT, *LARGER):
+        march = begun(sliding_job(points, steps, tolerance))
+        rows, clock = marched(march)
+        late, at = rows[half:], f"tolerance {tolerance:g}"
+        error = float(np.abs(np.array([row.measures.friction for row in late]) / exact - 1.0).max())
+        if tolerance != DEFAULT and error > ERROR:
+            continue
+        yield Line(f"{at}: largest error of friction", error)
+        yield Line(f"{at}: operator calls per step", statistics.fmean(row.operator_calls for row in late))
+        yield Line(f"{at}: iterations per step", statistics.fmean(row.iterations for row in late))
+        step = statistics.median(np.diff(clock)[half:].tolist())
+        bare = statistics.median(interleave({"pair": pair(march.scene.slab, "float64")}, 10)["pair"])
+        yield Line(f"{at}: a step", 1e3 * step, "ms")
+        yield Line(f"{at}: a step over a transform and its inverse", step / bare)
+        if tolerance != DEFAULT:
+            break
+    if asked.peers is not None:
+        yield from _beside_peers(points, asked.peers)
+
+
+def _friction(job: Json) -> Map:
+    return np.array([row.measures.friction for row in marched(begun(job))[0]])
+
+
+def _backward_euler_job(points: int, tolerance: float, precision: str = "double") -> Json:
+    """All branches have a map."""
+    numerics = {"integrator": "backward-euler", "tolerance": tolerance, "branch_error": 0.0, "precision": precision}
+    rough = {"hurst": 0.8, "long_wavelength": 0.25, "short_wavelength": 8 / points, "rms_slope": 0.1, "seed": 1}
+    branches = [{"modulus": MODULUS, "relaxation_time": tau} for tau in RELAXATION_TIMES]
+    return {
+        "grid": {"points": points, "size": 1.0},
+        "surface": {"shape": "rough", **rough},
+        "material": {"model": "zener", "modulus_inf": 1.0, "branches": branches},
+        "history": [{"pressure": PRESSURE, "velocity": 1.0, "distance": LATER / points, "cells_per_step": 1}],
+        "numerics": numerics,
+    }
+
+
+def _beside_peers(points: int, directory: Path) -> Iterator[Line]:
+    """Ours at the tolerance that makes friction good to ERROR with the fewest calls, and theirs."""
+    half, tried = LATER // 2, []
+    with warnings.catch_warnings(action="ignore"):  # of a body as soft as 1 Pa
+        rows = marched(begun(_backward_euler_job(points, EXACT_BESIDE_PEERS)))[0][-LATER:]
+        exact = np.array([row.measures.friction_x for row in rows])
+        for tolerance in TOLERANCES:
+            rows, clock = marched(begun(_backward_euler_job(points, tolerance, "mixed")))
+            friction = np.array([row.measures.friction_x for row in rows[-LATER:]])
+            error = float(np.abs(friction / exact - 1.0)[half:].max())
+            calls = statistics.fmean(row.operator_calls for row in rows[-half:])
+            tried.append((calls, error, tolerance, np.diff(clock)[-LATER:], rows[-1].measures.contact_area))
+    good = [found for found in tried if found[1] <= ERROR] or tried[-1:]
+    calls, error, tolerance, seconds, area = min(good, key=lambda found: found[0])
+    what, ours = f"8 branches, mixed precision, tolerance {tolerance:.2g}", float(np.mean(seconds[half:]))
+    yield Line(f"{what}: contact area", area)
+    yield Line(f"{what}: largest error of friction", error)
+    yield Line(f"{what}: operator calls per step", calls)
+    yield Line(f"{what}: a step", 1e3 * ours, "ms")
+    yield Line(f"{what}: one of the first {FIRST}", 1e3 * float(np.mean(seconds[FIRST // 2 : FIRST])), "ms")
+    job = _backward_euler_job(points, EXACT_BESIDE_PEERS)
+    heights = np.asarray(pc.surface(job["surface"], job["grid"]))
+    q = 2j * np.pi * np.fft.rfftfreq(points, 1.0 / points)
+    slope = np.fft.irfft(q * np.fft.rfft(heights, axis=1), points, axis=1)
+    given = {"heights": heights, "slope": slope, "friction": exact[:FIRST], "load": PRESSURE, "wanted": ERROR}
+    given |= {"relaxation_times": np.array(RELAXATION_TIMES), "modulus": MODULUS}
+    yield from compare_peers(directory, PEERS, given, ours)
+
+
+def folded(points: int, *_: object) -> Iterator[Line]:
+    """The surface of jobs/velocity_step.yaml slides at 3 m/s over 0.5 mm, with more and more branches folded. The error
+    of friction is its largest difference from that with all branches, over its last value, solved to 1e-8."""
+    stage = "history=[{pressure: 1.0e5, velocity: 3.0, distance: 5.0e-4, cells_per_step: 1}]"
+    sets = [f"grid.points={points}", "initial={state: virgin}", "output={}", stage, "numerics.tolerance=1e-8"]
+    for allowed in FOLDED:
+        march = begun(ROOT / "jobs" / "velocity_step.yaml", [*sets, f"numerics.branch_error={allowed!r}"])
+        rows, clock = marched(march)
+        friction = np.array([row.measures.friction for row in rows])
+        if not allowed:
+            whole, seconds = friction, clock[-1] - clock[0]
+        yield Line(f"allowed {allowed:g}: branches with a map", len(march.scene.folded.kept))
+        yield Line(f"allowed {allowed:g}: bound of the error", march.scene.folded.bound)
+        yield Line(f"allowed {allowed:g}: error of friction", float(abs(friction - whole).max() / whole[-1]))
+        yield Line(f"allowed {allowed:g}: time over that of all branches", (clock[-1] - clock[0]) / seconds)
+
+
+def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
+    base = scene.set_up(load(sliding_job(points, 1)), Slab(MPI.COMM_SELF, points, points))
+    for speed in (0.01, 0.3, 10.0):
+        yield Line(
+            f"cold at {speed:g} m/s: operator calls", SteadySliding(base).solve((speed, 0.0), 1e5).operator_calls
+        )
+    sliding = SteadySliding(base)
+    curve = [sliding.solve((0.03 * 10 ** (k / 8), 0.0), 1e5).operator_calls for k in range(min(17, rounds + 2))]
+    yield Line("curve: operator calls per further point", statistics.fmean(curve[1:]))
+    yield Line("curve: the most of them", max(curve[1:]))
+
+
+def held(points: int, *_: object) -> Iterator[Line]:
+    march = begun(sliding_job(points, 2))
+    slab = march.scene.slab
+    begun_with = slab.tally["map bytes"]
+    marched(march)
+    yield Line("planned", memory.total(march.scene.job) / 1e6, "MB")
+    yield Line("held", begun_with / 1e6, "MB")
+    yield Line("held at most, the first solve included", slab.tally["map bytes at most"] / 1e6, "MB")
+    yield Line("held at most, in maps", slab.tally["map bytes at most"] / (8 * points * points))

@@ -1,0 +1,117 @@
+"""Parts `fft`, `solve`, `sizes` and `large`: transforms, cold elastic solves, and how costs grow with the grid."""
+
+import argparse
+import math
+import resource
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+from mpi4py import MPI
+
+from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
+from parcontact.parallel.fftw import pyfftw
+from parcontact.parallel.slab import Slab
+
+from .peers import ASPHER_COLD, TAMAAS_COLD, Task, compare_peers
+from .table import Line, compare, interleave
+from .work import LOAD, MODULUS, Cold, Slide, distance, pair
+
+ERROR = 1e-7  # of pressures
+PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
+SMALLEST = 256  # points along a side, where `sizes` begins
+TOLERANCE = 1e-6  # of its cold solves
+LIGHT = 0.036  # mean pressure over E* of `large`, for 8 % of contact at a slope of 1
+LARGE_ERROR = 1e-5  # of its pressures
+COARSER = 4  # times fewer points, where the tolerance for that is looked for
+FURTHER = 1e3  # times smaller a tolerance, to see the error
+
+
+def fft(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
+    heights, out = (pyfftw.zeros_aligned((points, points), "float64", n=64) for _ in range(2))
+    waves = pyfftw.zeros_aligned((points, points // 2 + 1), "complex128", n=64)
+    forward = pyfftw.FFTW(heights, waves, (0, 1), "FFTW_FORWARD", ("FFTW_MEASURE",))
+    backward = pyfftw.FFTW(waves, out, (0, 1), "FFTW_BACKWARD", ("FFTW_MEASURE", "FFTW_DESTROY_INPUT"))
+    heights[...] = np.random.default_rng(1).random(heights.shape)
+    bare = {"FFTW alone": lambda: (forward.execute(), backward.execute())}
+    ours = {name: pair(Slab(MPI.COMM_SELF, points, points), name) for name in ("float64", "float32")}
+    yield from compare(interleave({**bare, **ours}, rounds), "FFTW alone")
+    before = export_wisdom()
+    pyfftw.forget_wisdom()
+    for name in ("the first time", "again"):  # again: with FFTW's wisdom of the first time, which runs keep
+        began = time.process_time()
+        FFT(Slab(MPI.COMM_SELF, points, points))
+        yield Line(f"planning, {name}", 1e3 * (time.process_time() - began), "ms")
+        import_wisdom(export_wisdom())  # forgets plans, too: those of the next run are made from what is kept
+    import_wisdom(before)
+
+
+def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
+    surface = Cold(points)
+    solves: dict[str, Callable[[], object]] = {}
+    for name, single in (("double", False), ("mixed", True)):
+        solver, error = surface.loosest(ERROR, single)
+        calls = surface.slab.tally["operator"]
+        surface.solve(solver)
+        yield Line(f"{name}: operator calls", surface.slab.tally["operator"] - calls)
+        yield Line(f"{name}: pressure error", error)
+        solves[name] = partial(surface.solve, solver)
+    times = interleave(solves, rounds)
+    yield from compare(times, "double")
+    if asked.peers is not None and surface.reference is not None:
+        given = {"heights": surface.heights, "reference": surface.reference / MODULUS, "load": LOAD, "wanted": ERROR}
+        yield from compare_peers(asked.peers, PEERS, given, statistics.median(times["double"]))
+
+
+def sizes(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
+    """Up to so many points, twice as many along each side every time; times are also told over N^2 log2 N."""
+    side = min(SMALLEST, points)
+    while side <= points:
+        surface, slide = Cold(side), Slide(side)
+        solver = surface.solver(TOLERANCE)
+        yield from _cost(side, "a cold solve", partial(surface.solve, solver), surface.slab, min(rounds, 3))
+        slide.warm_up()
+        yield from _cost(side, "a sliding step", slide.step, slide.march.scene.slab, rounds)
+        side *= 2
+
+
+def _cost(side: int, what: str, call: Callable[[], object], slab: Slab, rounds: int) -> Iterator[Line]:
+    call()  # plans and compiles
+    before = slab.tally["operator"]
+    seconds = statistics.median(interleave({what: call}, rounds, before=0)[what])
+    name = f"{side} x {side}: {what}"
+    yield Line(f"{name}: operator calls", (slab.tally["operator"] - before) / rounds)
+    yield Line(name, 1e3 * seconds, "ms")
+    yield Line(f"{name} over N^2 log2 N", 1e9 * seconds / (side**2 * math.log2(side)), "ns")
+
+
+def large(points: int, *_: object) -> Iterator[Line]:
+    """A cold solve at 8 % of contact: to a tolerance that is good enough on a coarser grid, then on from there until
+    the pressure is good enough, seen from where it gets with a thousandth of that tolerance."""
+    (coarse, _), _ = Cold(max(points // COARSER, 64), load=LIGHT).loosest(LARGE_ERROR)
+    tolerance = coarse.tolerance
+    began = time.process_time()
+    surface = Cold(points, load=LIGHT)
+    solver, tally = surface.solver(tolerance), surface.slab.tally
+    yield Line("surface, transforms and operators", time.process_time() - began, "s")
+    calls, began = tally["operator"], time.process_time()
+    found = surface.go_on(solver, surface.start(solver))
+    seconds, calls = time.process_time() - began, tally["operator"] - calls
+    yield Line("held at most", tally["map bytes at most"] / 1e9, "GB")
+    yield Line("resident at most", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, "GB")
+    exact, own = found.p.copy(), solver[0]
+    own.tolerance = tolerance / FURTHER
+    surface.go_on(solver, exact)
+    own.tolerance = tolerance
+    while (error := distance(found.p, exact)) > LARGE_ERROR:
+        own.tolerance /= 2.0
+        before, began = tally["operator"], time.process_time()
+        found = surface.go_on(solver, found.p)
+        seconds, calls = seconds + time.process_time() - began, calls + tally["operator"] - before
+    yield Line(f"a cold solve to {own.tolerance:.2g}", seconds, "s")
+    yield Line("operator calls", calls)
+    yield Line("certificate", found.certificate.worst)
+    yield Line("contact area", float(np.count_nonzero(found.p)) / found.p.size)
+    yield Line("pressure error", error)

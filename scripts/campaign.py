@@ -1,0 +1,68 @@
+"""The frame of campaigns: trials drawn from a seed and a number; those with faults are told, to be made again."""
+
+import argparse
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+EVERY = 50  # trials between two lines of progress
+
+
+def parser(doc: str | None, trials: int, what: str = "trials", **more: tuple[Any, str]) -> argparse.ArgumentParser:
+    """Options of all campaigns, and `more` by their names: a default and a help text each."""
+    made = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    made.add_argument(f"--{what}", type=int, default=trials, dest="trials", metavar="N")
+    made.add_argument("--seed", type=int, default=0, help="of all that is chosen")
+    made.add_argument("--from", type=int, default=0, dest="first", metavar="NUMBER", help="of the first trial")
+    made.add_argument("--only", type=int, metavar="NUMBER", help="make this trial alone")
+    made.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so many")
+    for name, (value, text) in more.items():
+        kind: Any = {"action": "store_true"} if value is False else {"type": type(value), "default": value}
+        made.add_argument(f"--{name.replace('_', '-')}", help=text, **kind)
+    return made
+
+
+def numbers(asked: argparse.Namespace) -> range:
+    """Which trials are asked for."""
+    return (
+        range(asked.only, asked.only + 1) if asked.only is not None else range(asked.first, asked.first + asked.trials)
+    )
+
+
+def go(
+    asked: argparse.Namespace,
+    trial: Callable[[int], Iterable[str]],
+    counts: Counter[str],
+    also: Callable[[], bool] = lambda: False,
+) -> int:
+    """Make the trials, and further ones while `also` says so; how many had faults, the sentences that each returns.
+
+    A trial that ends with an exception has that as its fault. `counts` is what trials count; printed at the end.
+    """
+    chosen, began, faulty, number = numbers(asked), time.monotonic(), 0, numbers(asked).start
+    while (number < chosen.stop or also()) and time.monotonic() - began < 60.0 * asked.minutes:
+        faults = _made(trial, number)
+        for fault in faults:
+            print(f"{number}: {fault}", flush=True)
+        faulty += bool(faults)
+        number += 1
+        if (number - chosen.start) % EVERY == 0:
+            seconds = time.monotonic() - began
+            print(f"{number - chosen.start:6} made, {faulty} with faults, {seconds:.0f} s: {told(counts)}", flush=True)
+    print(f"{number - chosen.start} made: {faulty} with faults; {told(counts)}")
+    return faulty
+
+
+def told(counts: Counter[str]) -> str:
+    return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
+
+
+def _made(trial: Callable[[int], Iterable[str]], number: int) -> list[str]:
+    try:
+        return list(trial(number))
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return [f"{type(error).__name__}: {str(error)[:300]} ({Path(where.filename).name}:{where.lineno})"]

@@ -1,0 +1,1 @@
+"""Parts of scripts/error_coverage.py."""
