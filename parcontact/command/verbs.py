@@ -83,15 +83,14 @@ def _doubts(job: Job) -> list[str]:
 
     if meaning.says_all(job.surface) and not job.measured:
         return []
-    from .. import scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
-    from ..scene import sanity
+    from ..scene import sanity, set_up
     from ..scene.measured_range import describe_beyond
 
     found = list(describe_beyond(job))
     if sanity.is_quickly_made(job):
-        found += sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+        found += sanity.check_heights(set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
     return found
 
 
@@ -100,13 +99,12 @@ def plan(options: argparse.Namespace) -> int:
 
     started = watch.age()
     world = ranks.start()
-    from .. import scene
     from ..parallel.groups import Groups
     from ..parallel.slab import Slab
     from ..plan.memory import count_side_by_side
     from ..plan.planning import Planner
     from ..run import sweep_warnings
-    from ..scene import sanity
+    from ..scene import sanity, set_up
     from ..scene.measured_range import describe_beyond
 
     chosen = on_root(world, lambda: cases_of(options)[1])
@@ -116,7 +114,7 @@ def plan(options: argparse.Namespace) -> int:
         on_root(world, lambda: sweep_warnings.warn_once(chosen))
     doubts = [] if several else [*job.warnings, *describe_beyond(job)]
     if sanity.is_quickly_made(job):
-        doubts += sanity.check_heights(scene.set_up(job, slab))
+        doubts += sanity.check_heights(set_up(job, slab))
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
     if several:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
@@ -183,11 +181,10 @@ def study(options: argparse.Namespace) -> int:
 def surface(options: argparse.Namespace) -> int:
     from pathlib import Path
 
-    from .. import scene
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..report import road as drawing
-    from ..scene import sanity
+    from ..scene import sanity, set_up
     from . import measured_maps
 
     given = Path(options.job)
@@ -197,7 +194,7 @@ def surface(options: argparse.Namespace) -> int:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
     measured_maps.refuse_taken(options.start)
     job = measured_maps.load(given, options.set) if alone else _load(options)
-    base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    base = set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())

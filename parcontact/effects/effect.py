@@ -49,8 +49,7 @@ class Effect(Remembers, Protocol):
     """The class of an effect that is told of every step made; made with a `Scene`, only where the job asks for it.
 
     It also has the `entries` and `restore` of whatever remembers something, and may have `rules` for the whole job, as
-    sections have them. Methods are collective, unless they say
-    otherwise.
+    sections have them. Methods are collective, unless they say otherwise.
     """
 
     section: ClassVar[type[Part]]  # what it adds to a job
@@ -86,7 +85,8 @@ def columns_of(effects: Mapping[str, Effect]) -> tuple[str, ...]:
 
 
 def values_of(effects: Mapping[str, Effect]) -> tuple[float, ...]:
-    """What effects have for their columns in the row of the last step made. Raises InputError for what does not fit."""
+    """Return what effects have for their columns in the row of the last step; raises InputError for what does not
+    fit."""
     return tuple(number for name, effect in effects.items() for number in _numbers(name, effect))
 
 

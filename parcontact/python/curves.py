@@ -17,8 +17,9 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene import set_up
 from ..steady_sliding import curve
-from ..steady_sliding.missed import describe_missed
 from ..steady_sliding.sliding import Point, SteadySliding
+from ..steady_sliding.table import describe_missed
+from ..storage.curve_points import Wanted
 from .jobs import Given, all_ranks, read, warn_of
 
 Array = NDArray[np.float64]
@@ -108,7 +109,7 @@ def steady(
     return _curve(wanted.points, points, tuple(failures))
 
 
-def _curve(wanted: Sequence[curve.Wanted], points: Sequence[Point | None], failures: tuple[str, ...]) -> Curve:
+def _curve(wanted: Sequence[Wanted], points: Sequence[Point | None], failures: tuple[str, ...]) -> Curve:
     def each(value: Callable[[Point], float]) -> Array:
         return np.array([math.nan if point is None else value(point) for point in points])
 

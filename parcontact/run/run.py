@@ -183,7 +183,7 @@ class Run:
         self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
         if self.job.included:
             self.console.say(str(self.job.included))
-        for fact in scene.facts(self.march.scene):
+        for fact in scene.describe_scene(self.march.scene):
             self.console.say(fact)
         if saved:
             self.console.say(f"goes on after step {self.first} from {saved.path}")

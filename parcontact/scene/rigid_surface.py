@@ -1,7 +1,8 @@
 """The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
 
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -15,35 +16,34 @@ from ..parallel.slab import Array
 from ..physics import heightfile
 from ..physics.lowest import lowest
 from ..physics.roughness import Roughness, shortest_wave
-from ..physics.shapes import Round, Shape
+from ..physics.shapes import Round
 from ..physics.surface import Surface, single_wave
 
-ROUNDING = 1e-8  # relative, of the shortest wavelength of a table
-FLAT = 1e-14  # a surface whose highest and lowest points differ by this, relative to their heights, is flat
+ROUNDING = 1e-8  # accuracy: relative, of the shortest wavelength of a table
+FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
 
 def make_surface(job: Job, fft: FFT) -> tuple[Surface, list[str]]:
-    """The rigid surface of a job, and on root what was done to measured maps; collective. Raises InputError."""
-    grid, slab, differences = job.grid, fft.slab, job.numerics.slope == "finite-difference"
-    waves: Spectrum | None = None
-    shapes: list[Shape] = []
-    told: list[str] = []
-    for part in job.surface:
-        if isinstance(part, jobs.Sphere | jobs.Cylinder):
-            centre = part.center or (grid.lx / 2, grid.ly / 2)
-            along = (1.0, 1.0)
-            if isinstance(part, jobs.Cylinder):
-                along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
-            shapes.append(Round(part.radius, centre, along, part.profile == "exact"))
-        elif isinstance(part, jobs.Spectral):
-            added = _waves(part, grid, fft, told)
-            waves = added if waves is None else waves + added
-    surface = Surface(slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
+    """Return the rigid surface of a job, and on root notes on how measured maps were prepared; collective. Raises
+    InputError."""
+    grid, notes = job.grid, list[str]()
+    spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
+    waves = reduce(add, (_waves(part, grid, fft, notes) for part in spectral)) if spectral else None
+    shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
+    differences = job.numerics.slope == "finite-difference"
+    surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
     surface.level()
     if surface.waves is not None:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))
-        slab.tally.hold(surface.waves)
-    return surface, told
+        fft.slab.tally.hold(surface.waves)
+    return surface, notes
+
+
+def _round(part: jobs.Sphere | jobs.Cylinder, grid: Grid) -> Round:
+    along = (1.0, 1.0)
+    if isinstance(part, jobs.Cylinder):
+        along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
+    return Round(part.radius, part.center or (grid.lx / 2, grid.ly / 2), along, part.profile == "exact")
 
 
 def shortest_measured(job: Job, surface: Surface) -> float | None:
@@ -73,7 +73,7 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
 
 
 def highest_waves(job: Job) -> tuple[int, int]:
-    """The most waves in the box, along x and y, of what a job's surface gives by waves: there are no shorter ones."""
+    """Return the most waves in the box, along x and y, of what a job's surface gives by waves."""
     grid, found = job.grid, [(0, 0)]
     for part in job.surface:
         if isinstance(part, jobs.Wave):
@@ -85,56 +85,45 @@ def highest_waves(job: Job) -> tuple[int, int]:
     return max(x for x, _ in found), max(y for _, y in found)
 
 
-def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: list[str]) -> Spectrum:
+def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
+    """Return the spectrum of one part of a surface, with `notes` on how it was prepared; collective."""
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
+    if isinstance(part, jobs.RoughSpectrum):
+        return _measured_spectrum(part, grid, fft, notes)
     if isinstance(part, jobs.Topography):
         from ..road import surface as road  # with much of scipy, which is slow to import
 
         rows, done = road.rows_of(part, grid, fft.slab)
-        told += done
+        notes += done
         return _transform(rows, fft)
-    if isinstance(part, jobs.RoughSpectrum):
-        return _of_spectrum(part, grid, fft, told)
     if isinstance(part, jobs.HeightFile):
         return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)
     if isinstance(part, jobs.HeightArray):
         return _transform(fft.slab.from_root(part.heights.values), fft)
-    return Roughness(
-        part.hurst,
-        part.long_wavelength,
-        part.rolloff_wavelength,
-        part.short_wavelength,
-        part.seed,
-        part.amplitudes == "random",
-        part.rms_slope,
-        part.rms_height,
-        part.psd_constant,
-    ).spectrum(fft, grid.size)
+    limits = part.long_wavelength, part.rolloff_wavelength, part.short_wavelength
+    amplitude = part.rms_slope, part.rms_height, part.psd_constant
+    return Roughness(part.hurst, *limits, part.seed, part.amplitudes == "random", *amplitude).spectrum(fft, grid.size)
 
 
-def _of_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, told: list[str]) -> Spectrum:
+def _measured_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
     from ..road import spectrum
 
     found, (long, short) = on_root(fft.slab.comm, lambda: spectrum.of(part))
-    told += _told(part, grid, long, short) if fft.slab.root else []
+    cell = max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
+    if fft.slab.root:
+        notes.append(f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}")
+        if short < 2 * cell:
+            notes.append(f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m")
+        if long > max(grid.size):
+            notes.append(f"spectrum: the box has no waves longer than {max(grid.size):.4g} m")
+    limits = long, long, short * (1.0 - ROUNDING)  # the last point of a table is among its waves
     random = part.amplitudes == "random"
-    limits = (long, long, short * (1.0 - ROUNDING))  # the last point of a table is among its waves
     return Roughness(1.0, *limits, part.seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
 
 
-def _told(part: jobs.RoughSpectrum, grid: Grid, long: float, short: float) -> Iterator[str]:
-    """Which waves of a measured spectrum there are."""
-    yield f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}"
-    cell = max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
-    if short < 2 * cell:
-        yield f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m"
-    if long > max(grid.size):
-        yield f"spectrum: the box has no waves longer than {max(grid.size):.4g} m"
-
-
 def _transform(heights: Array, fft: FFT) -> Spectrum:
-    """Of heights, their mean apart: there may be no digits for both; collective."""
+    """Return the transform of heights, their mean apart: there may be no digits for both; collective."""
     mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
     spectrum = fft.forward(heights - mean)
     if fft.columns.start == 0 < fft.columns.stop:
@@ -143,8 +132,8 @@ def _transform(heights: Array, fft: FFT) -> Spectrum:
 
 
 class Heights(NamedTuple):
-    """From the lowest to the highest point, Sz of the standards on roughness, 0 if that is rounding; the highest point
-    and the mean, over the surface's datum. All in m."""
+    """Heights [m] of a surface: from the lowest to the highest point, Sz of the standards on roughness, 0 if that is
+    rounding; the highest point and the mean, over the surface's datum."""
 
     span: float
     highest: float
@@ -152,7 +141,7 @@ class Heights(NamedTuple):
 
 
 def heights_of(surface: Surface) -> Heights:
-    """What a surface reaches; collective."""
+    """Return the heights that a surface reaches; collective."""
     heights = surface.heights((0.0, 0.0), surface.slab.empty())
     extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
     total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)

@@ -4,7 +4,7 @@ What is made follows from the job alone, as `choices.py` decides; what a job doe
 Steady sliding takes the setup from here and brings a solver of its own.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -180,19 +180,17 @@ def solver_in_double(setup: Setup) -> Callable[[], tuple[ContactSolver, Operator
     return partial(solver_on, setup, setup.slab, setup.choices.numerics.tolerance, np.float64)
 
 
-def facts(scene: Scene) -> list[str]:
-    """What a user should know: the surface's spectral moments and what follows from them, and the branches folded."""
-    setup, found = scene.setup, scene.setup.roughness
-    told = [*setup.preparation_notes, *describe_folded_branches(scene.folded, scene.choices.prony)]
-    if steps := describe_steps(setup.job):
-        told.append(f"time steps that are chosen: {steps}")
-    if found is None:
-        return told
-    return [
-        *told,
-        f"surface: rms height {found.rms_height:.4g} m, rms slope {found.rms_slope:.4g}, Nayak's parameter "
-        f"{found.nayak:.3g}; m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2",
-    ]
+def describe_scene(scene: Scene) -> Iterator[str]:
+    """Yield what a user should know: how maps were prepared, branches folded, steps chosen; the surface's moments."""
+    yield from scene.setup.preparation_notes
+    yield from describe_folded_branches(scene.folded, scene.choices.prony)
+    if steps := describe_steps(scene.job):
+        yield f"time steps that are chosen: {steps}"
+    if found := scene.setup.roughness:
+        yield (
+            f"surface: rms height {found.rms_height:.4g} m, rms slope {found.rms_slope:.4g}, Nayak's parameter "
+            f"{found.nayak:.3g}; m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2"
+        )
 
 
 # -- parts ------------------------------------------------------------------------------------------------------------

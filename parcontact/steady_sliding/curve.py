@@ -2,19 +2,22 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any
 
 from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, identity
+from ..parallel.root import on_root
 from ..parallel.signals import Signals
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Slab
 from ..scene import sanity
 from ..storage import curve_points, hdf5, marker, stopfile
 from ..storage.console import always
+from ..storage.curve_points import Wanted
 from ..storage.directory import ADVICE, Directory
 from ..storage.provenance import Link, Provenance
 from ..storage.steady_maps import SteadyMaps
@@ -24,14 +27,6 @@ from .table import CurveTable
 
 DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
 SAME = (*marker.SCENE, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
-
-
-class Wanted(NamedTuple):
-    """One steady state: speed [m/s], mean pressure [Pa], temperature [deg C], NaN for that of the material."""
-
-    speed: float
-    pressure: float
-    temperature: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -48,8 +43,7 @@ class Request:
     @property
     def points(self) -> list[Wanted]:
         """All points, in the order in which they are solved."""
-        found = curve_points.asked(self.velocities, self.pressures, self.temperatures)
-        return [Wanted(*point) for point in found]
+        return curve_points.asked(self.velocities, self.pressures, self.temperatures)
 
     def velocity(self, speed: float) -> tuple[float, float]:
         return speed * self.direction[0], speed * self.direction[1]
@@ -58,7 +52,7 @@ class Request:
 def request(
     job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
 ) -> Request:
-    """What a job's `steady` section asks for, changed by what is given here; raises InputError if something lacks."""
+    """Return what a job's `steady` section asks for, or what is given here; raises InputError if something lacks."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
     loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))
@@ -105,15 +99,14 @@ def run(
         sanity.refuse_impossible(job, Timeline.of(job))
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
-        goes_on = _goes_on(directory, plain, slab) if restart != "never" else False
+        goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
         setup = scene.set_up(job, slab)
         doubts = sanity.find_doubts(setup, wanted.temperatures)
         sliding = SteadySliding(setup)
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:
             directory.clear()
-        columns = wanted.waves, bool(wanted.temperatures)
-        table = _on_root(slab, lambda: CurveTable(directory.path, sliding, *columns, quiet))
+        table = _table(directory.path, sliding, wanted, quiet)
         if table:
             table.warn(doubts, shows)
         maps = _maps(job, slab, wanted, directory)
@@ -126,60 +119,54 @@ def run(
 
 
 def _identity(job: Job, wanted: Request) -> dict[str, Any]:
-    """What a curve is of, as plain data: of the `steady` section only what no point may differ in."""
-    return {
-        **marker.kept(identity.plain_job(job)),
-        "steady": {"direction": list(wanted.direction), "waves": wanted.waves},
-    }
+    """Return what a curve is of, as plain data: of the `steady` section only what no point may differ in."""
+    steady = {"direction": list(wanted.direction), "waves": wanted.waves}
+    return {**marker.kept(identity.plain_job(job)), "steady": steady}
 
 
-def _goes_on(directory: Directory, plain: Mapping[str, Any], slab: Slab) -> bool:
-    """Whether points of the same curve are there; collective. Raises InputError if they are of another."""
-    problem, there = "", False
-    if slab.root and (claim := directory.claim) is not None and directory.results():
-        there = True
-        if different := "; ".join(marker.differences(claim.job, plain, (*SAME, "steady"))):
-            problem = f"{directory.path} holds the friction curve of another job: {different}; {ADVICE}"
-    if problem := slab.agree(problem):
-        raise InputError(problem)
-    return slab.agree(there)
+def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
+    """Return whether points of the same curve are there; root only. Raises InputError if they are of another."""
+    if (claim := directory.claim) is None or not directory.results():
+        return False
+    if different := "; ".join(marker.differences(claim.job, plain, (*SAME, "steady"))):
+        raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {ADVICE}")
+    return True
 
 
-def _on_root(slab: Slab, make: Any) -> CurveTable | None:
-    found: list[CurveTable] = []
-    hdf5.on_root(slab, lambda: found.append(make()), "cannot write the table of the curve", InputError)
-    return found[0] if found else None
+def _table(path: Path, sliding: SteadySliding, wanted: Request, quiet: bool) -> CurveTable | None:
+    """Begin the tables, or continue them, on root; collective. Raises InputError where that cannot be."""
+    columns, made = (wanted.waves, bool(wanted.temperatures)), list[CurveTable]()
+    act = lambda: made.append(CurveTable(path, sliding, *columns, quiet))  # noqa: E731
+    hdf5.on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
+    return made[0] if made else None
 
 
 def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> SteadyMaps | None:
-    """The file for the maps that the job asks for, if it does."""
+    """Make the file for the maps that the job asks for, if it does; collective."""
     if not job.output.fields:
         return None
     provenance = Provenance((Link(job.resolved(), slab.comm.size),))
-    path = directory.path / "steady.h5"
     points = [point if wanted.temperatures else point[:2] for point in wanted.points]
-    return SteadyMaps(path, slab, job.grid.size, job.output.fields, points, provenance)
+    return SteadyMaps(directory.path / "steady.h5", slab, job.grid.size, job.output.fields, points, provenance)
 
 
+@dataclass
 class _Curve:
-    """The points of a curve, one after the other."""
+    """The points of a curve, one after the other; methods are collective."""
 
-    def __init__(
-        self,
-        sliding: SteadySliding,
-        wanted: Request,
-        table: CurveTable | None,
-        maps: SteadyMaps | None,
-        directory: Directory,
-        signals: Signals,
-        shows: Callable[[str], bool],
-        others_file: StopFile | None,
-    ) -> None:
-        self.sliding, self.wanted, self.table, self.maps = sliding, wanted, table, maps
-        self.directory, self.signals, self.slab = directory, signals, sliding.setup.slab
-        job = sliding.setup.job
-        self.shows, self.others_file = shows, others_file
-        self.watch, self.failures = sanity.ContactWatch(job.numerics.strict, Timeline.of(job)), 0
+    sliding: SteadySliding
+    wanted: Request
+    table: CurveTable | None
+    maps: SteadyMaps | None
+    directory: Directory
+    signals: Signals
+    shows: Callable[[str], bool]
+    others_file: StopFile | None
+    failures: int = 0
+
+    def __post_init__(self) -> None:
+        chosen, self.slab = self.sliding.setup.choices, self.sliding.setup.slab
+        self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline)
 
     def go(self) -> int:
         """Solve what lacks; collective. Returns the exit code."""
@@ -196,57 +183,38 @@ class _Curve:
         return FAILED if self.failures else DONE
 
     def _stopped(self) -> bool:
-        """Whether it is asked to stop; its own stop file is removed then; collective."""
-        asked = self.signals.stop or (self.slab.root and self._file_asks())
+        """Return whether it is asked to stop; its own stop file is removed then."""
+        others = self.others_file is not None and self.others_file.asks
+        asked = self.signals.stop or (self.slab.root and (others or os.path.lexists(self.directory.stop_file)))
         if not self.slab.reduce((), [float(asked)])[0]:
             return False
         if problem := self.slab.agree(stopfile.remove(self.directory.stop_file) if self.slab.root else ""):
             raise RunError(problem)
         return True
 
-    def _file_asks(self) -> bool:
-        others = self.others_file
-        return os.path.lexists(self.directory.stop_file) or (others is not None and others.asks)
-
     def _say(self, text: str) -> None:
         if self.table:
             self.table.say(text)
 
     def _solve(self, index: int) -> None:
-        speed, pressure, temperature = self.wanted.points[index]
-        velocity = self.wanted.velocity(speed)
-        at = f"{speed:g} m/s under {pressure:g} Pa" + (f" at {temperature:g} C" if temperature == temperature else "")
+        """Solve a point and write it; one that fails is told of."""
+        wanted, table = self.wanted.points[index], self.table
+        velocity = self.wanted.velocity(wanted.speed)
         try:
-            if temperature == temperature:
-                self.sliding.heat(temperature)
-            point = self.sliding.solve(velocity, pressure)
+            if not math.isnan(wanted.temperature):
+                self.sliding.heat(wanted.temperature)
+            point = self.sliding.solve(velocity, wanted.pressure)
         except RunError as error:
             self.failures += 1
             self._say(f"parcontact: {error}")
             return
         shares = self.sliding.shares(velocity) if self.wanted.waves else None
         if self.maps:
-            self.maps.save(index, dict(self._fields()))
-        table = self.table
+            self.maps.save(index, {name: self.sliding.field(name) for name in self.maps.names})
 
         def write() -> None:
             if table:
                 table.write(point, shares)
-                table.warn(self.watch.judge_point(point.measures, at), self.shows)
+                table.warn(self.watch.judge_point(point.measures, str(wanted)), self.shows)
 
         hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
-
-    def _fields(self) -> Iterator[tuple[str, Array]]:
-        """The maps of the last point that the job asks for, in SI units."""
-        contact, setup = self.sliding.contact, self.sliding.setup
-        assert contact is not None
-        heights, unit = self.sliding.levels[0].heights, setup.units.height
-        for name in setup.job.output.fields:
-            if name == "pressure":
-                yield name, contact.p * setup.units.pressure
-            elif name == "displacement":
-                yield name, contact.u * unit
-            elif name == "height":
-                yield name, heights * unit + setup.surface.datum
-            else:
-                yield name, (contact.u - heights - contact.d) * unit

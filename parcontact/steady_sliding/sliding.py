@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import RunError
 from ..march.errors import properties_of
 from ..parallel.fft import FFT
-from ..parallel.slab import Array, Slab, deal
+from ..parallel.slab import Array, Slab
 from ..physics.budget import ErrorBudget, estimate_steady
-from ..physics.convolution import PARTS, Convolution, wavenumbers
+from ..physics.convolution import Convolution
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..physics.prony import Prony
@@ -25,6 +24,7 @@ from ..solve.certificate import Certificate
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
+from .losses import branch_powers
 
 COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
 LOOSE, SHARE = 1e-3, 0.6  # so much of a tolerance above LOOSE leaves the contact area as right as in a march
@@ -55,6 +55,11 @@ class Point:
     sets: int
     seconds: float
     dissipated: tuple[float, ...]
+
+    @property
+    def speed(self) -> float:
+        """The size of the velocity [m/s]."""
+        return math.hypot(*self.velocity)
 
     @property
     def error_friction(self) -> float:
@@ -122,11 +127,22 @@ class SteadySliding:
         measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
         if not measures.finite:
             raise RunError(f"steady sliding at {speed:g} m/s under {pressure:g} Pa: its results would not be finite")
-        lost = tuple(self._powers(velocity).sum(axis=1).tolist()) if self.setup.grid.boundary == "periodic" else ()
+        powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
+        lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
         friction, errors = self._judge(contact, by_energy, velocity, measures)
         seconds = time.perf_counter() - began
         place = velocity, pressure, self.temperature, self.setup.choices.time_factor
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost)
+
+    def field(self, name: str) -> Array:
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m] in the last state."""
+        assert self.contact is not None
+        contact, setup, heights = self.contact, self.setup, self.levels[0].heights
+        if name == "pressure":
+            return contact.p * setup.units.pressure
+        if name == "height":
+            return heights * setup.units.height + setup.surface.datum
+        return (contact.u if name == "displacement" else contact.u - heights - contact.d) * setup.units.height
 
     def _judge(
         self, contact: SteadyContact, by_energy: float, velocity: Vector, measures: Measures
@@ -151,42 +167,13 @@ class SteadySliding:
         return friction, estimate_steady(self._known, seen, setup.slab.points)
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
-        """Wavelengths [m], and the share of the friction power that waves from each to half of it contribute.
-
-        Of the last state; only for periodic scenes, where waves are independent. Collective.
-        """
-        longest = max(self.setup.grid.size)
-        power = self._powers(velocity)
-        total = power.sum()
-        return longest / 2.0 ** np.arange(power.shape[1]), power.sum(axis=0) / (total if total > 0.0 else 1.0)
-
-    def _powers(self, velocity: Vector) -> Array:
-        """Power [W] lost in each branch to waves from each wavelength of `shares` to half of it; collective.
-
-        A wave u^ loses `|u^|^2/A |w| G_k''(|w|)`, with A its displacement over its pressure for a modulus of 1.
-        """
+        """Return the wavelengths [m] of `branch_powers`, and what share of the friction power the waves from each to
+        half of it have. Collective."""
         assert self.contact is not None
-        setup, fft, prony, grid = self.setup, self.setup.fft, self.setup.prony, self.setup.grid
-        spectrum, speed = fft.forward(self.contact.u), self.setup.in_units(velocity)
-        cells = max(max(grid.size) / grid.dx, max(grid.size) / grid.dy)  # along the longer side, of the smaller length
-        powers = np.zeros((prony.moduli.size, 2 + int(np.log2(cells * (1 + 1e-9)))))
-        for rows in deal(fft.my, PARTS):
-            omega = np.abs(setup.half_space.frequencies(fft, speed, rows))
-            compliance = setup.half_space.symbol(fft, rows)
-            waves = fft.multiplicity * np.abs(spectrum[rows]) ** 2
-            waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
-            octave = self._octaves(rows)
-            for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
-                loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
-                branch += np.bincount(octave.ravel(), loss.ravel(), branch.size)
-        unit = setup.units.pressure * setup.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
-        return np.array(setup.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
-
-    def _octaves(self, rows: slice) -> NDArray[np.int64]:
-        """How many times the wavelength of each wave, on these rows of a spectrum, can be doubled within the box."""
-        size = self.setup.grid.size
-        q = np.hypot(*wavenumbers(self.setup.fft, size, rows))
-        return np.floor(np.log2(np.maximum(q * max(size) / (2 * np.pi), 1.0) * (1 + 1e-9))).astype(np.int64)
+        power = branch_powers(self.setup, self.contact, velocity)
+        total = power.sum()
+        wavelengths = max(self.setup.grid.size) / 2.0 ** np.arange(power.shape[1])
+        return wavelengths, power.sum(axis=0) / (total if total > 0.0 else 1.0)
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
@@ -276,18 +263,3 @@ class SteadySliding:
 def tolerance_of(asked: float) -> float:
     """On the certificate of a steady state, where a job asks for one."""
     return max(SHARE * asked, min(LOOSE, asked))
-
-
-def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
-    """The map h_k of each branch in a steady state at a velocity [m/s], each time in `out`; collective."""
-    fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
-    if half_space.free:
-        for k in range(setup.prony.moduli.size):
-            yield half_space.branch_operator(fft, speed, setup.prony, k).apply(contact.p, out)
-        return
-    u = fft.forward(contact.u).copy()
-    for modulus, tau in zip(setup.prony.moduli, setup.prony.relaxation_times, strict=True):
-        own = Prony(0.0, np.array([modulus]), np.array([tau]))
-        for rows in deal(fft.my, PARTS):
-            np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
-        yield fft.backward(fft.spectrum, out)

@@ -10,7 +10,8 @@ from ..parallel.slab import Slab
 from ..scene import Setup, build_on, set_up
 from ..solve.nonsymmetric.steady import SteadyContact
 from ..storage.checkpoint import Contents
-from .sliding import Point, SteadySliding, branch_maps
+from .losses import branch_maps
+from .sliding import Point, SteadySliding
 
 
 def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:

@@ -1,18 +1,18 @@
 """steady.csv and steady_waves.csv: a line for each point of a friction curve, on root, and what is said of it."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from .. import progress
 from ..effects.interface import InterfaceColumns
 from ..job.checks.advice import describe_sample
+from ..physics.budget import advice, describe
 from ..storage import curve_points, files, measures
 from ..storage.console import Console, always
-from ..storage.curve_points import LOG
+from ..storage.curve_points import LOG, Wanted
 from ..storage.files import GrowingTable
-from .missed import describe_missed
 from .sliding import Point, SteadySliding
 
 COLUMNS = (
@@ -43,7 +43,7 @@ class CurveTable:
         self._bar = progress.Bar(0, "")
         self.say(HEAD)
 
-    def _read(self) -> list[curve_points.Point]:
+    def _read(self) -> list[Wanted]:
         """The points that are there; a line that was not finished is removed."""
         if not self.path.exists():
             return []
@@ -57,7 +57,7 @@ class CurveTable:
                 new.write(whole[: whole.rfind(b"\n") + 1])
         return curve_points.of_table(columns)
 
-    def lacking(self, points: Sequence[curve_points.Point]) -> list[int]:
+    def lacking(self, points: Sequence[Wanted]) -> list[int]:
         """The numbers of the points that are not there."""
         found = curve_points.lacking(points, self.known)
         if len(found) < len(points):
@@ -80,7 +80,7 @@ class CurveTable:
             self._console.warn(text, shown(text))
 
     def write(self, point: Point, waves: Any) -> None:
-        m, c, speed = point.measures, point.certificate, math.hypot(*point.velocity)
+        m, c, speed = point.measures, point.certificate, point.speed
         forces = (m.force_x, m.force_y, point.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
         solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
         last = [point.friction * (point.velocity[0] / speed), m.contact_area_corrected]
@@ -130,6 +130,21 @@ class CurveTable:
         self._file.close()
         if self._waves:
             self._waves.close()
+
+
+def describe_missed(points: Sequence[Point], accuracy: float) -> Iterator[str]:
+    """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than asked for."""
+    friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
+    area = [(point, point.errors.area) for point in points]
+    for name, each in (("friction", friction), ("corrected contact area", area)):
+        missed = [(parts.total, point, parts) for point, parts in each if parts.total > accuracy]
+        if missed:
+            _, point, parts = max(missed, key=lambda one: one[0])
+            place = Wanted(point.speed, point.pressure, point.temperature)
+            yield (
+                f"estimated error of the {name} of {len(missed)} of {len(points)} points: up to {describe(parts)}, "
+                f"at {place}{advice(parts, accuracy)}"
+            )
 
 
 def _percent(share: float) -> str:

@@ -136,7 +136,10 @@ def test_nothing_to_fold_costs_nothing() -> None:
 def test_energies_keep_every_branch() -> None:
     found = begun(sliding(output={"energy": True})).scene
     assert found.folded.folded == 0
-    assert scene.facts(found)[0] == "branches: all 4 have a map: output.energy counts the energy of every branch"
+    assert (
+        next(scene.describe_scene(found))
+        == "branches: all 4 have a map: output.energy counts the energy of every branch"
+    )
 
 
 def test_a_steady_start_freezes_nothing() -> None:

@@ -1,0 +1,55 @@
+"""What the branches of a body hold, and lose, in a steady state.
+
+A wave u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with A its displacement over its pressure for a modulus
+of 1 and the frequency w with which it passes a point.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..parallel.slab import Array, deal
+from ..physics.convolution import PARTS, wavenumbers
+from ..physics.prony import Prony
+from ..scene import Setup
+from ..solve.nonsymmetric.steady import SteadyContact
+
+ROUNDING = 1e-9  # accuracy: of a wave whose length is that of an octave
+
+Vector = tuple[float, float]
+
+
+def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Array:
+    """Return the power [W] lost in each branch to waves of each octave, the first from the longer side of the box to
+    half of it, shape (branches, octaves); only of periodic scenes, where waves are independent. Collective."""
+    fft, prony, grid, half_space = setup.fft, setup.prony, setup.grid, setup.half_space
+    spectrum, speed, longest = fft.forward(contact.u), setup.in_units(velocity), max(grid.size)
+    cells = max(longest / grid.dx, longest / grid.dy)  # along the longer side, of the smaller length
+    powers = np.zeros((prony.moduli.size, 2 + int(np.log2(cells * (1 + ROUNDING)))))
+    for rows in deal(fft.my, PARTS):
+        omega = np.abs(half_space.frequencies(fft, speed, rows))
+        compliance = half_space.symbol(fft, rows)
+        waves = fft.multiplicity * np.abs(spectrum[rows]) ** 2
+        waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
+        q = np.hypot(*wavenumbers(fft, grid.size, rows))
+        octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + ROUNDING))).astype(np.int64)
+        for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
+            loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
+            branch += np.bincount(octave.ravel(), loss.ravel(), branch.size)
+    unit = setup.units.pressure * setup.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
+    return np.array(setup.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
+
+
+def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
+    """Yield the map h_k of each branch in a steady state at a velocity [m/s], each time in `out`; collective."""
+    fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
+    if half_space.free:
+        for k in range(setup.prony.moduli.size):
+            yield half_space.branch_operator(fft, speed, setup.prony, k).apply(contact.p, out)
+        return
+    u = fft.forward(contact.u).copy()
+    for modulus, tau in zip(setup.prony.moduli, setup.prony.relaxation_times, strict=True):
+        own = Prony(0.0, np.array([modulus]), np.array([tau]))
+        for rows in deal(fft.my, PARTS):
+            np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
+        yield fft.backward(fft.spectrum, out)
