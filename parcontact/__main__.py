@@ -16,7 +16,7 @@ from .command import ranks
 from .command.arguments import parse_arguments
 from .command.verbs import BAD_INPUT, DONE, FAILED
 from .errors import InputError, JobError, RunError
-from .streams import patient, why_unread
+from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
 WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the others to do so too
@@ -39,13 +39,13 @@ def program() -> int:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv`; returns the exit code."""
-    with patient():
+    with tolerant_streams():
         return _run(list(sys.argv[1:] if argv is None else argv))
 
 
 def _run(words: list[str]) -> int:
     try:
-        _refuse_nowhere()
+        _refuse_lost_directory()
         options = parse_arguments(words)
         code = int(options.act(options))
         return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output())
@@ -60,7 +60,7 @@ def _run(words: list[str]) -> int:
         _end_all(error)
 
 
-def _refuse_nowhere() -> None:
+def _refuse_lost_directory() -> None:
     try:
         os.getcwd()
     except OSError as error:
@@ -69,8 +69,8 @@ def _refuse_nowhere() -> None:
 
 
 def _judge_output() -> int:
-    """The exit code of what has done its work if somebody can read it."""
-    reason = why_unread() if ranks.is_root() else ""
+    """Return the exit code of what has done its work: not 0 if its output could not be written."""
+    reason = describe_loss() if ranks.is_root() else ""
     if reason:
         print(f"parcontact: cannot write to standard output: {reason}", file=sys.stderr, flush=True)
     return BAD_INPUT if reason else DONE
@@ -85,7 +85,7 @@ def _leave_code(code: int) -> int:
 
 
 def _end_together(text: str, code: int) -> int:
-    """Every rank has this error, and root says it. If one turns out to be alone with it, it says so and ends all."""
+    """End with an error that every rank has, which root prints. A rank that is alone with it says so and ends all."""
     root, world = ranks.is_root(), ranks.started()
     if root:
         print(text, file=sys.stderr, flush=True)
@@ -102,15 +102,15 @@ def _end_together(text: str, code: int) -> int:
 
 
 def _end_all(error: BaseException) -> NoReturn:
-    """One rank cannot go on: it says why and ends all of them."""
+    """End all ranks where one cannot go on, which says why."""
     world = ranks.started()
     if not ranks.is_root():
         time.sleep(STAGGER_SECONDS)
     several = world is not None and world.size > 1
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
     said = f": {error}" if str(error) else ""
-    reason = _trouble_around(error) or f"ended by {type(error).__name__}"
-    if not isinstance(error, KeyboardInterrupt) and not _trouble_around(error):
+    reason = _describe_surroundings(error) or f"ended by {type(error).__name__}"
+    if not isinstance(error, KeyboardInterrupt) and not _describe_surroundings(error):
         traceback.print_exception(error)
     print(f"parcontact: {reason}{where}{said}", file=sys.stderr, flush=True)
     if world is not None and several:
@@ -118,8 +118,8 @@ def _end_all(error: BaseException) -> NoReturn:
     sys.exit(FAILED)
 
 
-def _trouble_around(error: BaseException) -> str:
-    """What is wrong around the program, where that has ended it, and what to do; '' for any other error."""
+def _describe_surroundings(error: BaseException) -> str:
+    """Return what is wrong around the program, where that has ended it, and what to do; '' for any other error."""
     limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
     if isinstance(error, MemoryError) or (limited and isinstance(error, ImportError | SystemError)):
         return "out of memory; free some, allow more by ulimit -v, or take fewer points"

@@ -1,4 +1,4 @@
-"""How far long work has come: a bar on a terminal, with how much is done and the time left; nothing elsewhere."""
+"""Progress of long work: a bar on a terminal, with how much is done and the time left; nothing elsewhere."""
 
 import sys
 from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ class Bar:
             self._bar.close()
 
 
-def shown(items: Sequence[T], what: str, unit: str = "step") -> Iterator[T]:
+def with_bar(items: Sequence[T], what: str, unit: str = "step") -> Iterator[T]:
     """The items, with a bar that counts those that were dealt with."""
     bar = Bar(len(items), what, unit)
     try:

@@ -1,4 +1,4 @@
-"""What the program says must not end it: streams that take every text, whoever reads them, if anybody does."""
+"""Streams that take every text, whoever reads them: printing must not end the program."""
 
 import io
 import os
@@ -16,7 +16,7 @@ def printable(text: str) -> str:
     return CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}" if ord(found[0]) > 255 else repr(found[0])[1:-1], text)
 
 
-class Patient(io.TextIOBase):
+class TolerantStream(io.TextIOBase):
     """A stream in front of another, which may be closed, full, or know fewer letters: then less is shown.
 
     `plain`: control characters are spelt out, but for tabs and ends of lines; a progress bar needs them.
@@ -57,8 +57,8 @@ class Patient(io.TextIOBase):
             return self._stream is not None and not self.gone and self._stream.isatty()
         return False
 
-    def let_go(self) -> None:
-        """What the stream still holds, and cannot write, must not fail when Python ends."""
+    def drop_the_rest(self) -> None:
+        """Drop what the stream still holds and cannot write, so that it does not fail when Python ends."""
         self.flush()
         if self.gone and self._stream is not None:
             with suppress(OSError, ValueError):
@@ -68,20 +68,20 @@ class Patient(io.TextIOBase):
 
 
 @contextmanager
-def patient() -> Iterator[None]:
-    """Standard output and standard error are patient meanwhile."""
+def tolerant_streams() -> Iterator[None]:
+    """Make standard output and standard error tolerant meanwhile."""
     before = sys.stdout, sys.stderr
-    out, err = Patient(before[0], True), Patient(before[1], False)
+    out, err = TolerantStream(before[0], True), TolerantStream(before[1], False)
     sys.stdout, sys.stderr = out, err
     try:
         yield
     finally:
         sys.stdout, sys.stderr = before
-        out.let_go()
-        err.let_go()
+        out.drop_the_rest()
+        err.drop_the_rest()
 
 
-def why_unread() -> str:
-    """Why nobody can read what was printed so far; '' if all was written, or if its reader has left before the end."""
+def describe_loss() -> str:
+    """Return why what was printed could not be written; '' if it was, or if its reader has left before the end."""
     sys.stdout.flush()
-    return sys.stdout.lost if isinstance(sys.stdout, Patient) else ""
+    return sys.stdout.lost if isinstance(sys.stdout, TolerantStream) else ""

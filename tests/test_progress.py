@@ -34,7 +34,7 @@ def told(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, *words: str) ->
 
 def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    items = progress.shown([1, 2, 3], "maps", "map")
+    items = progress.with_bar([1, 2, 3], "maps", "map")
     assert next(items) == 1
     assert "maps:   0%" in terminal.getvalue()
     assert "0/3" in terminal.getvalue()

@@ -224,6 +224,6 @@ def _add_arguments(parser: argparse.ArgumentParser, verb: Verb) -> argparse.Argu
 
 
 def describe_verbs() -> str:
-    """What the manual says of the verbs: the help of each."""
+    """Return the help of each verb, for the manual."""
     parsers = [_add_arguments(_Parser(prog=f"parcontact {verb.name}"), verb) for verb in VERBS]
     return "\n".join(f"\n## `{own.prog.split()[1]}`\n\n```text\n{own.format_help().rstrip()}\n```" for own in parsers)

@@ -23,7 +23,7 @@ OF_A_CURVE = ("velocities", "pressures", "temperatures")
 def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
     """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective.
 
-    Of cases that are done side by side only the beginning and the end are told.
+    Only beginning and end are printed of cases that are done side by side.
     """
     from ..parallel.slab import Slab
     from ..storage.console import always
@@ -56,9 +56,10 @@ def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case
 
 
 def overrides(options: argparse.Namespace) -> list[str]:
-    """What the command line changes in a job; the name of a directory is taken as it is, whatever YAML would read.
+    """Return the changes that the command line makes to a job.
 
-    Velocities, pressures and temperatures of a friction curve are keys of the job, which then needs no history.
+    The name of a directory is taken as it is, whatever YAML would read. Velocities, pressures and temperatures of a
+    friction curve are keys of the job, which then needs no history.
     """
     name = "".join(f"\\U{ord(letter):08x}" for letter in options.out or "")
     asked = {key: getattr(options, key, ()) for key in OF_A_CURVE}

@@ -21,7 +21,7 @@ LOAD = {"pressure": 1.0e5}
 
 
 def is_map(path: Path) -> bool:
-    """Whether a name is that of a measured map, not of a job."""
+    """Tell whether a name is that of a measured map, not of a job."""
     return path.suffix.lower() not in JOBS
 
 

@@ -30,7 +30,7 @@ LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_
 
 
 def is_root() -> bool:
-    """Whether this is the rank that speaks."""
+    """Tell whether this is the rank that prints."""
     return rank() == 0
 
 
@@ -42,12 +42,12 @@ def rank() -> int:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
 def launched() -> int:
-    """How many ranks a launcher has started."""
+    """Return the number of ranks that a launcher has started."""
     return max((int(os.environ.get(name) or 1) for name in LAUNCHERS), default=1)
 
 
@@ -73,7 +73,7 @@ def start() -> MPI.Intracomm:
 
 
 def _refuse_surroundings() -> None:
-    """Raises InputError for limits and settings of the shell under which MPI ends without a sentence."""
+    """Raise InputError for limits and settings of the shell under which MPI ends without a sentence."""
     files, memory = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_NOFILE, resource.RLIMIT_AS))
     if 0 <= files < LEAST_FILES:
         raise InputError(f"only {files} files may be open: set a limit of {LEAST_FILES} or more, by ulimit -n")

@@ -1,4 +1,4 @@
-"""What each verb does: options -> exit code. A verb imports what it needs when it runs, so that each begins at once."""
+"""Verbs of the command line: options -> exit code. Each imports what it needs when it runs: all begin at once."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def check(options: argparse.Namespace) -> int:
 
 
 def _doubts(job: Job) -> list[str]:
-    """What only a look at heights and measured moduli tells."""
+    """Return the doubts that only a look at heights and measured moduli raises."""
     from ..job.checks import meaning
 
     if meaning.says_all(job.surface) and not job.measured:

@@ -90,7 +90,7 @@ class Bench:
         return np.concatenate(march.scene.slab.from_all(march.field(name)))
 
     def amplitude(self, march: March) -> float:
-        """Of the pressure of a wave that is longer than two cells [Pa]; collective."""
+        """Return the amplitude of the pressure of a wave that is longer than two cells [Pa]; collective."""
         return float(np.sqrt(2.0) * np.std(self.whole(march, "pressure")))
 
     def _note(self, row: Row) -> None:
@@ -137,7 +137,7 @@ class Bench:
             self.findings[what] = finding
 
     def expect_all(self, what: str, found: ArrayLike, expected: ArrayLike, within: float) -> None:
-        """The same for many numbers, each of which may be off by `within` times the largest expected one."""
+        """Note many numbers, each of which may be off by `within` times the largest expected one."""
         found, expected = np.broadcast_arrays(np.asarray(found, float), np.asarray(expected, float))
         largest = float(np.abs(expected).max())
         for one, other in zip(found.ravel(), expected.ravel(), strict=True):

@@ -33,7 +33,7 @@ CHECKS = (
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What came out of a check: all findings, the worst residual and the most iterations of its solves."""
+    """Result of a check: all findings, the worst residual and the most iterations of its solves."""
 
     check: Check
     findings: tuple[Finding, ...]

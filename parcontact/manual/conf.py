@@ -1,4 +1,4 @@
-"""How Sphinx builds the manual: see scripts/manual."""
+"""Settings with which Sphinx builds the manual: see scripts/manual."""
 
 from parcontact import __version__
 

@@ -1,4 +1,4 @@
-"""What the manual's page on Python says of functions and classes, from their docstrings, to be read in a terminal.
+"""Text of the manual's page on Python, from the docstrings of functions and classes, to be read in a terminal.
 
 The web site has it from Sphinx, by the same directives: `.. autoclass:: NAME`, `:members:`, `.. autofunction:: NAME`.
 """
@@ -37,7 +37,7 @@ def _public(kind: type) -> list[str]:
 
 
 def _parameters(found: Any) -> str:
-    """As they are written in a call: `(job, set=None)`; '' of attributes, results and errors, which nobody calls."""
+    """Return parameters as in a call: `(job, set=None)`; '' of attributes, results and errors, which nobody calls."""
     if not callable(found) or is_dataclass(found) or _is(found, Exception):
         return ""
     signature = inspect.signature(found)

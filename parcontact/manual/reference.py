@@ -1,4 +1,4 @@
-"""What the manual says of every key of a job: generated from the types, with a meaning and an example beside each."""
+"""Reference of every key of a job: generated from the types, with a meaning and an example beside each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MEANINGS = Path(__file__).parent / "keys.yaml"
 
 @cache
 def meanings() -> dict[str, dict[str, Any]]:
-    """By the names of the parts, then of their keys: `[meaning, example]`."""
+    """Return `[meaning, example]` by the names of the parts, then of their keys."""
     found: dict[str, dict[str, Any]] = yaml.safe_load(MEANINGS.read_text(encoding="utf-8"))
     return found
 
@@ -29,7 +29,7 @@ def keys() -> str:
 
 
 def heading(section: Section) -> str:
-    """What a section is called: its place in a job, and its kind where there are several."""
+    """Return the name of a section: its place in a job, and its kind where there are several."""
     kind = kind_key(section.part)
     named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
     more = section.part.label.removeprefix(named.replace(":", "")).strip()

@@ -59,7 +59,7 @@ def _reference(found: re.Match[str]) -> str:
 
 
 def built(name: str) -> Path:
-    """Where the page of the web site is. Raises InputError where scripts/manual has not made it."""
+    """Return the path of a page of the web site. Raises InputError where scripts/manual has not made it."""
     page = SITE / f"{name}.html"
     if not page.is_file():
         raise InputError(

@@ -1,1 +1,1 @@
-"""What a job will do and cost, before it runs: effects, memory, steps, transforms, messages, time."""
+"""The plan of a job before it runs: effects, memory, steps, time, and the price of other accuracies."""

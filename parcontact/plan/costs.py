@@ -1,4 +1,4 @@
-"""What a job costs on the ranks that have tried it: the time of its steps, scaled from a coarser grid where need be."""
+"""Costs of a job on the ranks that have tried it: time and memory, scaled from a coarser grid where need be."""
 
 import math
 import os

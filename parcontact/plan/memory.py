@@ -1,4 +1,4 @@
-"""How many bytes a rank holds in maps, and how many a checkpoint has: from the job alone, to the byte.
+"""Bytes that a rank holds in maps, and bytes of a checkpoint: from the job alone, exactly.
 
 Each class says what it holds; here this is added up.
 """
@@ -113,7 +113,7 @@ def free_bytes() -> int:
 
 
 def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
-    """How many of these cases are run at a time on so many ranks: small ones one on each rank, as they gain little from
+    """Return the number of cases to run at a time on so many ranks: small ones one on each, as they gain little from
     several; 1 where they are not small, or where so many do not fit into the memory."""
     at_once = min(ranks, len(jobs))
     if at_once < 2:
@@ -128,7 +128,7 @@ def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
 
 @dataclass(frozen=True)
 class _Part:
-    """What one of several ranks has of a job's grid; without a rank that which has the most."""
+    """The part of a job's grid that one of several ranks has; without a rank the largest part."""
 
     job: Job
     ranks: int

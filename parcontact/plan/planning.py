@@ -82,7 +82,7 @@ class Planner:
         return costs_of(job, seen, slab.agree(measure_write_rate(job.output.directory) if slab.root else 0.0))
 
     def _tell(self, job: Job, slab: Slab) -> Iterator[str]:
-        """What the steps, or the steady states, of a job cost; collective."""
+        """Lines on the costs of the steps, or the steady states, of a job; collective."""
         bar = progress.Bar(1, f"trying the job for some {self.seconds:g} s", "trial", slab.root)
         try:
             costs = self.try_job(job, slab)
@@ -105,7 +105,7 @@ def only_steady_states(job: Job) -> Job:
 
 
 def cases_to_try(count: int) -> list[int]:
-    """Of so many cases: the first, the last, and between them."""
+    """Return the numbers of the first case, the last, and some between them."""
     few = min(TRIED_CASES, count)
     return sorted({round(number * (count - 1) / max(few - 1, 1)) for number in range(few)})
 

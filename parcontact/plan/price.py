@@ -1,4 +1,4 @@
-"""What accuracy costs: the mesh, the steps and the time of a job at other accuracies, from a trial of it at its own.
+"""The price of accuracy: the mesh, the steps and the time of a job at other accuracies, from a trial of it at its own.
 
 Nothing more is tried. All parts of the error budget together keep the accuracy: the mesh may have MESH_SHARE of it,
 time steps TIME_SHARE, the solver the rest; steps that are chosen make CHOSEN_SHARE, whatever the mesh makes. The mesh
@@ -56,7 +56,7 @@ def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
 
 
 def _finer(job: Job, sample: Sample, accuracy: float) -> float:
-    """How many times the points of the job; 1 where its surface has one mesh only, or the mesh makes no error."""
+    """Return the points needed over those of the job; 1 where its surface has one mesh, or the mesh makes no error."""
     if any(isinstance(shape, OnOneMesh) for shape in job.surface):
         return 1.0
     error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
@@ -138,7 +138,7 @@ def time_error(cost: StageCost, sample: Sample) -> float:
 
 
 def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple[int, float]:
-    """How many steps a stage has instead of its own `count` that last if these are to be `more` times as many, and how
+    """Return the steps of a stage instead of its own `count` that last if these are to be `more` times as many, and how
     many times the calls one of them takes."""
     if count == 0:
         return 0, 1.0
@@ -154,7 +154,7 @@ def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple
 
 
 def _calls(own: Job, job: Job) -> float:
-    """How many times as many calls a solve to the tolerance of a job takes."""
+    """Return the calls of a solve to the tolerance of a job over those of the own one."""
     return float(CALLS_PER_DECADE ** math.log10(own.numerics.tolerance / job.numerics.tolerance))
 
 

@@ -11,9 +11,9 @@ from .costs import Costs
 
 SUMS_PER_STEP = 1  # that a run makes besides those of its march: whether to stop
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
-LARGE = 1e10  # bytes from which on there are told GB
+LARGE = 1e10  # bytes from which on GB are the unit
 STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
-MARK = "*"  # of figures that were taken while other programs were at work
+MARK = "*"  # on figures that were taken while other programs were at work
 
 
 def effects(job: Job) -> Iterator[str]:
@@ -43,7 +43,7 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
 
 
 def steps(costs: Costs) -> Iterator[str]:
-    """How many steps, or steady states, and what is in one."""
+    """Lines on the number of steps, or steady states, and on the work of one."""
     job, sample = costs.job, costs.sample
     word = "step" if job.history else "state"
     if job.steady and not job.history:
@@ -85,7 +85,7 @@ def times(costs: Costs) -> Iterator[str]:
 
 
 def unit_of(most: float) -> tuple[str, float]:
-    """In which to tell of so many bytes and less: its name and its bytes."""
+    """Return a unit for up to so many bytes: its name and its bytes."""
     return ("GB", 1e9) if most >= LARGE else ("MB", 1e6)
 
 

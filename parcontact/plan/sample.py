@@ -35,7 +35,7 @@ LATE = 2.0  # tuning: times the time given, after which no more steps are made
 
 @dataclass
 class StageCost:
-    """What the steps of a stage cost: their number, how many were tried, sums over the FIRST of these and over later
+    """Cost of the steps of a stage: their number, how many were tried, sums over the FIRST of these and over later
     ones."""
 
     steps: int
@@ -60,7 +60,7 @@ class StageCost:
 
 @dataclass(frozen=True)
 class Sample:
-    """What was seen of a job on some ranks: its stages, and how long all of it took [s].
+    """A job as it was tried on some ranks: its stages, and how long all of it took [s].
 
     `starting` the program, `building` the scene; `resident` is the memory of root that is not in maps, `held` that in
     maps at most [bytes]. `share` is how much of its time a rank had a core, at least: less than all of it where other
@@ -79,7 +79,7 @@ class Sample:
 
     @property
     def disturbed(self) -> bool:
-        """Whether other programs have taken so much of the machine that times say little."""
+        """Tell that other programs have taken so much of the machine that times say little."""
         return self.share < UNDISTURBED
 
     @property
@@ -215,7 +215,7 @@ def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator
 
 
 def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:
-    """What a call returns, its seconds, and what is counted in it."""
+    """Return what a call returns, and its seconds and counts."""
     before, began = slab.tally.copy(), time.perf_counter()
     found = call()
     seconds = time.perf_counter() - began

@@ -94,7 +94,7 @@ def _flat(value: Any, key: str, depth: int = 0) -> Iterator[tuple[str, str]]:
 
 
 def path_of(path: object) -> Path:
-    """Raises InputError for what is no path."""
+    """Return a path. Raises InputError for what is none."""
     if not isinstance(path, str | os.PathLike):
         raise InputError(f"a path must be a text or a pathlib.Path, got {path!r:.60}")
     return Path(path)

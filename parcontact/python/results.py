@@ -20,7 +20,7 @@ NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install x
 
 
 def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
-    """What a run has measured and saved, also of one that still goes on.
+    """Return what a run has measured and saved, also one that still goes on.
 
     The columns of measures.csv by their names, along `step` and with the coordinate `time` [s]; each map of fields.h5
     as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used. Variables have

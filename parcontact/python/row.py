@@ -1,4 +1,4 @@
-"""What a step has measured, by the names of measures.csv."""
+"""Measures of a step, by the names of the columns of measures.csv."""
 
 from __future__ import annotations
 

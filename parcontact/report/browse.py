@@ -43,7 +43,7 @@ def _browsers(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[
 
 
 def _browser(file: h5py.File, name: str, labels: dict[int, str]) -> Browser:
-    counted = progress.shown(list(labels), f"maps of {name}", "map")
+    counted = progress.with_bar(list(labels), f"maps of {name}", "map")
     images = zip(maps.frames(file, name, labels, SIZE, DPI), counted, strict=True)
     return name, [(uri_of(small_png(image), "image/png"), labels[index]) for image, index in images]
 

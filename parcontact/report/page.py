@@ -49,7 +49,7 @@ def _refuse_links(directory: Path) -> None:
 
 def render(directories: Sequence[Path]) -> str:
     """Return the text of the page."""
-    each = [chapter(directory) for directory in progress.shown(directories, "chapters", "chapter")]
+    each = [chapter(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
     chapters = [*together(directories), *each]
     loader = PackageLoader("parcontact", "report")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)

@@ -1,1 +1,1 @@
-"""From a measured road to heights on a grid: files of many instruments, what is done to them, what they are like."""
+"""Measured roads: files of many instruments, their treatment, statistics, and heights on a grid."""

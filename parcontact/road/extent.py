@@ -1,4 +1,4 @@
-"""How many points a measured map has, and how large it is, for jobs that take their grid from it."""
+"""Points and size of a measured map, for jobs that take their grid from it."""
 
 from functools import lru_cache
 from pathlib import Path

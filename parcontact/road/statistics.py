@@ -1,4 +1,4 @@
-"""What a map is like: spectra, rms values, Nayak's parameter, the Hurst exponent of a self-affine range.
+"""Statistics of a map: spectra, rms values, Nayak's parameter, the Hurst exponent of a self-affine range.
 
     C2(q) = <|h^(q)|^2>/(Lx Ly)/(4 pi^2)   over directions, with h^ = int h exp(-i q x) d2x,   <h^2> = int C2 d2q,
     C1(q) along one direction, one-sided: <h^2> = int_0^inf C1 dq.
@@ -25,8 +25,8 @@ FLAT, STEEP = -2.0, -4.2  # slopes of a Hurst exponent of 0, and of 1 with some 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of a periodic map of (ny, nx) points on (lx, ly) [m]: rms height [m], slope [-] of the gradient, and curvature
-    [1/m], half of the Laplacian; Nayak's parameter; `q`, shape (n,) [1/m], with `psd_2d` [m^4] and the spectra along x
+    """Statistics of a periodic map of (ny, nx) points on (lx, ly) [m]: rms height [m], slope [-], and curvature [1/m],
+    half of the Laplacian; Nayak's parameter; `q`, shape (n,) [1/m], with `psd_2d` [m^4] and the spectra along x
     and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`; `hurst` is NaN where no power law holds."""
 
     rms_height: float
@@ -43,7 +43,7 @@ class Statistics:
 
 
 def describe(heights: Array, size: tuple[float, float]) -> Statistics:
-    """All of it, from the Fourier series of the map."""
+    """Return the statistics of a map, from its Fourier series."""
     ny, nx = heights.shape
     power = np.abs(fft.fft2(heights - heights.mean()) / (nx * ny)) ** 2
     qx, qy = (2 * np.pi * fft.fftfreq(n, length / n) for n, length in zip((nx, ny), size, strict=True))
@@ -79,7 +79,7 @@ def _along(power: Array, length: float) -> tuple[Array, Array]:
 
 
 def _hurst(q: Array, psd: Array) -> float:
-    """From the slope of log C2 over log q, -2 (1 + H), in the widest range that is a power law.
+    """Return the exponent from the slope of log C2 over log q, -2 (1 + H), in the widest range that is a power law.
 
     Waves beyond those that make up the slopes are what an instrument, a filter or an edge has left.
     """

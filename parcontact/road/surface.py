@@ -25,8 +25,8 @@ class Prepared:
     size: tuple[float, float]
 
     @property
-    def told(self) -> list[str]:
-        """What was done, in sentences."""
+    def notes(self) -> list[str]:
+        """Return sentences on what was done."""
         (ny, nx), done = self.cut.shape, self.treated
         lines = [f"road: {nx} x {ny} points of the map, {self.size[0]:.4g} x {self.size[1]:.4g} m, are used"]
         if done.missing:
@@ -81,4 +81,4 @@ def rows_of(part: Topography, grid: Grid, slab: Slab) -> tuple[Array, list[str]]
     found: list[Prepared] = []
     on_root(slab.comm, lambda: found.append(prepare(part, grid)))
     rows = slab.from_root(found[0].heights if found else None)
-    return rows, found[0].told if found else []
+    return rows, found[0].notes if found else []

@@ -1,4 +1,4 @@
-"""What is done to a measured map before it can be pressed on a body: filled, levelled, made periodic, resampled.
+"""Treatment of a measured map before it is pressed on a body: filled, levelled, made periodic, resampled.
 
 Maps are arrays of shape (ny, nx), x last; missing points are NaN.
 """

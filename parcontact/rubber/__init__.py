@@ -1,1 +1,1 @@
-"""From a measured rubber to a material: tables of moduli, time-temperature shift, Prony series, material files."""
+"""Measured rubbers as materials: tables of moduli, time-temperature shift, Prony series, material files."""

@@ -23,7 +23,7 @@ DIGITS = 7  # of the numbers in a material file
 
 @dataclass(frozen=True)
 class Compound:
-    """What was measured (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
+    """The measurement (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
     `shift` (None for a table of one temperature); `poisson` is the ratio with which Young's moduli were divided; both
     moduli count in the fit, or only the one to `weigh`; whether the shift was fitted to the sweeps that it `joined`."""
 
@@ -59,7 +59,7 @@ class Compound:
         return "moduli" if self.weigh == "both" else f"{self.weigh} modulus"
 
     def doubts(self) -> list[str]:
-        """What to say of a fit that misses the table by more than it scatters, and of tables that are of no rubber."""
+        """Return warnings of a fit that misses the table by more than it scatters, and of tables of no rubber."""
         from .sane import odd_moduli  # with numpy, which is slow to import
 
         series, found = self.series, []

@@ -1,4 +1,4 @@
-"""What cannot be a measured rubber: wrong units and orders, told in a sentence before anything is fitted."""
+"""Checks that a table can be of a measured rubber: wrong units and orders are refused before anything is fitted."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -73,7 +73,7 @@ def fit(
     weigh = weigh if kind == "frequency" else "both"
     dense = _solve(at, data, kind, _dense(*band), weigh)
     goal = math.hypot(error, dense.error)
-    for count in progress.shown(range(1, MOST + 1), "number of branches", "branch"):
+    for count in progress.with_bar(range(1, MOST + 1), "number of branches", "branch"):
         tried = [_solve(at, data, kind, _grid(band, count, spare), weigh) for spare in ENDS]
         found = min(tried, key=lambda series: series.error)
         if found.error <= goal:
@@ -110,7 +110,7 @@ def _reduced(sets: Sequence[Set], kind: str, shifts: Sequence[float]) -> tuple[A
 
 
 def _columns(at: Array, kind: str, times: Array) -> Array:
-    """What a unit modulus of each time, and of none (the last column), adds to the data."""
+    """Return the contributions to the data of a unit modulus of each time, and of none (the last column)."""
     if kind == "time":
         return np.hstack([np.exp(-at[:, None] / times), np.ones((at.size, 1))])
     z = at[:, None] * times
@@ -216,7 +216,7 @@ def _fitted(
         return _solve(at, data, measured.kind, _dense(float(rates.min()), float(rates.max())), weigh).error
 
     grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
-    errors = [error(point) for point in progress.shown(grid, "shift with temperature", "law")]
+    errors = [error(point) for point in progress.with_bar(grid, "shift with temperature", "law")]
     start = grid[int(np.argmin(errors))]
     if not math.isfinite(error(start)):
         raise InputError(f"{measured.path}: no law of the shift joins the sets at {reference:g} C")

@@ -22,7 +22,7 @@ ZERO = 273.15  # K at 0 deg C
 
 
 class Shift(Protocol):
-    """How relaxation times depend on temperature; `reference` [deg C] is where they are as given."""
+    """Dependence of relaxation times on temperature; `reference` [deg C] is where they are as given."""
 
     @property
     def reference(self) -> float: ...
@@ -84,7 +84,7 @@ class Factors:
 
 
 def given(text: str, reference: float | None) -> str | Shift:
-    """What the text of a command line means: the name of a law whose constants are to be fitted, or a law.
+    """Return what a text of the command line means: the name of a law whose constants are to be fitted, or a law.
 
     `wlf:8.86,101.6` and `arrhenius:1.2e5` hold constants at the reference temperature, another text is the path of a
     file with the columns T[C] and log_aT. Raises InputError.

@@ -171,7 +171,7 @@ class _Table:
     lines: Sequence[int]
 
     def measurement(self, poisson: float) -> Measurement:
-        """What the columns say, in SI units."""
+        """Return the columns as sets in SI units."""
         derived = self._complete()
         modulus = self._name_modulus()
         kind: Kind = "time" if f"{modulus}_relax" in self.values else "frequency"

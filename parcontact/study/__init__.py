@@ -1,1 +1,1 @@
-"""What accuracy costs: a job run with coarser and finer settings, the limit that its results go to, and the price."""
+"""Studies of accuracy: a job run with coarser and finer settings, the limit that its results go to, and the price."""

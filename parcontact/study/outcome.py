@@ -30,8 +30,8 @@ LAST_SHARE = 0.25  # of the last stage that slides (or lasts): its mean is taken
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one run: the largest friction, its mean and those of the contact area over the last quarter of the last stage
-    that slides, and what it cost on all ranks.
+    """Outcome of a run: the largest friction, means of friction and contact area over the last quarter of the last
+    stage that slides, and what it cost on all ranks.
 
     `transform_work` is the number of transforms times `N log2 N` of their N points, which no machine changes.
     """

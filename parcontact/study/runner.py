@@ -106,7 +106,7 @@ class _Study:
     def _curves(
         self, outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]]
     ) -> list[study_plots.Curve]:
-        """How errors fall along each ladder."""
+        """Return the errors along each ladder."""
         return [
             study_plots.Curve(quantity, integrator, name, sizes, [errors[case][quantity] for case in cases])
             for integrator in self.refined.integrators
@@ -130,12 +130,12 @@ def _points(
 
 
 def _short(case: Settings) -> str:
-    """Its settings in the order of the key of a picture."""
+    """Return the settings of a case in the order of the key of a picture."""
     steps = "auto" if case.cells_per_step is None else f"{case.cells_per_step:.3g}"
     return f"{case.mesh}, {steps}, {case.tolerance:g}, {case.precision}"
 
 
 def _fingerprint(job: Job) -> str:
-    """Of all that the outcome of a case depends on."""
+    """Return a fingerprint of all that the outcome of a case depends on."""
     lasting = job.model_copy(update={"study": None, "output": None, "checkpoint": None, "title": ""})
     return hashlib.sha256(lasting.resolved().encode()).hexdigest()[:12]

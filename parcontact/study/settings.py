@@ -30,7 +30,7 @@ class Settings:
 
     @property
     def time_step(self) -> float:
-        """In lengths of the box; of steps that are chosen that of a cell, about which they are."""
+        """Return the time step in lengths of the box; one cell for steps that are chosen, which are about that."""
         return (self.cells_per_step or 1.0) / self.mesh
 
     @property
@@ -52,7 +52,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Ladders:
-    """What is refined, from the coarsest to the finest; one value where the job asks for none.
+    """Ladders of what is refined, from the coarsest to the finest; one value where the job asks for none.
 
     `shared` is the relative error that all cases may have alike: the accuracy for which steps are chosen, else 0.
     """
@@ -88,14 +88,14 @@ def _cells_of_time_steps(job: Job) -> float:
 
 
 def at_time_step(case: Settings, mesh: int) -> Settings:
-    """The same time step on another mesh; steps that are chosen are so there too."""
+    """Return the settings with the same time step on another mesh; steps that are chosen are so there too."""
     if case.cells_per_step is None:
         return replace(case, mesh=mesh)
     return replace(case, mesh=mesh, cells_per_step=case.cells_per_step * mesh / case.mesh)
 
 
 def ladders(job: Job) -> Ladders:
-    """What a job's study refines; raises InputError where there is nothing, or its surface has one mesh only."""
+    """Return the ladders of a job's study. Raises InputError where there are none, or its surface has one mesh only."""
     study, numerics = job.study, job.numerics
     if study is None:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
@@ -119,7 +119,7 @@ def ladders(job: Job) -> Ladders:
 
 
 def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
-    """What makes a case of the job, as for `--set`; time steps of all kinds change in the same proportion."""
+    """Return the overrides that make a case of the job; time steps of all kinds change in the same proportion."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += ["output.branch_dissipation=false"]

@@ -1,4 +1,4 @@
-"""What a study finds: limits, errors of every case, which settings are worth their price, and sentences about it."""
+"""Results of a study: limits, errors of every case, which settings are worth their price, and sentences about it."""
 
 import math
 from collections.abc import Mapping
@@ -56,7 +56,7 @@ def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str
 
 
 def _alike(one: float | None, other: float | None) -> bool:
-    """Whether they are the same cells per step; None for steps that are chosen."""
+    """Tell whether cells per step are the same; None for steps that are chosen."""
     return one == other if one is None or other is None else math.isclose(one, other)
 
 
