@@ -10,9 +10,9 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from paper_panels import means
 
 from parcontact.errors import InputError
 from parcontact.job import Initial, load
@@ -26,15 +26,6 @@ JOB = Path(__file__).resolve().parents[1] / "jobs" / "paper" / "fig09_velocities
 
 SLIGHT = 3.2e5  # Pa: pressures up to here are low
 FULL = 0.999  # contact area ratio from which on contact is full
-
-Rows = list[dict[str, Any]]
-
-
-def means(rows: Rows, key: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a key, and means of a column over the cases of each."""
-    at = sorted({row[key] for row in rows})
-    values = [np.array([row[name] for row in rows if row[key] == value]) for value in at]
-    return np.array(at), np.array([np.nanmean(group) for group in values])
 
 
 def claims(out: Path) -> Iterator[tuple[str, str]]:
@@ -52,8 +43,8 @@ def claims(out: Path) -> Iterator[tuple[str, str]]:
             share = 100 * (means(rows, key, f"theory_{name}")[1] / means(rows, key, name)[1] - 1)
             shares.append(f"{figure}: {share.min():+.0f} ... {share.max():+.0f} %")
         yield text, "; ".join(shares)
-    x, highest = means(speeds, "history.1.velocity", "mu_max")
-    _, dynamic = means(speeds, "history.1.velocity", "mu_dyn")
+    x, highest, _ = means(speeds, "history.1.velocity", "mu_max")
+    _, dynamic, _ = means(speeds, "history.1.velocity", "mu_dyn")
     theory = means(speeds, "history.1.velocity", "theory_mu_dyn")[1]
     where = f"{x[np.argmax(dynamic)]:g} m/s; theory: {x[np.argmax(theory)]:g} m/s"
     yield "the theory's gamma = 0.45 is slightly too low", _fitting_gammas(dynamic / theory, x)
@@ -62,7 +53,7 @@ def claims(out: Path) -> Iterator[tuple[str, str]]:
     below = highest[x < x[np.argmax(dynamic)]] / dynamic[x < x[np.argmax(dynamic)]]
     told = f"yes: mu_max/mu_dyn = {below.min():.2f}" if below.size and below.min() > 1 else "no"
     yield "there is a maximum also when V0 and V1 are below the velocity of highest friction", told
-    p, dynamic = means(pressures, "history.1.pressure", "mu_dyn")
+    p, dynamic, _ = means(pressures, "history.1.pressure", "mu_dyn")
     area, theory = (means(pressures, "history.1.pressure", name)[1] for name in ("contact_area", "theory_mu_dyn"))
     low = dynamic[p <= SLIGHT]
     yield "friction depends only slightly on low pressures", f"mu_dyn {low.min():.4f} ... {low.max():.4f} up to 0.3 MPa"

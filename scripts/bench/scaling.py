@@ -14,7 +14,7 @@ from runs import ROOT, begun
 from parcontact.compiled import loop
 from parcontact.parallel.fft import transform_name
 from parcontact.parallel.fftw import pyfftw
-from parcontact.parallel.slab import Slab, deal
+from parcontact.parallel.slab import Slab
 
 from .meter import OTHER, TRANSFORM, Meter
 from .table import Line, quartiles
@@ -190,8 +190,8 @@ def _bandwidth(points: int, rounds: int, ranks: int) -> float:
 def march(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
     """From the steady start through the climb, then rounds of a step of one cell and bare transforms; collective.
 
-    Bare transforms are ours, with the exchange between ranks, and FFTW's passes alone, which exchange nothing, both in
-    double precision for all transforms of a step, whatever theirs is; and ours, each in its own precision.
+    Bare transforms have the exchange between ranks; in double precision for all transforms of a step, whatever theirs
+    is, and each in its own precision.
     """
     sets = {"grid.points": points, "surface.0.short_wavelength": min(CELLS * 1e-3 / points, LONGEST)}
     run = begun(JOB, sets, WORLD)
@@ -201,44 +201,23 @@ def march(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
         if step.number > run.timeline().spans[0].last:
             break
     held = slab.sum(slab.tally["map bytes at most"])[0] / (8 * points**2)
-    passes, double, single = _passes_alone(slab.comm, points), pair(slab, "float64"), pair(slab, "float32")
+    double, single = pair(slab, "float64"), pair(slab, "float32")
     names = [transform_name((points, points), dtype) for dtype in ("float64", "float32")]
     calls = slab.tally["operator"]
-    ratios: dict[str, list[float]] = {name: [] for name in ("ours alone", "FFTW's passes alone", "ours, as precise")}
+    ratios: dict[str, list[float]] = {"all in double precision": [], "each in its own precision": []}
     for step in islice(steps, rounds):
         before = slab.tally.copy()
         seconds = _seconds(partial(run.advance, step))
         made = slab.tally.since(before)
-        ours, theirs, own = _seconds(double), _seconds(passes), _seconds(single)
-        in_double, in_single = (0.5 * made.get(name, 0) for name in names)
-        pairs = in_double + in_single
-        for name, took in zip(ratios, (pairs * ours, pairs * theirs, in_double * ours + in_single * own), strict=True):
-            ratios[name].append(seconds / took)
+        took, (in_double, in_single) = (_seconds(double), _seconds(single)), (0.5 * made.get(name, 0) for name in names)
+        both = (in_double + in_single) * took[0], in_double * took[0] + in_single * took[1]
+        for values, bare in zip(ratios.values(), both, strict=True):
+            values.append(seconds / bare)
     yield Line("operator calls per step", (slab.tally["operator"] - calls) / rounds)
     for name, values in ratios.items():
-        yield quartiles(f"a step over its transforms by {name}", values)
+        yield quartiles(f"a step over its transforms, {name}", values)
     yield Line("held at most, the steady start included", held, "maps")
     yield Line("the same without one for each branch", held - len(run.state.body.branches), "maps")
-
-
-def _passes_alone(comm: MPI.Intracomm, points: int) -> Callable[[], None]:
-    """FFTW's passes along x and y there and back, over this rank's rows and columns; collective."""
-    height, width = (len(range(*deal(n, comm.size)[comm.rank].indices(n))) for n in (points, points // 2 + 1))
-    heights = pyfftw.zeros_aligned((height, points), "float64", n=64)
-    waves = pyfftw.zeros_aligned((height, points // 2 + 1), "complex128", n=64)
-    spectrum = pyfftw.zeros_aligned((points, width), "complex128", n=64)
-    plans = [
-        pyfftw.FFTW(heights, waves, (1,), "FFTW_FORWARD", ("FFTW_MEASURE",)),
-        pyfftw.FFTW(spectrum, spectrum, (0,), "FFTW_FORWARD", ("FFTW_MEASURE",)),
-        pyfftw.FFTW(spectrum, spectrum, (0,), "FFTW_BACKWARD", ("FFTW_MEASURE",)),
-        pyfftw.FFTW(waves, heights, (1,), "FFTW_BACKWARD", ("FFTW_MEASURE", "FFTW_DESTROY_INPUT")),
-    ]
-
-    def call() -> None:
-        for plan in plans:
-            plan.execute()
-
-    return call
 
 
 def _seconds(call: Callable[[], object]) -> float:

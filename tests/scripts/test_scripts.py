@@ -41,7 +41,7 @@ SMALL = {
     "faults": Small(
         ["--kinds", "kill,damage", "--trials", "2", "--flips", "4", "--shorter", "4"], r"2 made: 0 with faults; "
     ),
-    "fuzz_jobs": Small(["--jobs", "40", "--processes", "1"], r"(?m)^40 made: 0 with faults; "),
+    "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^2\d pages in pages"),
