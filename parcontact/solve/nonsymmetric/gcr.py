@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...compiled import loop
 from ...parallel.slab import Array, Slab
+from .. import kernels
 from ..problem import Operator
 
 
@@ -63,7 +64,7 @@ class Directions:
             t, w = self._pair(step)
             self.preconditioner.apply(r, t)
             _, mean = self.slab.sum(*sum_on(working, t))
-            centre(working, mean / members, t)
+            kernels.turn(working, t, 0.0, mean / members, t)
             self.operator.apply(t, w)
             self._orthogonalize(working, members, norms, means)
             total, square, product = self.slab.sum(*_products(working, w, r))
@@ -133,14 +134,6 @@ def sum_on(working, z):
         count += row_count
         total += row_total
     return count, total
-
-
-@loop
-def centre(working, mean, t):
-    """`t <- t - mean` on the set, 0 elsewhere."""
-    for j in range(t.shape[0]):
-        for i in range(t.shape[1]):
-            t[j, i] = t[j, i] - mean if working[j, i] else 0.0
 
 
 @loop

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from ...compiled import loop
 from ...parallel.slab import Array, Slab
+from .. import kernels
 from ..constraint import Constraint
 from ..local_load import LEAST, LocalLoad
 from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
-from .gcr import centre, gaps_on, residual, sum_on
+from .gcr import gaps_on, residual, sum_on
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
@@ -61,7 +62,7 @@ class Projected:
         residual(working, u, h, level, t)
         self.extended.apply(self.preconditioner, working, t)
         _, mean = self.slab.sum(*sum_on(working, t))
-        centre(working, mean / members, t)
+        kernels.turn(working, t, 0.0, mean / members, t)
         self.operator.apply(t, self.w[0])
         sums = np.array(self.slab.sum(*_gram(working, u, h, level, *self.w)))
         a, b, c = self.slab.agree(_smallest(sums, members))
