@@ -15,7 +15,7 @@ from parcontact.solve.fallback import active_set
 from parcontact.solve.problem import Approach, MeanPressure
 from parcontact.solve.workspace import Workspace
 
-from .bodies import TIGHT, Bench, keep, rough, solver, white
+from ..bodies import TIGHT, Bench, keep, rough, solver, white
 
 
 def found_by_sets(body: Bench, h: Any, control: MeanPressure | Approach, start: float = 0.0) -> Contact:

@@ -17,7 +17,7 @@ from parcontact.solve.fallback.cold_start import start_on_coarse_grids
 from parcontact.solve.problem import Approach, MeanPressure, Operators
 from parcontact.solve.workspace import Workspace
 
-from .bodies import Bench, Map, rough, solver
+from ..bodies import Bench, Map, rough, solver
 
 LOAD = MeanPressure(0.4)
 
