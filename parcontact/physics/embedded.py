@@ -43,7 +43,6 @@ class Embedded:
 
     def __init__(self, slab: Slab, material: ZenerBody, dx: float) -> None:
         self.slab, self.material, self.dx = slab, material, dx
-        self._apart: tuple[float, Array, float, float] | None = None
 
     def look(
         self,
@@ -66,17 +65,14 @@ class Embedded:
         slope = math.sqrt(rise / seen) / (2.0 * self.dx)
         variance = square / seen - (height / seen) ** 2
         angle = math.sqrt(turned / seen / variance) if variance > LEAST_VARIANCE * square / seen else 0.0
-        order = self._difference(dt, trial.alpha)[2]
-        return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, order, angle)
+        return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, self._order(dt), angle)
 
     def look_without_load(self, dt: float, trial: Trial, memory: BodyMemory) -> IntegratorDifference:
         """Look at a step in which nothing presses, with the `memory` of the body after it: the difference over the
         displacement, both as rms; collective."""
         u = surface_of(memory)
         _, apart, size, *_ = self._add(dt, trial, memory, np.ones_like(u), u, self.stride(1.0))
-        return IntegratorDifference(
-            math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._difference(dt, trial.alpha)[2]
-        )
+        return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._order(dt))
 
     def stride(self, share: float) -> int:
         """From one sampled row to the next, where that share of the points is in contact."""
@@ -86,27 +82,19 @@ class Embedded:
         self, dt: float, trial: Trial, memory: BodyMemory, pressure: Array, displacement: Array, stride: int
     ) -> list[float]:
         """Return the sums of `loops.embedded` over all ranks."""
-        decay, gain, _ = self._difference(dt, trial.alpha)
-        maps = (memory.branches, decay, memory.increment, gain, pressure, displacement)
+        decay, gain = self._pair(dt)
+        decay, whole = decay[self.material.kept] / trial.alpha, float(gain[self.material.moving].sum()) / trial.alpha
+        maps = (memory.branches, decay, memory.increment, whole, pressure, displacement)
         return self.slab.sum(*loops.embedded(*maps, *trial.heights.parts, -self.slab.rows.start % stride, stride))
 
-    def _difference(self, dt: float, alpha: float) -> tuple[Array, float, float]:
-        """The weights of h_k and du in e, over alpha, and the order of the latter; those of the last dt are kept."""
-        if self._apart is None or self._apart[0] != dt:
-            material = self.material
-            decay, gain = self._pair(dt)
-            whole = float(gain[material.moving].sum())
-            self._apart = dt, decay[material.kept] / alpha, whole / alpha, self._order(dt, whole)
-        return self._apart[1:]
-
     def _pair(self, dt: float) -> tuple[Array, Array]:
-        """Decay and gain of one integrator minus those of the other."""
+        """Return decay and gain of one integrator minus those of the other: what h_k and du weigh in e."""
         pair = [coefficients(self.material.prony, name, dt) for name in ("exponential", "backward-euler")]
         decay, gain = (np.asarray(one - other) for one, other in zip(*pair, strict=True))
         return decay, gain
 
-    def _order(self, dt: float, gain: float) -> float:
-        """The order of `gain du` in dt, du being proportional to dt: 2 where all branches are slow, 1 where some are as
-        fast as the step is short, however short it is."""
-        shorter = float(self._pair(0.5 * dt)[1][self.material.moving].sum())
+    def _order(self, dt: float) -> float:
+        """Return the order in dt of what du weighs, du being proportional to dt: 2 where all branches are slow, 1 where
+        some are as fast as the step is short, however short it is."""
+        gain, shorter = (float(self._pair(step)[1][self.material.moving].sum()) for step in (dt, 0.5 * dt))
         return 1.0 + math.log2(gain / shorter) if dt > 0.0 and gain > 0.0 and shorter > 0.0 else 2.0

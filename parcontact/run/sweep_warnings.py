@@ -19,7 +19,7 @@ class SweepWarnings:
         self.kinds: Kinds = {}
 
     def begin(self, case: int) -> None:
-        """What follows is of this case."""
+        """Take what follows to be of this case."""
         self._case = case
 
     def shows(self, text: str) -> bool:
@@ -33,17 +33,14 @@ class SweepWarnings:
         return new and self._at_once
 
     def summary(self, of_groups: Sequence[Kinds]) -> list[str]:
-        """What is to be said at the end of what all groups of ranks have noted: what was not shown yet, or is not of
-        one case alone."""
+        """Return what is to be said at the end of what all groups of ranks have noted: what was not shown yet, or is
+        not of one case alone."""
         whole: Kinds = {}
         for kinds in of_groups:
             for kind, (text, cases) in kinds.items():
                 whole.setdefault(kind, (text, []))[1].extend(cases)
-        return [
-            f"{text} ({cases_text(sorted(cases))})"
-            for text, cases in whole.values()
-            if len(cases) > 1 or not self._at_once
-        ]
+        told = [(text, sorted(cases)) for text, cases in whole.values() if len(cases) > 1 or not self._at_once]
+        return [f"{text} ({name_cases(cases)})" for text, cases in told]
 
 
 def warn_once(cases: Sequence[Case]) -> list[str]:
@@ -56,22 +53,15 @@ def warn_once(cases: Sequence[Case]) -> list[str]:
         for text in dict.fromkeys(case.job.warnings):
             found.setdefault(text, []).append(case.number)
     for text, numbers in found.items():
-        warn(f"{text} ({'all cases' if len(numbers) == len(cases) else cases_text(numbers)})")
+        which = "all cases" if len(numbers) == len(cases) else name_cases(numbers)
+        print(f"warning: {text} ({which})", file=sys.stderr, flush=True)
     return list(found)
 
 
-def warn(text: str) -> None:
-    """To the user; root only."""
-    print(f"warning: {text}", file=sys.stderr, flush=True)
-
-
-def cases_text(numbers: Sequence[int]) -> str:
-    """Ascending numbers as `cases 0, 2-5`."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    listed = ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+def name_cases(numbers: Sequence[int]) -> str:
+    """Return ascending numbers as `cases 0, 2-5`."""
+    starts = [number for number in numbers if number - 1 not in numbers]
+    ends = [number for number in numbers if number + 1 not in numbers]
+    pairs = zip(starts, ends, strict=True)
+    listed = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in pairs)
     return f"case{'s' * (len(numbers) > 1)} {listed}"
