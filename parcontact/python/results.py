@@ -56,7 +56,7 @@ def _add_maps(path: Path, found: dict[str, Any], coordinates: dict[str, Any]) ->
 
     try:
         with h5py.File(path, "r") as file:
-            layout = fields.Layout(file)
+            layout = fields.SavedFields(file)
             saved = np.flatnonzero(~np.isnan(layout.times))
             coordinates["t"] = ("t", layout.times[saved], {"units": "s"})
             coordinates |= {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}

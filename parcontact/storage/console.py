@@ -59,7 +59,7 @@ class Console:
     def __init__(self, log: Path | None = None, quiet: bool = True, total: int = 0, speaks: bool = True) -> None:
         self._log = LogFile(log) if log is not None else None
         self._quiet, self._total, self._speaks = quiet, total, speaks
-        self._first, self._began, self._told = 0, 0.0, 0.0
+        self._first, self._began, self._last_time_left = 0, 0.0, 0.0
         self._bar: tqdm[None] | None = None
 
     def say(self, text: str) -> None:
@@ -88,7 +88,7 @@ class Console:
         if not self._began:
             print(HEAD)
             self._first, self._began = row.step, time.monotonic()
-            self._told = self._began
+            self._last_time_left = self._began
             if sys.stderr.isatty() and self._total > 1:
                 self._bar = tqdm(
                     total=self._total, initial=row.step, unit="step", leave=False, mininterval=EVERY_SECONDS
@@ -102,8 +102,8 @@ class Console:
     def _say_time_left(self, step: int) -> None:
         """Say now and then how long it takes if steps go on to take as long as they did."""
         now = time.monotonic()
-        if now - self._told >= LEFT_SECONDS and self._first < step < self._total:
-            self._told = now
+        if now - self._last_time_left >= LEFT_SECONDS and self._first < step < self._total:
+            self._last_time_left = now
             left = (now - self._began) / (step - self._first) * (self._total - step)
             clock = f"{int(left // 3600)}:{int(left // 60) % 60:02d}:{int(left) % 60:02d}"
             self._write(f"# step {step} of {self._total}, about {clock} left")

@@ -193,7 +193,7 @@ class Directory:
             self.claims = marker.read(self.path)
         except ValueError as error:
             raise InputError(
-                f"{error}, so that it cannot be told whose {self.path} is; --out chooses another directory"
+                f"{error}, so that the owner of {self.path} is unknown; --out chooses another directory"
             ) from error
 
     def _take_lock(self) -> None:
@@ -210,8 +210,8 @@ class Directory:
                     holder = os.pread(handle, 200, 0).decode(errors="replace").strip() or "just started"
                     os.close(handle)
                     if time.monotonic() > deadline:
-                        said = f"the output directory {self.path} is in use by another run ({holder})"
-                        raise InUseError(said) from None
+                        message = f"the output directory {self.path} is in use by another run ({holder})"
+                        raise InUseError(message) from None
                     time.sleep(0.05)
                     continue
             if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):

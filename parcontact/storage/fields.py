@@ -70,7 +70,7 @@ class FieldsFile:
             self._replace(found, kept)
         return problem
 
-    def lacks(self, step: int) -> bool:
+    def is_due(self, step: int) -> bool:
         """Return whether the maps of the step after which a run goes on are due, and were not saved then."""
         return step in self.steps and step not in self._kept
 
@@ -106,7 +106,7 @@ class FieldsFile:
         step.dims[0].attach_scale(file["t"])
         layout.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, "t")
 
-    def _replace(self, found: "Layout | None", kept: Sequence[int] = ()) -> None:
+    def _replace(self, found: "SavedFields | None", kept: Sequence[int] = ()) -> None:
         """Lay a new file out, and copy the maps of the steps that are `kept`; one that was not saved then is NaN."""
         new = self.slab.agree(files.unused(self.path))
         size = len(self.steps) * len(self.names) * self.slab.nx * self.slab.ny * layout.DOUBLE
@@ -116,7 +116,7 @@ class FieldsFile:
         hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
         self._draw()
 
-    def _copy(self, found: "Layout", kept: Sequence[int], new: Path) -> None:
+    def _copy(self, found: "SavedFields", kept: Sequence[int], new: Path) -> None:
         rows = np.empty(self.slab.shape)
         for step in kept:
             for name in self.names:
@@ -160,15 +160,15 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
         return ""
     found, problem = _found(path, slab)
 
-    def forget() -> None:
+    def take_back() -> None:
         if found is not None:
             layout.put(path, {"t": np.where(np.array(found.steps) > step, np.nan, found.times)})
 
-    hdf5.on_root(slab, forget, f"cannot write {path}")
+    hdf5.on_root(slab, take_back, f"cannot write {path}")
     return problem
 
 
-class Layout:
+class SavedFields:
     """The maps and instants of a file of fields."""
 
     def __init__(self, file: h5py.File) -> None:
@@ -185,18 +185,18 @@ class Layout:
         return [number for number, time in pairs if number <= step and not np.isnan(time)]
 
 
-def _found(path: Path, slab: Slab) -> tuple[Layout | None, str]:
+def _found(path: Path, slab: Slab) -> tuple[SavedFields | None, str]:
     """Return what a file of fields holds, and what is lost; collective. Raises InputError for one that is locked.
 
     A file that cannot be read is put aside.
     """
 
-    def look() -> tuple[Layout | None, str]:
+    def look() -> tuple[SavedFields | None, str]:
         if not path.exists():
             return None, f"{path} is missing: the fields saved so far are lost"
         try:
             with h5py.File(path, "r") as file:
-                return Layout(file), ""
+                return SavedFields(file), ""
         except BlockingIOError:
             raise InputError(f"{path} is locked by another program; let it close the file, and run again") from None
         except hdf5.FAILURES as error:
@@ -217,7 +217,7 @@ def xdmf(
     """
     (ny, nx), (lx, ly) = shape, size
     saved = np.flatnonzero(~np.isnan(times))
-    told = times if len(set(times[saved].tolist())) == saved.size else steps.astype(np.float64)
+    shown = times if len(set(times[saved].tolist())) == saved.size else steps.astype(np.float64)
     real = 'NumberType="Float" Precision="8"'
     grids = []
     for index in saved:
@@ -230,7 +230,7 @@ def xdmf(
         )
         spacing = f"{lx / nx!r} {ly / ny!r} {lx / nx!r}"  # the same in the order of x, y, z and of z, y, x
         grids.append(
-            f'<Grid><Time Value="{float(told[index])!r}"/><Topology TopologyType="3DCoRectMesh" '
+            f'<Grid><Time Value="{float(shown[index])!r}"/><Topology TopologyType="3DCoRectMesh" '
             f'Dimensions="1 {ny} {nx}"/><Geometry GeometryType="ORIGIN_DXDYDZ">'
             f'<DataItem Dimensions="3" {real} Format="XML">0 0 0</DataItem>'
             f'<DataItem Dimensions="3" {real} Format="XML">{spacing}</DataItem></Geometry>{attributes}</Grid>'

@@ -52,8 +52,8 @@ def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
         if path.is_file() and not path.is_symlink() and is_ours(path):
             return
     if aside := put_aside(path):
-        said = f"warning: {path} was there and not written by this program: it is kept as {aside.name}"
-        print(said, file=sys.stderr, flush=True)
+        message = f"warning: {path} was there and not written by this program: it is kept as {aside.name}"
+        print(message, file=sys.stderr, flush=True)
 
 
 def put_aside(path: Path) -> Path | None:

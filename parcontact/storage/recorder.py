@@ -129,7 +129,7 @@ class Recorder:
 
     def catch_up(self, row: Row, field: Callable[[str], Array]) -> None:
         """Save the maps of the step after which a run goes on, if they are due and could not be saved then."""
-        if self._fields and self._fields.lacks(row.step):
+        if self._fields and self._fields.is_due(row.step):
             self._save_fields(row, field)
 
     def _save_fields(self, row: Row, field: Callable[[str], Array]) -> None:

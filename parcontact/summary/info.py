@@ -74,7 +74,7 @@ def _checkpoint(path: Path) -> tuple[str, bool]:
 
 
 def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
-    layout = fields.Layout(file)
+    layout = fields.SavedFields(file)
     saved = [index for index, time in enumerate(layout.times) if not np.isnan(time)]
     lines = [f"{path}: {', '.join(layout.names)} on {len(file['x'])} x {len(file['y'])} points"]
     lines += [*_runs(read_chain(file)), *_budget(read_budget(file))]
@@ -165,13 +165,13 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     table = directory / theory_settings.TABLE
     if table.exists():
-        told = f"  Persson's theory: {len(measures.read(table)['time'])} rows, "
+        count = f"  Persson's theory: {len(measures.read(table)['time'])} rows, "
         try:
             settings = theory_settings.read(directory)
         except InputError:
-            yield told + "of unknown settings"
+            yield count + "of unknown settings"
             raise
-        yield told + (f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings")
+        yield count + (f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings")
 
 
 def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
@@ -184,10 +184,10 @@ def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
         )
         errors = {name: slide.largest(columns[name]) for name in slide.ERRORS if name in columns}
         if errors:
-            told = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
+            parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
             asked = f"; asked for: {100 * numerics['accuracy']:.3g} %" if "accuracy" in numerics else ""
-            yield f"  largest estimated errors of the curve: {told}{asked}"
+            yield f"  largest estimated errors of the curve: {parts}{asked}"
         yield from (f"  warning: {text}" for text in warnings_of(directory / curve_points.LOG))
 
 
@@ -201,7 +201,7 @@ def _saved_maps(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     path = directory / "fields.h5"
     if path.exists():
         with h5py.File(path, "r") as file:
-            layout = fields.Layout(file)
+            layout = fields.SavedFields(file)
         saved = np.isfinite(layout.times).sum()
         yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
 
@@ -210,8 +210,8 @@ def _sweep(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     path = directory / sweep_table.TABLE
     if path.exists():
         states = Counter(str(row["state"]) for row in sweep_table.read(path))
-        told = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
-        yield f"  sweep of {states.total()} cases: {told}"
+        counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
+        yield f"  sweep of {states.total()} cases: {counts}"
 
 
 def _study(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -45,8 +45,8 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
 
     None where nothing slides, or has not slid yet.
     """
-    during = _during(history, np.asarray(columns["time"], float))
-    distance, friction, area = (np.asarray(columns[name], float)[during] for name in _COLUMNS)
+    rows = _during(history, np.asarray(columns["time"], float))
+    distance, friction, area = (np.asarray(columns[name])[rows] for name in ("distance", "friction", "contact_area"))
     if distance.size < 2 or distance[-1] == distance[0]:
         return None
     start = distance[0]
@@ -100,12 +100,12 @@ def describe(
     one before it, and say so.
     """
     last, begun = _slide(history), _begun(history, columns["time"])
-    waits = begun <= last.start
-    so_far = history[:begun] if waits else history
+    not_begun = begun <= last.start
+    so_far = history[:begun] if not_begun else history
     found = measure(so_far, columns)
     if found is None:
         return
-    if waits:
+    if not_begun:
         ends_with = _slide(so_far).stop - 1
         yield f"the last slide has not begun; what follows is of the one before it, which ends with history.{ends_with}"
     rows = _during(so_far, np.asarray(columns["time"], float))
@@ -120,8 +120,8 @@ def describe(
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
-        told = ", ".join(f"{what[name]} {per_cent(value)}" for name, value in known.items())
-        yield f"largest errors of the steps of the slide: {told}"
+        parts = ", ".join(f"{what[name]} {per_cent(value)}" for name, value in known.items())
+        yield f"largest errors of the steps of the slide: {parts}"
     if known.get(ERRORS[0], 0.0) >= 1.0:
         yield "friction of some of its steps cannot be told from no friction"
     if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
@@ -146,9 +146,6 @@ def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error:
             f"friction left the {start:.6g} of the steady start by {abs(mu_dyn - start):.2g}, more than the errors of "
             f"both, {allowed:.2g}: where nothing changes it is to stay; try smaller steps and a smaller tolerance"
         )
-
-
-_COLUMNS = ("distance", "friction", "contact_area")
 
 
 def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:

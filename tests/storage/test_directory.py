@@ -71,7 +71,7 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
     with pytest.raises(InputError, match=r"holds a run of another job: grid.points was \[8, 8\], is \[9, 9\]"):
         make(directory_at(out, "study"), job, {**PLAIN, "grid": {"points": [9, 9]}})
     (out / marker.MARKER).write_text("{")
-    with pytest.raises(InputError, match="is damaged, so that it cannot be told whose"):
+    with pytest.raises(InputError, match="is damaged, so that the owner of"):
         make(directory_at(out), job)
 
 

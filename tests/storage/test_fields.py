@@ -109,7 +109,7 @@ def test_lost_or_damaged(comm: MPI.Intracomm, shared_path: Path) -> None:
     path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
     file = FieldsFile(path, slab, SIZE, ("pressure",), [2, 4, 6])
     assert "is missing" in file.resume(4, SECOND)
-    assert file.lacks(4)
+    assert file.is_due(4)
     check(path, slab, [4, 6], 0, {"pressure": []})
     for kept in ("fields.h5.aside", "fields.h5.aside-2"):
         if slab.root:
