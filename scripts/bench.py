@@ -13,12 +13,11 @@
     traffic  what passes through memory in a cold iteration and in a sliding step, loop by loop, counted on one rank
     scale    a transform, a cold solve and a sliding step on two ranks, over one, by part; and what memory lets at most
     memory   bytes of a run as they are planned and held, and in maps
-    checkpoint  what it costs on two ranks, over plain writing of the same bytes; --where names the disk
     sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
     large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
 
 Operator calls are those on the finest grid, coarser ones counted by their share of its points. Times of one process are
-CPU times, those of `march`, `scale`, `checkpoint` and `start` wall times. What is compared takes turns, round by round;
+CPU times, those of `march`, `scale` and `start` wall times. What is compared takes turns, round by round;
 shown are the median, and of the ratios of each round the median and the quartiles. The pressure error is the relative
 L2 distance from a solution to 1e-11, for every program alike, that of friction from steps to a tolerance of 5e-5,
 beside peers 1e-7. `--peers DIRECTORY` installs tamaas and aspher there, each in an environment of its own, and gives
@@ -37,7 +36,7 @@ from pathlib import Path
 
 import runs
 from bench.effects import effects
-from bench.files import save, start
+from bench.program import start
 from bench.scaling import WORLD, march, scale, traffic
 from bench.slides import folded, held, slide, steady
 from bench.solves import fft, large, sizes, solve
@@ -47,7 +46,7 @@ FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 PARTS = {"fft": fft, "solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
 PARTS |= {"folded": folded, "traffic": traffic, "memory": held, "sizes": sizes, "large": large}
-ON_TWO_RANKS = {"march": march, "scale": scale, "checkpoint": save}
+ON_TWO_RANKS = {"march": march, "scale": scale}
 
 
 def measure(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, Line]]:
@@ -62,7 +61,7 @@ def measure(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, 
 def on_two_ranks(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, Line]]:
     """Lines of parts that this script, started on two ranks, measures there. Raises RuntimeError if it cannot."""
     words = [Path(sys.executable).with_name("mpirun"), "-n", 2, sys.executable, __file__, *parts, "--inside"]
-    words += ["--points", asked.points, "--rounds", asked.rounds, *(["--where", asked.where] if asked.where else [])]
+    words += ["--points", asked.points, "--rounds", asked.rounds]
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=runs.environment())
     if done.returncode:
         raise RuntimeError(f"{', '.join(parts)} on two ranks: {done.stderr.strip()}")
@@ -82,7 +81,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="write the lines into this file, too")
     parser.add_argument("--peers", type=Path, help="compare with tamaas and aspher, installed into this directory")
     parser.add_argument("--picture", type=Path, help="draw the effects, like jobs/pictures/ablation.png")
-    parser.add_argument("--where", type=Path, help="a directory on the disk in question")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if unknown := set(asked.parts) - set(names):
@@ -104,7 +102,7 @@ def main() -> int:
         print(f"WARNING: others keep {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores busy: trust counts, not times")
     lines = list[tuple[str, Line]]()
     for part, line in measure(asked.parts, asked):
-        print(f"{part:<11}{line}", flush=True)
+        print(f"{part:<8}{line}", flush=True)
         lines.append((part, line))
     if asked.json is not None:
         asked.json.write_text(as_json(lines) + "\n")
