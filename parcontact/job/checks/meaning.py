@@ -66,7 +66,7 @@ def says_all(surface: tuple[Any, ...]) -> bool:
 
 
 def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
-    """Of shapes whose rms slope follows from the job; those of files are known once they are read."""
+    """Judge shapes whose rms slope follows from the job; those of files are known once they are read."""
     if not says_all(surface):
         return
     square = 0.0
@@ -172,7 +172,7 @@ def _band(
 
 
 def _room(grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...]) -> Iterator[str]:
-    """A single sphere: the least radius its contact can have, where it goes, and whether that is inside the box."""
+    """Judge a single sphere: the least radius its contact can have, where it goes, and whether the box holds that."""
     if len(surface) != 1 or not isinstance(surface[0], Sphere) or min(grid.points) == 1:
         return
     sphere = surface[0]

@@ -155,7 +155,7 @@ CHOSEN = chosen("shape", KINDS)
 
 
 def _shape(data: Any, info: ValidationInfo) -> Any:
-    """Return a rough surface is measured, or follows from a few numbers: its keys tell which."""
+    """Return a shape; a rough one with a `spectrum` is measured, the others follow from a few numbers."""
     if isinstance(data, dict) and data.get("shape") == "rough" and data.get("spectrum") is not None:
         return RoughSpectrum.model_validate(data, context=info.context)
     return data if isinstance(data, RoughSpectrum) else CHOSEN(data, info)

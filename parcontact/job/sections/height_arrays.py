@@ -41,7 +41,7 @@ class Heights:
 
     @property
     def name(self) -> str:
-        """Of the file in which they are stored: other heights have another one."""
+        """The name of the file in which they are stored: other heights have another one."""
         return f"surface-{self.checksum}.npy"
 
     def __eq__(self, other: object) -> bool:
@@ -58,7 +58,7 @@ class Heights:
 
 
 class _Checksum:
-    """Of a file that is not written."""
+    """The CRC-32 of a file that is not written."""
 
     value = 0
 
@@ -86,13 +86,15 @@ class HeightArray(Part):
     )
 
     def stored(self) -> dict[str, Any]:
-        """As the file of heights that stands for it, as plain data."""
+        """Return the file of heights that stands for it, as plain data."""
         return {"shape": "file", "path": self.heights.name, "scale": 1.0, "dataset": "heights"}
 
 
 def with_shapes(surface: Any) -> Any:
-    """The `surface` of a job as a list of shapes; an array, alone or in a list, is one. Rows of numbers are meant as
-    one, and are refused as a whole."""
+    """Return the `surface` of a job as a list of shapes; an array, alone or in a list, is one.
+
+    Rows of numbers are meant as an array, and are refused as a whole.
+    """
     shapes = surface if isinstance(surface, list) else [surface]
     if len(shapes) > 1 and all(isinstance(shape, list | int | float) for shape in shapes):
         return [{"shape": "array", "heights": surface}]

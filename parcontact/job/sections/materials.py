@@ -64,7 +64,7 @@ class PronyBranch(Part):
 
 
 def _branch(data: Any, info: ValidationInfo) -> ZenerBranch | PronyBranch:
-    """Return the form of a branch follows from its keys."""
+    """Return a branch of the form that its keys have."""
     if isinstance(data, ZenerBranch | PronyBranch):
         return data
     forms = f"{', '.join(ZenerBranch.words())} or {', '.join(PronyBranch.words())}"
@@ -192,7 +192,7 @@ class Dma(Part):
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What to say of the fit."""
+        """Sentences about the fit."""
         return self._doubts
 
     @property

@@ -47,8 +47,6 @@ class Origin(NamedTuple):
 def existing_file(path: Path, info: ValidationInfo) -> Path:
     """Return the absolute path of a file that a job names; relative ones start at the job file."""
     found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
-    if found.exists() and not (found.is_file() or found.is_dir()):
-        refuse(Fault(f"must be a regular file, got {str(path)!r}, which is a pipe, a device or a socket"))
     if not found.is_file():
         refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
     return found

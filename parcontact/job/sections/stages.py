@@ -86,7 +86,7 @@ def _stepping(
     time_step: float | GeometricStep | Auto | None,
     cells_per_step: float | None,
 ) -> Iterator[Fault]:
-    """Yield a stage that does not last must have no steps."""
+    """Check that steps have time to be made in, and ways a velocity."""
     lasts = duration is not None or distance is not None
     if not lasts and (time_step or cells_per_step):
         key = "time_step" if time_step else "cells_per_step"

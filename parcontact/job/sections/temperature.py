@@ -81,7 +81,7 @@ Shift = Annotated[AnyShift, PlainValidator(chosen("law", LAWS), json_schema_inpu
 
 
 def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault]:
-    """Yield the rule of every material with a temperature: it needs a shift that reaches it."""
+    """Check that a material with a temperature has a shift that reaches it."""
     if temperature is None:
         return
     if shift is None:

@@ -14,11 +14,10 @@ from ..text.fault import Fault, quote, refuse, shorten
 FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
 SMALLEST, LARGEST = 1e-40, 1e40  # accuracy: of numbers, so that double precision holds what follows from them
-MOST_SEED = 2**128 - 1
 LONGEST_NUMBER = 400  # characters of a number that is given as a text
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
 
-MOST_OF_A_RANGE = 100_000
+MOST_OF_A_RANGE = 100_000  # tuning
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -36,17 +35,17 @@ def _whole(value: Any, info: ValidationInfo) -> Any:
 
 
 def both(value: Any) -> Any:
-    """One value for both directions."""
+    """Return a pair; one value stands for both directions."""
     return value if isinstance(value, list | tuple) else (value, value)
 
 
 def along_x(value: Any) -> Any:
-    """Return a number is the x component of a vector."""
+    """Return a vector; a number is its x component."""
     return value if isinstance(value, list | tuple) else (value, 0.0)
 
 
 def listed(value: Any) -> Any:
-    """Return a single value is a list of one."""
+    """Return a list; a single value is a list of one."""
     return value if isinstance(value, list | tuple) else (value,)
 
 
@@ -56,14 +55,8 @@ def _countable(value: int) -> int:
     return value
 
 
-def _seed(value: int) -> int:
-    if value > MOST_SEED:
-        refuse(Fault(f"must be at most 2^128 - 1, got {quote(value)}"))
-    return value
-
-
 def from_home(path: Path) -> Path:
-    """A path whose leading ~ or ~user is replaced; one that names nobody, or is too long for any file, is a fault."""
+    """Replace a leading ~ or ~user of a path; refuse what names nobody, or is too long for any file."""
     if len(str(path)) > LONGEST_NAME or any(len(part.encode()) > 255 for part in path.parts):
         refuse(Fault(f"must be the name of a file, got {len(str(path))} characters, {shorten(str(path), 40)!r}"))
     try:
@@ -77,13 +70,11 @@ def log_range(text: str) -> tuple[float, ...]:
 
     Raises ValueError with the rest of the sentence "... must be" for other text.
     """
-    parts = text.split(":")
     try:
-        a, b, n = float(parts[0]), float(parts[1]), int(parts[2])
-    except (ValueError, IndexError):
-        parts = []
-    if len(parts) != 3:
-        raise ValueError("numbers or a range first:last:count like 1e-3:1e2:31")
+        first, last, count = text.split(":")
+        a, b, n = float(first), float(last), int(count)
+    except ValueError:
+        raise ValueError("numbers or a range first:last:count like 1e-3:1e2:31") from None
     if not (0 < a < math.inf and 0 < b < math.inf):
         raise ValueError("a range first:last:count with first and last positive")
     if not 1 <= n <= MOST_OF_A_RANGE:
@@ -109,10 +100,7 @@ Fraction = Annotated[float, Field(strict=True, gt=0, lt=1), NUMBER]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(_countable)]
 Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(_countable)]
 Seed = Annotated[
-    int,
-    Field(strict=True, ge=0, description="a whole number of zero or more"),
-    BeforeValidator(_whole),
-    AfterValidator(_seed),
+    int, Field(strict=True, ge=0, lt=2**128, description="a whole number of zero or more"), BeforeValidator(_whole)
 ]
 Flag = Annotated[bool, Field(strict=True, description="true or false")]
 Vector = Annotated[tuple[Real, Real], BeforeValidator(along_x)]

@@ -114,7 +114,7 @@ def _overlap(one: str, other: str) -> bool:
 
 
 def refuse_overrides(sweep: Sweep, overrides: list[tuple[str, Place]], source: Source) -> None:
-    """Return a mistake for each override of a key that is swept."""
+    """Note a mistake for each override of a key that is swept."""
     names = {setting.name for axis in sweep.axes for setting in axis[0]}
     for name, place in overrides:
         if found := next((swept for swept in names if _overlap(swept, name)), ""):

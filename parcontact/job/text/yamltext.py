@@ -7,7 +7,6 @@ its values once all aliases are followed, and the depth of its nesting.
 
 from __future__ import annotations
 
-import os
 import re
 import stat
 from collections.abc import Iterator
@@ -61,10 +60,6 @@ JobDumper.add_representer(PlacedDict, yaml.SafeDumper.represent_dict)
 JobDumper.add_representer(PlacedList, yaml.SafeDumper.represent_list)
 
 
-class TooMuchError(Exception):
-    """More than a job may hold, as the rest of a sentence."""
-
-
 def dump(data: Any) -> str:
     """Return plain data as YAML text that `parse` reads back as equal data."""
     return yaml.dump(data, Dumper=JobDumper, default_flow_style=None, sort_keys=False, allow_unicode=True, width=120)
@@ -78,28 +73,20 @@ def read(path: Path, shown: str) -> Source:
 def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
     """Return the bytes of a YAML file too."""
     try:
-        content = _content(path)
-        return content, parse(content, shown)
+        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe might never end
+            raise OSError(0, "it is no regular file")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+        if len(content) <= MAX_BYTES:
+            return content, parse(content, shown)
+        reason = f"it is larger than {MAX_BYTES / 1e6:g} MB, which no job is"
     except FileNotFoundError:
         reason = "there is no such file"
-    except OSError as error:
-        reason = error.strerror or str(error)
-    except ValueError as error:  # a null character in its name
-        reason = str(error)
+    except (OSError, ValueError) as error:  # ValueError: a null character in its name
+        reason = getattr(error, "strerror", None) or str(error)
     found = Source(UNREADABLE, Place(shorten(shown)))
     found.note(found.place, f"cannot be read: {reason}")
     return b"", found
-
-
-def _content(path: Path) -> bytes:
-    """Return the bytes of a regular file of bounded size; a pipe or a device, which might never end, is not opened."""
-    if stat.S_ISREG(path.stat().st_mode) or path.is_dir():
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
-            content = file.read(MAX_BYTES + 1)
-        if len(content) <= MAX_BYTES:
-            return content
-        raise OSError(0, f"it is larger than {MAX_BYTES / 1e6:g} MB, which no job is")
-    raise OSError(0, "it is no regular file")
 
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
@@ -115,9 +102,10 @@ def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
         source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}")
     except yaml.reader.ReaderError as error:
         source.note(start, f"is not a text file in UTF-8: {error.reason} at position {error.position}")
-    except (RecursionError, TooMuchError) as error:
-        deep = "cannot be read as YAML: it is nested too deeply"
-        source.note(start, str(error) if isinstance(error, TooMuchError) else deep)
+    except yaml.YAMLError as error:
+        source.note(start, str(error))
+    except RecursionError:
+        source.note(start, "cannot be read as YAML: it is nested too deeply")
     return source
 
 
@@ -155,9 +143,9 @@ class _Reader:
     def value(self, node: yaml.Node, path: Key) -> Any:
         self.count += 1
         if self.count > MAX_VALUES:
-            raise TooMuchError(f"has more than {MAX_VALUES} values once its aliases are followed, which no job has")
+            raise yaml.YAMLError(f"has more than {MAX_VALUES} values once its aliases are followed, which no job has")
         if len(path) > MAX_DEPTH:
-            raise TooMuchError(f"cannot be read as YAML: it is nested too deeply, by more than {MAX_DEPTH} levels")
+            raise yaml.YAMLError(f"cannot be read as YAML: it is nested too deeply, by more than {MAX_DEPTH} levels")
         if id(node) in self.open:
             return self.refuse(node, "this alias holds itself")
         self.open.append(id(node))
@@ -184,7 +172,7 @@ class _Reader:
         return self.refuse(node, f"{shorten(node.tag.replace(YAML_TAG, '!!'))} does not belong in a job")
 
     def mapping(self, node: yaml.MappingNode, path: Key) -> PlacedDict:
-        """Return what `<<` merges comes last, and only where the mapping has no such key."""
+        """Return a mapping; what `<<` merges comes last, and only where the mapping has no such key."""
         found = PlacedDict()
         merged: list[yaml.Node] = []
         for key, child in node.value:
