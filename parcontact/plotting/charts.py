@@ -150,11 +150,6 @@ def _name_peak(axes: Axes, one: Series, unit: str) -> None:
         axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=told, scalex=False, scaley=False)
 
 
-def _share(axes: Axes, x: float) -> float:
-    """Return where a number is on the x axis, from 0 at the left to 1 at the right."""
-    return float((axes.transScale + axes.transLimits).transform((x, 1.0))[0])
-
-
 def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -> None:
     """Show where stages begin, and their names above: on several levels where they would touch, else turned."""
     for _, start, _ in stages[1:]:
@@ -162,7 +157,8 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
     if not named or len(stages) < 2:
         return
     width = AXES_SHARE * 72.0 * axes.figure.bbox.width / axes.figure.dpi / _panels_beside(axes)
-    ends = np.clip([[_share(axes, start), _share(axes, end)] for _, start, end in stages], 0.0, 1.0)
+    places = (axes.transScale + axes.transLimits).transform([(x, 1.0) for _, *ends in stages for x in ends])[:, 0]
+    ends = np.clip(places, 0.0, 1.0).reshape(-1, 2)  # from 0 at the left to 1 at the right
     names = [style.plain(name, MAX_NAME) for name, _, _ in stages]
     middles = width * ends.mean(axis=1)
     levels = _levels(middles, [TextPath((0, 0), name, size=NAMES).get_extents().width + NAMES / 2 for name in names])

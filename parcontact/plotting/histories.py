@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..parallel.slab import Array
 from ..storage import measures
+from ..storage.row import UNITS
 from . import style, units
 from .charts import Axis, Chart, Series
 from .run import Run
@@ -20,11 +21,11 @@ VISCOUS = "friction_viscous"  # friction without that of the interface; in the t
 
 @dataclass(frozen=True)
 class Abscissa:
-    """What histories are drawn over: values in SI of which rows, stages over them, and whether each row has a mark."""
+    """What histories are drawn over: values in SI of some rows or all, stages, and whether each row has a mark."""
 
     axis: Axis
     values: Array
-    rows: NDArray[np.intp]
+    rows: NDArray[np.intp] | None = None
     stages: Sequence[tuple[str, float, float]] = ()
     marked: bool = False
 
@@ -32,8 +33,9 @@ class Abscissa:
         """Return lines by their names; the only one has none."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
+        rows = slice(None) if self.rows is None else self.rows
         drawn = zip(lines.items(), looks, strict=True)
-        return [Series(name, self.values, values[self.rows], look) for (name, values), look in drawn]
+        return [Series(name, self.values, values[rows], look) for (name, values), look in drawn]
 
 
 def charts(run: Run, over: str = "") -> list[Chart]:
@@ -78,13 +80,18 @@ def _charts(run: Run, along: Abscissa) -> Iterator[Chart]:
     panels: tuple[tuple[str, Axis, dict[str, Array], bool], ...] = (
         ("friction", Axis(friction), {"": columns["friction_x" if signed else "friction"]}, run.slides),
         ("area", area_axis, {"": area}, True),
-        ("approach", Axis("approach", "m"), {"": np.where(load > 0.0, columns["approach"], np.nan)}, free),
-        ("gap", Axis("mean gap", "m"), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
-        ("pressure", Axis("highest pressure", "Pa"), {"": columns["max_pressure"]}, True),
+        (
+            "approach",
+            Axis("approach", UNITS["approach"]),
+            {"": np.where(load > 0.0, columns["approach"], np.nan)},
+            free,
+        ),
+        ("gap", Axis("mean gap", UNITS["mean_gap"]), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
+        ("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": columns["max_pressure"]}, True),
         ("load", load_axis, {"": load}, run.lasts and np.ptp(load) > 1e-9 * load.max()),
         (
             "energy",
-            Axis("energy", "J"),
+            Axis("energy", UNITS["work"]),
             {"work done": columns["work"], "dissipated": columns["dissipated"], "stored": columns["stored"]},
             run.lasts and bool(np.isfinite(columns["work"]).all()),
         ),
@@ -113,19 +120,18 @@ def _abscissa(run: Run, over: str) -> Abscissa:
     if not over:
         slides = run.slides and all(stage.speed > 0.0 for stage in run.job.history if stage.seconds)
         over = ("distance" if slides else "time") if run.lasts else "load"
-    everywhere = np.arange(run.columns["step"].size)
     if over == "load":
-        return Abscissa(*run.load, everywhere, marked=True)
+        return Abscissa(*run.load, marked=True)
     if over == "velocity":
         return _over_velocity(run)
-    axis, values = Axis("distance slid", "m") if over == "distance" else Axis("time", "s"), run.columns[over]
+    axis, values = Axis("distance slid" if over == "distance" else over, UNITS[over]), run.columns[over]
     if not np.ptp(values):
         told = f"{over}, which stays {values[-1]:g} {axis.unit}"
         raise InputError(f"{run.directory}: there is nothing to draw over {told}")
     stages = []
     for number, rows in run.rows_of_stages.items():
         stages.append((run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]])))
-    return Abscissa(axis, values, everywhere, stages)
+    return Abscissa(axis, values, stages=stages)
 
 
 def _over_velocity(run: Run) -> Abscissa:

@@ -16,7 +16,7 @@ from .run import box, contact_of, load_of, table
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
-SAME = 1e-6  # relative: values that are the same but for rounding
+DIGITS = 6  # in which values agree that are the same but for rounding
 
 
 def charts(directory: Path, over: str = "") -> list[Chart]:
@@ -34,9 +34,9 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
     }
     _add_derived(columns, area)
     x, by = "velocity", "load"
-    if over == "load" or (not over and len(distinct(columns[x])) < 2 <= len(distinct(columns[by]))):
+    if over == "load" or (not over and _number(columns[x]) < 2 <= _number(columns[by])):
         x, by = by, x
-    warm = "temperature" in columns and len(distinct(columns["temperature"])) > 1
+    warm = "temperature" in columns and _number(columns["temperature"]) > 1
     by = "temperature" if warm else by
     panels = [("steady friction", x, "friction", "steady, at"), ("steady area", x, "area", "")]
     if warm and x == "velocity":
@@ -47,7 +47,8 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
         _add_derived(theory, area)
     found = []
     for key, along, name, title in panels:
-        series = [*_lines(columns, along, name, by, axes[by].unit), *_theory(theory, along, name, by)]
+        series = list(_lines(columns, along, name, by, axes[by].unit))
+        series += _theory(theory, along, name, by) if theory else ()
         found.append(Chart(key, axes[along], axes[name], series, log_x=True, legend_title=title))
     return found
 
@@ -56,8 +57,8 @@ def title(directory: Path) -> str:
     """Return the title of the job, with the pressure or force if there is one for all points."""
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
     axis, loads = load_of(table(directory / TABLE, ("pressure",))["pressure"], box(directory))
-    name, same = (job.title if job else "") or "steady sliding", distinct(loads)
-    return f"{name}: {units.text(same[0], axis.unit)}" if len(same) == 1 else name
+    name = (job.title if job else "") or "steady sliding"
+    return f"{name}: {units.text(loads[0], axis.unit)}" if _number(loads) == 1 else name
 
 
 def _add_derived(columns: dict[str, Array], area: float) -> None:
@@ -71,8 +72,9 @@ def _add_derived(columns: dict[str, Array], area: float) -> None:
 def _lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Iterator[Series]:
     """Yield a line for each value of the column `by`."""
     error = columns.get(f"error_{y}")
-    for number, value in enumerate(distinct(columns[by])):
-        rows = np.flatnonzero(np.abs(columns[by] - value) <= SAME * abs(value))
+    groups = _rounded(columns[by])
+    for number, value in enumerate(np.unique(groups)):
+        rows = np.flatnonzero(groups == value)
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
         shown = units.text(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
         yield Series(*shown, None if error is None else error[rows])
@@ -80,18 +82,16 @@ def _lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Ite
 
 def _theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[Series]:
     """Yield thin lines of Persson's theory: as many as there are of the simulation, one over a_T v."""
-    one = x == "reduced"
-    for number, line in enumerate(
-        _lines(columns | {"": 0.0 * columns[x]}, x, y, "" if one else by, "") if columns else ()
-    ):
+    one = {"one": np.zeros_like(columns[x])} if x == "reduced" else {}
+    for number, line in enumerate(_lines(columns | one, x, y, "one" if one else by, "")):
         color = style.GREY if one else style.line(number)["color"]
         yield Series("" if number else "theory", line.x, line.y, {"color": color, "linestyle": ":"})
 
 
-def distinct(values: Array) -> list[float]:
-    """Return sorted values; those that differ by round-off only are one."""
-    found: list[float] = []
-    for value in np.sort(values).tolist():
-        if not found or value - found[-1] > SAME * abs(value):
-            found.append(value)
-    return found
+def _rounded(values: Array) -> Array:
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
+
+
+def _number(values: Array) -> int:
+    """Return how many values there are, but for rounding."""
+    return np.unique(_rounded(values)).size

@@ -40,7 +40,7 @@ def charts(directory: Path) -> list[Chart]:
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, title, columns in PANELS:
-        wanted = [(name + part, own, column) for part, own in _parts(rows, others) for name, column in columns.items()]
+        wanted = [(name, part, own, column) for part, own in _parts(rows, others) for name, column in columns.items()]
         series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.line(k)["color"])]
         if series:
             dots = next((k for k, one in enumerate(series) if one.look.get("marker") == "."), None)
@@ -81,20 +81,17 @@ def _parts(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
         yield f", {units.text(value, unit)}", [row for row in rows if row[others[0]] == value]
 
 
-def _lines(name: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
+def _lines(name: str, part: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
     """Yield means as a line with its points, all cases as small dots, and the theory."""
     x, y, theory = (_numbers(rows, wanted) for wanted in (key, column, f"theory_{column}"))
     if (there := np.isfinite(y)).any():
         at, means = _means(x[there], y[there])
-        yield Series(name, at, means, {"marker": "o", "linestyle": "-", "color": color})
+        yield Series(name + part, at, means, {"marker": "o", "linestyle": "-", "color": color})
         if at.size < there.sum():
             look = {"marker": ".", "linestyle": "none", "color": color, "alpha": 0.5, "markersize": 3}
             yield Series("", x[there], y[there], look)
     if (there := np.isfinite(theory)).any():
-        part = name.partition(", ")
-        yield Series(
-            "theory" + part[1] + part[2], *_means(x[there], theory[there]), {"linestyle": "--", "color": color}
-        )
+        yield Series("theory" + part, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
 
 
 def _means(x: Array, y: Array) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ CAPTION = "moduli and loss tangent over frequency, at the temperature of the job
 
 
 def section(job: Job) -> Section:
-    """Of the material of a job at its temperature."""
+    """Return the section about the material of a job at its temperature."""
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [
@@ -47,39 +47,35 @@ def _temperature(job: Job) -> Iterator[tuple[str, str]]:
     found = job.material.fitted if isinstance(job.material, Dma) else job.material
     if isinstance(job.material, Dma):
         yield "fitted to", str(job.material.path)
-    if isinstance(found, Zener) and found.shift is not None:
+    if not isinstance(found, Zener):
+        return
+    if found.shift is not None:
         reference = found.shift.made.reference
         temperature = reference if found.temperature is None else found.temperature
         yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
         yield "shift factor a_T", f"{found.time_factor:.4g}"
-    if isinstance(found, Zener) and found.band is not None:
-        yield "measured at, as at the reference", _range(found.band, "Hz")
-    if isinstance(found, Zener) and found.temperatures is not None:
+    if found.band is not None:
+        yield "measured at, as at the reference", _range(found.band)
+    if found.temperatures is not None:
         yield "measured from", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
 
 
 def _excited(job: Job) -> Table:
-    """Which frequencies the waves of the surface excite at each temperature, if they move."""
+    """Return which frequencies the waves of the surface excite at each temperature, if they move."""
     found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
-    rows = [
-        (
-            "–" if one.temperature is None else f"{one.temperature:g} °C",
-            f"{one.factor:.3g}",
-            _range(one.band, "Hz"),
-            _range(one.reduced, "Hz"),
-        )
-        for one in found
-    ]
+    degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
+    ranges = ((f"{one.factor:.3g}", _range(one.band), _range(one.reduced)) for one in found)
+    rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
     told = "frequencies with which the waves of the surface pass, at all velocities of the job"
     return Table(("temperature", "a_T", "excited by the job", "as at the reference"), rows, told)
 
 
-def _range(ends: tuple[float, float], unit: str) -> str:
-    return f"{units.text(ends[0], unit)} to {units.text(ends[1], unit)}"
+def _range(band: tuple[float, float]) -> str:
+    return f"{units.text(band[0], 'Hz')} to {units.text(band[1], 'Hz')}"
 
 
 def _moduli(axes: Axes, job: Job) -> None:
-    """Storage and loss modulus over frequency, and the loss tangent."""
+    """Draw storage and loss modulus over frequency, and the loss tangent."""
     series = relaxation_of(job.material)
     ends = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
     frequency = np.logspace(ends.min() - DECADES, ends.max() + DECADES, POINTS)

@@ -1,12 +1,11 @@
 """What Persson's theory predicts for a job with one rough surface: friction and contact area at each instant."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from ..theory import full_contact, persson, persson_rings
 from ..theory.persson_history import Leg, Memory, follow
 from ..theory.persson_rings import Rings
 
-COLUMNS = ("time", "distance", "pressure", "friction", "contact_area")
 STEADY_FILE = "steady_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
@@ -44,7 +42,7 @@ class Instant(NamedTuple):
 
 
 def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Instant]:
-    """The rows for a job, the initial state first; `slab` must be that of one rank.
+    """Return the rows for a job, the initial state first; `slab` must be that of one rank.
 
     The waves are those of the job's spectrum as an unbounded surface has them (`continuum`), or those of the very
     surface in the box (`lattice`). Stages that choose their steps have those of the run in the job's directory, before
@@ -62,7 +60,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
 
 
 def _times_of_run(job: Job) -> dict[int, float]:
-    """When the steps of a run ended that the job has made, by their numbers; none before its run."""
+    """Return when the steps of the job's run ended, by their numbers; none before the run."""
     path = job.output.directory / "measures.csv"
     if not Timeline.of(job).chooses or not path.is_file():
         return {}
@@ -87,14 +85,14 @@ def has_spectrum(job: Job) -> bool:
 
 
 def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
-    """The one rough surface of a job that has nothing else."""
+    """Return the one rough surface of a job that has nothing else."""
     parts = [part for part in job.surface if not isinstance(part, jobs.Flat)]
     part = parts[0] if len(parts) == 1 else None
     return part if isinstance(part, jobs.Rough | jobs.RoughSpectrum) else None
 
 
 def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> Iterator[SteadyInstant]:
-    """Friction and contact area of the steady states of a curve, for the job's spectrum as an unbounded surface has it.
+    """Yield the steady states of a curve for the spectrum of the job, as an unbounded surface has it.
 
     Raises InputError for jobs that the theory does not know.
     """
@@ -111,41 +109,33 @@ def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> I
 
 
 def write_steady(job: Job, wanted: Request) -> Path:
-    """The prediction for a curve as steady_theory.csv beside it, in whose picture it is then; returns the picture."""
-    path = job.output.directory / STEADY_FILE
-    with _told_where(path):
-        _write(path, SteadyInstant._fields, predict_steady(job, wanted))
+    """Write the prediction for a curve as steady_theory.csv beside it and draw both; returns the picture."""
     from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
+    _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, predict_steady(job, wanted))
     return plots.draw_steady(job.output.directory / "steady.csv")
 
 
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
     """Write the rows as theory.csv, and theory.yaml beside it, for the job; returns the table's path."""
-    path = job.output.directory / theory_settings.TABLE
-    with _told_where(path):
-        _write(path, COLUMNS, rows, theory_settings.is_own_table)
-        theory_settings.write(path.parent, settings)
-    return path
+    return _write(job.output.directory / theory_settings.TABLE, Instant._fields, rows, settings)
 
 
 def _write(
-    path: Path, columns: Sequence[str], rows: Iterator[Any], is_ours: Callable[[Path], bool] | None = None
-) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with files.replaced(path, is_ours) as file:
-        file.write(f"{','.join(columns)}\n".encode())
-        for row in rows:
-            file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
-
-
-@contextmanager
-def _told_where(path: Path) -> Iterator[None]:
-    """A path that cannot be written is an InputError that names it."""
+    path: Path, columns: Sequence[str], rows: Iterator[Sequence[float]], settings: TheorySettings | None = None
+) -> Path:
+    """Write a table, and its settings beside it; raises InputError for a path that cannot be written."""
     try:
-        yield
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with files.replaced(path, theory_settings.is_own_table if settings else None) as file:
+            file.write(f"{','.join(columns)}\n".encode())
+            for row in rows:
+                file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
+        if settings:
+            theory_settings.write(path.parent, settings)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
+    return path
 
 
 def _refuse_unknown(job: Job) -> None:
@@ -180,7 +170,7 @@ def _on_body(job: Job, rings: Rings) -> Rings:
 
 
 def _continuum(job: Job, slide: float) -> Rings:
-    """The spectrum between the limits of the job, of which the box holds nothing longer than its longer side."""
+    """Return the spectrum between the limits of the job; the box holds no waves longer than its longer side."""
     part = _only_rough(job)
     if part is None:
         raise InputError("surface: the theory needs one rough surface and nothing else; --waves lattice takes any")
@@ -205,7 +195,7 @@ def _continuum(job: Job, slide: float) -> Rings:
 
 
 def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
-    """Of a measured spectrum; the box holds nothing longer than its longer side, the grid no waves below two cells."""
+    """Return a measured spectrum without waves longer than the box or shorter than two cells of the grid."""
     from ..road import spectrum
 
     found, (long, short) = spectrum.of(part)
@@ -218,7 +208,7 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
 
 
 def _longest_slide(timeline: Timeline) -> float:
-    """The largest distance between two places of the surface [m]: old and new waves are that far out of phase."""
+    """Return the largest distance between two places of the surface [m]: waves are that far out of phase."""
     places = {place for span in timeline.spans for place in (span.origin, span.position(span.ends.count))}
     return max((math.dist(*pair) for pair in combinations(places, 2)), default=0.0)
 
@@ -227,7 +217,7 @@ def _longest_slide(timeline: Timeline) -> float:
 
 
 def _material(job: Job) -> Prony:
-    """The incompressible body that is as stiff as the job's half space, to which nu is a factor."""
+    """Return the incompressible body that is as stiff as the job's half space, to which nu is a factor."""
     if job.material.hardness is not None:
         raise InputError("the theory excludes counterbodies that yield: leave out material.hardness")
     series, factor = relaxation_of(job.material), 0.5 / (1.0 - job.material.poisson)
@@ -252,7 +242,7 @@ def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterato
 
 
 def _leg(job: Job, span: Span) -> Leg:
-    """A stage: the jump of its load, if it begins with one, and its steps."""
+    """Return a stage: the jump of its load, if it begins with one, and its steps."""
     fractions = np.array([*([0.0] if span.jumps else []), *(span.ends[index] for index in range(1, span.count + 1))])
     area = job.grid.lx * job.grid.ly if span.stage.control == "force" else 1.0
     pressures = np.array([span.load.at(min(fraction, 1.0)) for fraction in fractions]) / area

@@ -1,17 +1,24 @@
-"""The sections about results: of a run, a friction curve, a sweep, a study."""
+"""The sections about results of a run, a friction curve, a sweep or a study, and their maps to browse over time."""
 
 import csv
+import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
-from ..plotting import histories, steady, sweep
-from ..plotting.run import Run
-from ..storage import measures
+import h5py
+import numpy as np
+from PIL import Image
+
+from .. import progress
+from ..plotting import histories, maps, steady, style, sweep, units
+from ..plotting.plots import spread
+from ..plotting.run import Run, box, frame_labels, load_of
+from ..storage import hdf5, measures
 from ..storage.row import UNITS
 from ..summary import slide, sweep_table, theory_settings
-from . import browse
-from .parts import Section, Table, of_chart, uri_of
+from .parts import RC, Browser, Section, Table, of_chart, uri_of
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -22,6 +29,10 @@ POINTS = (
 )
 DIGITS = 5
 MOST_ROWS = 200  # of a table: the whole is in the data
+MOST_MAPS = 24  # pictures of one map: instants in between are left out
+MAP_DPI = 100
+COLORS = 256  # of a picture: less than half of the bytes that true colours need, and one does not see it
+MAP_SIZE = (4.2, 3.5)  # [inch]
 
 
 def of_run(directory: Path) -> Section:
@@ -39,18 +50,18 @@ def of_run(directory: Path) -> Section:
         theory_settings.describe(directory),
     ]
     pictures = [of_chart(chart) for chart in histories.charts(run)]
-    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse.of_run(run))
+    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse_run(run))
 
 
 def of_curve(directory: Path) -> Section:
     """Return the points of a friction curve, and their maps."""
     columns = measures.read(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
-    units = {**UNITS, "velocity": "m/s", "temperature": "°C"}
-    head = [f"{_words(name)} [{units[name]}]" if name in units else _words(name) for name in names]
+    known = {**UNITS, "velocity": "m/s", "temperature": "°C"}
+    head = [f"{_words(name)} [{known[name]}]" if name in known else _words(name) for name in names]
     table = _shortened(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [of_chart(chart) for chart in steady.charts(directory)]
-    return Section("Friction curve", (), [table], pictures, browse.of_curve(directory))
+    return Section("Friction curve", (), [table], pictures, _browse_curve(directory))
 
 
 def of_sweep(directory: Path) -> Section:
@@ -100,3 +111,46 @@ def _number(text: str) -> object:
         return float(text or "nan")
     except ValueError:
         return text
+
+
+def browse_run(run: Run) -> list[Browser]:
+    """Return all maps that a run has saved, over time."""
+    return _browsers(run.directory / "fields.h5", partial(frame_labels, run))
+
+
+def _browse_curve(directory: Path) -> list[Browser]:
+    """Return all maps that a friction curve has saved in a directory, over velocity and load."""
+    return _browsers(directory / "steady.h5", partial(_states, box(directory)))
+
+
+def _browsers(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[Browser]:
+    """Return none where the file is missing or cannot be read: a report tells what there is."""
+    try:
+        with h5py.File(path, "r", locking=False) as file, style.drawing(RC):
+            labels = spread(label(file), MOST_MAPS)
+            return [_browser(file, name, labels) for name in maps.LOOKS if name in file and labels]
+    except hdf5.FAILURES:
+        return []
+
+
+def _browser(file: h5py.File, name: str, labels: dict[int, str]) -> Browser:
+    counted = progress.with_bar(list(labels), f"maps of {name}", "map")
+    images = zip(maps.frames(file, name, labels, MAP_SIZE, MAP_DPI), counted, strict=True)
+    return name, [(uri_of(small_png(image), "image/png"), labels[index]) for image, index in images]
+
+
+def small_png(image: Image.Image) -> bytes:
+    """Return a picture with so few colours that all of it, also what is rare, has nearly its own."""
+    png = io.BytesIO()
+    few = image.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few.save(png, "png", optimize=True)
+    return png.getvalue()
+
+
+def _states(area: float, file: h5py.File) -> dict[int, str]:
+    """Return speeds and loads of the states that are saved: forces on the box of a free scene of this `area` [m^2]."""
+    speeds = file["velocity"][...]
+    axis, loads = load_of(file["load"][...], area)
+    warm = [f", {t:g} °C" for t in file["temperature"][...]] if "temperature" in file else [""] * speeds.size
+    known = np.flatnonzero(~np.isnan(speeds)).tolist()
+    return {k: f"{units.text(speeds[k], 'm/s')}, {units.text(loads[k], axis.unit)}{warm[k]}" for k in known}

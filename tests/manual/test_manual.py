@@ -142,7 +142,7 @@ COLUMNS = {
         *(*steady_table.HEATED, *InterfaceColumns.columns, *steady_table.ERRORS),
     ],
     "steady_waves.csv": steady_table.WAVES,
-    "theory.csv": prediction.COLUMNS,
+    "theory.csv": prediction.Instant._fields,
     "steady_theory.csv": prediction.SteadyInstant._fields,
     "sweep.csv": ["case", *sweep_table.COLUMNS],
     "study.csv": outcome.COLUMNS,

@@ -16,7 +16,7 @@ from PIL import Image
 
 from parcontact.plotting import maps, plots
 from parcontact.plotting.run import Run, frame_labels
-from parcontact.report import browse
+from parcontact.report import results
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
 CREEP = "history: [{pressure: 1.0e3, duration: 2.0e-3, time_step: 2.0e-3}]\n"
@@ -50,7 +50,7 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     plots.plot([out])
     found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
     assert set(found) == {"pressure", "gap", "height"}
-    assert [label for _, label in browse.of_run(Run(out))[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
+    assert [label for _, label in results.browse_run(Run(out))[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
             list(maps.frames(file, name, {1: ""}))
@@ -126,5 +126,5 @@ def test_rare_colours_stay() -> None:
     colors = (255 * colormaps["viridis"](scale)[..., :3]).round().astype(np.uint8)
     colors[:200] = 255  # the paper, and grey around letters
     colors[:2] = np.arange(256)[None, :, None]
-    found = np.asarray(Image.open(io.BytesIO(browse.small_png(Image.fromarray(colors)))).convert("RGB"))
+    found = np.asarray(Image.open(io.BytesIO(results.small_png(Image.fromarray(colors)))).convert("RGB"))
     assert np.abs(found.astype(int) - colors).max() <= 0.02 * 255

@@ -151,7 +151,7 @@ def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     assert done.stdout.splitlines() == ["Persson's theory, gamma 1, continuum of waves: here/theory.csv"]
     with (tmp_path / "here" / "theory.csv").open(newline="") as file:
         table = list(csv.DictReader(file))
-    assert tuple(table[0]) == prediction.COLUMNS
+    assert tuple(table[0]) == prediction.Instant._fields
     assert float(table[-1]["distance"]) == pytest.approx(4.32e-4)
     assert {path.name for path in (tmp_path / "here").iterdir()} == {"theory.csv", "theory.yaml"}
     assert yaml.safe_load((tmp_path / "here" / "theory.yaml").read_text()) == {
