@@ -239,6 +239,7 @@ def doctor(options: argparse.Namespace) -> int:
     from pathlib import Path
 
     from ..doctor import checks, machine
+    from ..doctor.bench import Bench
 
     def tell(text: str) -> None:
         if world.rank == 0:
@@ -246,7 +247,7 @@ def doctor(options: argparse.Namespace) -> int:
 
     for line in machine.describe_machine(world, Path.cwd()):
         tell(line)
-    results = [checks.run_check(check, world, options.precision) for check in checks.CHECKS]
+    results = [checks.run_check(check, Bench(world, options.precision)) for check in checks.CHECKS]
     tell("\n" + checks.markdown(results))
     wrong = [f"{result.check.name}: {text}" for result in results for text in result.wrong]
     wrong += filter(None, [machine.find_broken_files(world, Path.cwd())])

@@ -1,15 +1,14 @@
-"""A bench for checks: it marches small jobs, looks in every step at what must always hold, and notes what came out."""
+"""A bench for checks: it marches small jobs and notes what came out beside what should."""
 
-import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..history.timeline import Step, Timeline
+from ..history.timeline import Timeline
 from ..job import Job
 from ..march.loop import March
 from ..parallel.slab import Array, Slab
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
 Json = dict[str, Any]
 Watch = Callable[[March], None]
-LOAD = 1e-13  # how well the mean pressure is met
-BALANCE = {"double": 1e-11, "mixed": 1e-9}  # work = stored + dissipated, over the largest of all times
 
 
 @dataclass(frozen=True)
@@ -78,11 +75,8 @@ class Bench:
         for step in Timeline.of(job):
             rows.append(march.advance(step))
             self._note(march.row)
-            self._always(march, step)
             for watch in watches:
                 watch(march)
-        if job.output.energy and job.numerics.integrator == "exponential":  # the other closes to first order only
-            self._balance(rows)
         return march, rows
 
     def whole(self, march: March, name: str) -> Array:
@@ -96,35 +90,6 @@ class Bench:
     def _note(self, row: Row) -> None:
         self.residual = float(np.max((self.residual, row.certificate.worst)))  # NaN if one is
         self.iterations = max(self.iterations, row.iterations)
-
-    # -- what must always hold ----------------------------------------------------------------------------------------
-
-    def _always(self, march: March, step: Step) -> None:
-        """No traction, no penetration, the load met, nothing that is not a number; collective.
-
-        Without the program's own sums, which may be what is wrong.
-        """
-        built, measures = march.scene, march.row.measures
-        tolerance = built.job.numerics.tolerance
-        pressure, gap = march.field("pressure"), march.field("gap")
-        own = pressure.sum(dtype=np.float64), (-pressure).max(initial=-np.inf), (-gap).max(initial=-np.inf)
-        loads, tractions, penetrations = zip(*built.slab.from_all(own), strict=True)
-        load, traction, penetration = math.fsum(loads), float(max(tractions)), float(max(penetrations))
-        self.expect("traction", max(traction, 0.0), 0.0, 0.0)
-        self.expect("penetration", max(penetration / built.setup.height, 0.0), 0.0, 1.1 * tolerance, scale=1.0)
-        self.expect("residual", march.row.certificate.worst, 0.0, tolerance, scale=1.0)
-        numbers = dataclasses.astuple(measures)
-        self.expect("numbers", math.fsum(abs(x) < math.inf for x in numbers), float(len(numbers)), 0.0)
-        if step.control != "approach":
-            area = built.job.grid.lx * built.job.grid.ly if step.control == "force" else 1.0
-            scale = step.load + 1e-30 * built.units.pressure * area  # less is none
-            self.expect("load", load / built.slab.points * area, step.load, LOAD, scale)
-            self.expect("measured load", measures.pressure * area, step.load, LOAD, scale)
-
-    def _balance(self, rows: Sequence[Row]) -> None:
-        largest = max(max(abs(row.work), row.stored, row.dissipated) for row in rows)
-        for row in rows:
-            self.expect("energy", row.stored + row.dissipated, row.work, BALANCE[self.precision], scale=largest)
 
     # -- what is expected ---------------------------------------------------------------------------------------------
 
@@ -142,6 +107,3 @@ class Bench:
         largest = float(np.abs(expected).max())
         for one, other in zip(found.ravel(), expected.ravel(), strict=True):
             self.expect(what, one, other, within, scale=largest)
-
-
-ALWAYS = ("traction", "penetration", "residual", "numbers", "load", "measured load", "energy")

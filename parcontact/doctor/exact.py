@@ -1,22 +1,20 @@
-"""Contacts with exact answers: almost full, full and flat ones, vanishing loads, sliding, unloading, many branches."""
+"""Contacts with exact answers: almost full and full ones, vanishing loads, sliding, unloading, many branches."""
 
 import numpy as np
 
 from ..physics import prony as viscoelastic
-from ..theory import full_contact, hertz, jgh, lee_radok, persson, persson_rings, westergaard
+from ..theory import full_contact, hertz, lee_radok, persson, persson_rings, westergaard
 from .bench import Bench
 from .jobs import (
     CELL,
     GLASSY,
     HEIGHT,
     INTEGRATORS,
-    MEAN,
     PRONY,
     RADIUS,
     RELAXATION,
     WAVELENGTH,
     K,
-    flat,
     sphere,
     wave,
     zener,
@@ -31,7 +29,7 @@ FULL = 5e7  # Pa, enough for full contact
 
 
 def nearly_full(bench: Bench) -> None:
-    """Westergaard's wave and Johnson's at 0.99, 1 and 1.01 of the load that closes the last gap."""
+    """Westergaard's wave at 0.99, 1 and 1.01 of the load that closes the last gap."""
     for share in (0.99, 1.0, 1.01):
         mean = share * float(westergaard.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
         job = wave([{"pressure": mean}, {"pressure": mean}], points=(256, 1), material=RUBBER)
@@ -41,38 +39,7 @@ def nearly_full(bench: Bench) -> None:
         bench.expect_all("Westergaard", bench.whole(march, "pressure")[0], exact, 1e-9 if share > 1 else 5e-3)
         area = float(westergaard.contact_fraction(mean, HEIGHT, WAVELENGTH, GLASSY))
         bench.expect("area", rows[-1].measures.contact_area, area, 2 / 256 if share <= 1 else 0.0, scale=1.0)
-        _two_ways(bench, share)
     bench.expect("iterations", bench.iterations, 0.0, ITERATIONS, scale=1.0)
-
-
-def _two_ways(bench: Bench, share: float) -> None:
-    full = float(jgh.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
-    surface = [{"shape": "wave", "amplitude": HEIGHT / 2, "waves": [1, sign]} for sign in (1, -1)]
-    march, rows = bench.march(wave([{"pressure": share * full}], points=(64, 64), material=RUBBER, surface=surface))
-    x = np.arange(64) * WAVELENGTH / 64
-    measures = rows[-1].measures
-    if share >= 1.0:
-        exact = jgh.full_contact_pressure_field(x[None, :], x[:, None], share * full, HEIGHT, WAVELENGTH, GLASSY)
-        bench.expect_all("Johnson", bench.whole(march, "pressure"), exact, 1e-9)
-    closed = float(jgh.high_load_contact_fraction(share * full, HEIGHT, WAVELENGTH, GLASSY))
-    bench.expect("area, Johnson", measures.contact_area, closed, 0.0 if share > 1 else 12 / 64**2, scale=1.0)
-    bench.expect("peak, Johnson", measures.max_pressure, (1.0 + share) * full, 1e-3)
-
-
-def flat_surface(bench: Bench) -> None:
-    """Uniform pressure, no gap, no friction, whatever the step, the velocity and the body; then no load at all."""
-    for dt in (1e-12, 1e-3, 1e12):
-        for velocity in (0.0, [0.3, 0.1], 1e3):
-            loading = {"pressure": MEAN, "velocity": velocity, "duration": 3 * dt, "time_step": dt}
-            unloading = {"pressure": 0.0, "duration": dt, "time_step": dt}
-            _, rows = bench.march(flat([loading, unloading], output={"energy": True}))
-            loaded, free = rows[-3].measures, rows[-1].measures
-            bench.expect("friction", max(row.measures.friction for row in rows), 0.0, 0.0)
-            bench.expect("area", loaded.contact_area, 1.0, 0.0)
-            bench.expect("peak", loaded.max_pressure, MEAN, 1e-12)
-            bench.expect("gap", loaded.mean_gap, 0.0, 1e-15, scale=WAVELENGTH)
-            bench.expect("pressure without load", free.max_pressure, 0.0, 0.0)
-            bench.expect("work", rows[-1].work, 0.0, 1e-12, scale=MEAN * WAVELENGTH**3)
 
 
 def vanishing_load(bench: Bench) -> None:
@@ -83,8 +50,8 @@ def vanishing_load(bench: Bench) -> None:
         exact = float(hertz.approach(force, RADIUS, GLASSY))
         bench.expect(f"approach, {force:g} N", rows[-1].measures.approach, exact, 1e-3)
     cell = 1e-4
-    for force in (1e-6, 1e-12, 1e-150):
-        stages = [{"force": force}, {"force": 1e-300}, {"force": 5e-324}, {"force": 0.0}]
+    for force in (1e-6, 1e-12, 1e-38):
+        stages = [{"force": force}, {"force": 1e-39}, {"force": 1e-40}, {"force": 0.0}]
         _, rows = bench.march(sphere(stages, points=8, size=8 * cell, material=RUBBER))
         pressed, free = rows[1].measures, rows[-1].measures
         bench.expect("points", 64 * pressed.contact_area, 1.0, 0.0)

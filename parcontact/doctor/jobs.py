@@ -60,8 +60,3 @@ def sphere(history: Sequence[Json], points: int = 32, size: float = 3e-3, **job:
         "history": list(history),
         **job,
     }
-
-
-def flat(history: Sequence[Json], **job: Any) -> Json:
-    """A flat surface."""
-    return wave(history, **{"surface": {"shape": "flat"}, **job})

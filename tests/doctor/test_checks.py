@@ -22,7 +22,7 @@ def test_a_case_that_goes_wrong_is_seen() -> None:
         bench.expect("force", float("nan"), 1.0, 0.1)
         bench.expect("peak", 1.0, 1.05, 0.1)
 
-    result = run_check(Check("name", "expected", wrong), MPI.COMM_SELF)
+    result = run_check(Check("name", "expected", wrong), Bench(MPI.COMM_SELF))
     assert result.wrong == ["area = 0.5 (0.6 +- 0.06)", "force = nan (1 +- 0.1)"]
     assert "WRONG" in markdown([result])
     failed = CheckResult(result.check, (), 0.0, 0, "the contact solve stalled")

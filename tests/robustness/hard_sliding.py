@@ -21,7 +21,7 @@ from parcontact.doctor.jobs import (
     zener,
 )
 from parcontact.physics import prony as viscoelastic
-from parcontact.theory import full_contact, westergaard
+from parcontact.theory import full_contact, jgh, westergaard
 
 STIFF = 2 * HEIGHT  # pressure amplitude of a wave in full contact over modulus and wavenumber
 CELLS = 6
@@ -160,3 +160,41 @@ def single_point(bench: Bench) -> None:
         if abs(abs(where) - 0.5) > 0.1:  # not about half-way, where two points touch
             bench.expect("points", 64 * row.measures.contact_area, 1.0, 0.0)
             bench.expect("force", row.measures.force_x, unit * where, 1e-9, scale=unit)
+
+
+def two_waves(bench: Bench) -> None:
+    """Johnson's two waves at 0.99, 1 and 1.01 of the load that closes the last gap."""
+    for share in (0.99, 1.0, 1.01):
+        _two_waves(bench, share)
+
+
+def _two_waves(bench: Bench, share: float) -> None:
+    full = float(jgh.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
+    surface = [{"shape": "wave", "amplitude": HEIGHT / 2, "waves": [1, sign]} for sign in (1, -1)]
+    march, rows = bench.march(
+        wave([{"pressure": share * full}], points=(64, 64), material=zener(GLASSY, [], []), surface=surface)
+    )
+    x = np.arange(64) * WAVELENGTH / 64
+    measures = rows[-1].measures
+    if share >= 1.0:
+        exact = jgh.full_contact_pressure_field(x[None, :], x[:, None], share * full, HEIGHT, WAVELENGTH, GLASSY)
+        bench.expect_all("Johnson", bench.whole(march, "pressure"), exact, 1e-9)
+    closed = float(jgh.high_load_contact_fraction(share * full, HEIGHT, WAVELENGTH, GLASSY))
+    bench.expect("area, Johnson", measures.contact_area, closed, 0.0 if share > 1 else 12 / 64**2, scale=1.0)
+    bench.expect("peak, Johnson", measures.max_pressure, (1.0 + share) * full, 1e-3)
+
+
+def flat_surface(bench: Bench) -> None:
+    """Uniform pressure, no gap, no friction, whatever the step, the velocity and the body; then no load at all."""
+    for dt in (1e-12, 1e-3, 1e12):
+        for velocity in (0.0, [0.3, 0.1], 1e3):
+            loading = {"pressure": MEAN, "velocity": velocity, "duration": 3 * dt, "time_step": dt}
+            unloading = {"pressure": 0.0, "duration": dt, "time_step": dt}
+            _, rows = bench.march(wave([loading, unloading], surface={"shape": "flat"}, output={"energy": True}))
+            loaded, free = rows[-3].measures, rows[-1].measures
+            bench.expect("friction", max(row.measures.friction for row in rows), 0.0, 0.0)
+            bench.expect("area", loaded.contact_area, 1.0, 0.0)
+            bench.expect("peak", loaded.max_pressure, MEAN, 1e-12)
+            bench.expect("gap", loaded.mean_gap, 0.0, 1e-15, scale=WAVELENGTH)
+            bench.expect("pressure without load", free.max_pressure, 0.0, 0.0)
+            bench.expect("work", rows[-1].work, 0.0, 1e-12, scale=MEAN * WAVELENGTH**3)

@@ -31,11 +31,11 @@ def long_steps(bench: Bench) -> None:
     """After one step of dt >> tau the body is elastic with its long-term modulus, to tau/dt."""
     elastic, _ = bench.march(crossed([{"pressure": 1e4}], material=zener(LONG_TERM, [], [])))
     soft = bench.whole(elastic, "pressure")
-    for relaxation, ratio in ((RELAXATION, 1e6), (RELAXATION, 1e12), (RELAXATION, 1e300), (1e-20, np.inf)):
+    for relaxation, ratio in ((RELAXATION, 1e6), (RELAXATION, 1e12), (RELAXATION, 1e42), (1e-38, np.inf)):
         for integrator in INTEGRATORS:
             body: Json = {"material": zener(*PRONY[:2], [relaxation]), "numerics": {"integrator": integrator}}
             body["output"] = {"energy": ratio > 1e12}
-            dt = min(relaxation * ratio, 1e303)
+            dt = min(relaxation * ratio, 1e39)
             stage = {"duration": dt, "time_step": dt}
             within = 2.0 * GLASSY / LONG_TERM / ratio + 1e-8
             march, _ = bench.march(crossed([{"pressure": 1e4, **stage}], **body))
