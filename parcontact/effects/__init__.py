@@ -1,1 +1,1 @@
-"""Which effects a job calls for, and why; a new effect has its own file here."""
+"""Effects that a job may call for; a new one has its own file here."""

@@ -1,4 +1,4 @@
-"""What an effect is: a decision from the job alone, and what is made, held, remembered and written where it is on.
+"""The interface of effects: a decision from the job alone, and what is made, remembered and written where it is on.
 
 An effect that follows the steps is one class, found by the section that it adds to a job (`job.extension`): no other
 file knows it. One that takes the place of a part (another body, operator or path) has its decision in
@@ -22,7 +22,7 @@ from ..physics.measures import Measures
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether an effect is on, and why in a few words."""
+    """Decision whether an effect is on, and why in a few words."""
 
     name: str
     on: bool
@@ -57,22 +57,22 @@ class Effect(Remembers, Protocol):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        """Whether the job asks for it, and its name in checkpoints; the same on every rank."""
+        """Decide whether the job asks for it, and give its name in checkpoints; the same on every rank."""
         ...
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """The types of the maps that it holds and that a checkpoint has; what it holds besides is not planned."""
+        """Return the types of the maps that it holds and that a checkpoint has; what else it holds is not planned."""
         ...
 
     def __init__(self, scene: Any) -> None: ...
 
     def follow(self, instant: Instant) -> None:
-        """After a step."""
+        """Take note of a step that was made."""
         ...
 
     def values(self) -> Sequence[float]:
-        """What its columns have in the row of the last step made, the same on every rank; NaN leaves one empty.
+        """Return what its columns have in the row of the last step, the same on every rank; NaN leaves one empty.
 
         Local to this rank.
         """
@@ -80,7 +80,7 @@ class Effect(Remembers, Protocol):
 
 
 def columns_of(effects: Mapping[str, Effect]) -> tuple[str, ...]:
-    """What effects add to measures.csv."""
+    """Return the columns that effects add to measures.csv."""
     return tuple(name for effect in effects.values() for name in effect.columns)
 
 

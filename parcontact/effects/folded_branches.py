@@ -14,7 +14,7 @@ from ..physics.prony import Prony
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
-    """What a user should know about the branches of a material [Pa, s]: nothing if they are as the job says."""
+    """Return what a user should know about the branches of a material [Pa, s]: nothing if they are as the job says."""
     count = prony.moduli.size
     if not found.folded:
         return [f"branches: all {count} have a map: {found.reason}"] if found.reason and count > 1 else []

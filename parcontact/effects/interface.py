@@ -55,7 +55,7 @@ def interface_of(section: Interface | None, time_factor: float) -> InterfaceFric
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
-    """What of friction comes from the body, along the velocity, and what from the interface."""
+    """Return the friction of the body, along the velocity, and that of the interface."""
     speed = math.hypot(*velocity)
     opposing = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / speed if speed else 0.0
     whole = opposing / measures.normal_force if measures.normal_force > 0.0 else 0.0
@@ -63,8 +63,7 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
 
 
 class InterfaceColumns:
-    """What of friction comes from the body, along the velocity (positive where it opposes it), and what from the
-    interface."""
+    """Columns of the friction of the body, along the velocity (positive where it opposes it), and of the interface."""
 
     section: ClassVar[type[Part]] = Interface
     columns: ClassVar[tuple[str, ...]] = ("friction_viscous", "friction_interface")

@@ -1,4 +1,4 @@
-"""What Persson's theory predicts for a job with one rough surface: friction and contact area at each instant."""
+"""Predictions of Persson's theory for a job with one rough surface: friction and contact area at each instant."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -52,8 +52,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Inst
     _refuse_unknown(job)
     timeline = Timeline.of(job).follow(_times_of_run(job))
     rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
-    rings = _on_body(job, rings)
-    memory = Memory(rings, _material(job))
+    memory = Memory(_on_body(job, rings), _material(job))
     if job.initial.state == "steady":
         memory.slide_for_ever(job.initial.velocity)
     return _rows(job, timeline, memory, gamma)
@@ -80,7 +79,7 @@ class SteadyInstant(NamedTuple):
 
 
 def has_spectrum(job: Job) -> bool:
-    """Whether the theory knows the surface of a job without its heights: a periodic one with one rough surface."""
+    """Return whether the theory can do without the heights of a job: a periodic one with one rough surface."""
     return job.grid.boundary == "periodic" and _only_rough(job) is not None
 
 
@@ -152,9 +151,8 @@ def _refuse_unknown(job: Job) -> None:
 
 
 def _lattice(job: Job, slab: Slab) -> Rings:
-    exact = job.model_copy(update={"numerics": job.numerics.model_copy(update={"precision": "double"})})
-    setup = scene.set_up(exact, slab)
-    heights = setup.units.height * setup.surface.heights((0.0, 0.0), slab.empty(np.float64))
+    setup = scene.set_up(job, slab)
+    heights = setup.units.height * setup.surface.heights((0.0, 0.0), slab.empty())
     try:
         return persson_rings.rings_of_surface(full_contact.waves(heights, *job.grid.size))
     except ValueError as error:

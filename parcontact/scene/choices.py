@@ -1,4 +1,4 @@
-"""What a job calls for, decided once: what is on and why, and everything else that follows from the job alone.
+"""The choices that follow from a job alone, each made once: which effects are on and why, and what they need.
 
 `scene.py` makes what is decided here, `parcontact plan` prints it, and rooms below never see the job. An effect that is
 off allocates nothing, calls nothing and writes nothing.
@@ -75,7 +75,7 @@ class Choices:
 
     @cached_property
     def time_factor(self) -> float:
-        """By what factor relaxation times are longer than at the reference temperature, a_T [-]."""
+        """The relaxation times over those at the reference temperature, a_T [-]."""
         return time_factor_of(self.job.material)
 
     @property
@@ -90,7 +90,7 @@ class Choices:
 
     @cached_property
     def folded(self) -> FoldedBranches:
-        """Which branches of the material need a map (`physics.folding`)."""
+        """The branches of the material that need a map, and those that do not (`physics.folding`)."""
         if self.prony.moduli.size == 0:
             return keep_all(self.prony, "the body has no branch")
         reason = "output.energy counts the energy of every branch" if self.energies.on else ""
@@ -144,7 +144,7 @@ class Choices:
 
     @cached_property
     def slides_along_x(self) -> bool:
-        """Whether the surface slides along x on a periodic box, where whole cells are an index offset."""
+        """True if the surface slides along x on a periodic box, where whole cells are an index offset."""
         spans = [span for span in self.timeline.spans if span.moves]
         return bool(spans) and not self.isolated.on and not any(span.stage.velocity[1] for span in spans)
 
@@ -188,7 +188,7 @@ class Choices:
 
     @decided("rest cut short")
     def short_rest(self) -> Verdict:
-        """Once nothing changes any more at rest, one step ends the stage (`march.rest`)."""
+        """One step that ends a stage at rest once nothing changes any more (`march.rest`)."""
         if (span := next((span for span in self.timeline.spans if span.rests), None)) is None:
             return False, "no stage stands under a constant load with growing time steps"
         return True, f"stage {span.stage.name!r} stands under a constant load"
@@ -241,7 +241,7 @@ class Choices:
 
     @property
     def transforms(self) -> list[Any]:
-        """On what it depends, beside the number of ranks, which transforms a run has."""
+        """The facts that decide, beside the number of ranks, which transforms a run has."""
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
         single, steady = [self.mixed_precision.on, self.single_operator.on], self.job.steady is not None
         return [*kinds, single, [self.job.initial.state, steady]]
@@ -268,7 +268,7 @@ class Choices:
 
     @property
     def _inverse_is_known(self) -> bool:
-        """Whether the preconditioner is the inverse of the operator, but for its precision."""
+        """True if the preconditioner is the inverse of the operator, but for its precision."""
         return not self.isolated.on and self.numerics.kernel == "spectral" and not self.layer.on
 
     @decided("dissipation per branch")

@@ -1,4 +1,4 @@
-"""Whether a job stays within the frequencies and temperatures at which its rubber was measured."""
+"""Warnings for jobs that leave the frequencies and temperatures at which their rubber was measured."""
 
 import math
 from collections.abc import Iterator, Sequence

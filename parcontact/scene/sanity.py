@@ -1,4 +1,4 @@
-"""Whether a scene means something, seen from its heights before a run and from its contacts during it.
+"""Doubts about what a scene means, from its heights before a run and from its contacts during it.
 
 What a job alone tells is in `job/checks/meaning.py`. All is judged from sums over all points: every rank says the same.
 """

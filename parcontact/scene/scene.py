@@ -39,7 +39,7 @@ from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
 
 @dataclass
 class Setup:
-    """What every calculation on a job shares: its choices, who owns which rows, the surface, the units, the body.
+    """The parts that every calculation on a job shares: its choices, rows of ranks, surface, units and body.
 
     `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
     of a cell if it is flat); `shortest` [m] is the shortest wave of what is measured of it, None where nothing is;
@@ -87,11 +87,11 @@ class Setup:
         return HalfSpace(self.size, poisson, kernel, self.choices.isolated.on, layer)
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
-        """A velocity [m/s] in the run's units of length per second."""
+        """Return a velocity [m/s] in the run's units of length per second."""
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
     def ledger(self) -> Ledger:
-        """A new one, with the shear of the interface if the job has one."""
+        """Make a new ledger, with the shear of the interface if the job has one."""
         return Ledger(self.slab, self.surface, self.units, self.choices.interface)
 
 
@@ -126,7 +126,7 @@ class Scene:
         return self.setup.units
 
     def constraint(self, alpha: float) -> Constraint:
-        """Which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
+        """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
         hardness = self.choices.hardness
         return NonNegative() if hardness is None else Bounded(hardness / (alpha * self.units.pressure))
 
@@ -164,7 +164,7 @@ def build_on(setup: Setup) -> Scene:
 def solver_on(
     setup: Setup, slab: Slab, tolerance: float, operator_type: type[np.floating] | None = None
 ) -> tuple[ContactSolver, Operators]:
-    """A solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
+    """Make a solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
 
     Their transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give
     other last digits.
@@ -174,7 +174,7 @@ def solver_on(
 
 
 def solver_in_double(setup: Setup) -> Callable[[], tuple[ContactSolver, Operators]] | None:
-    """What makes a solver with an operator in double precision, for a retry; None where that of the scene is."""
+    """Return a maker of a solver with an operator in double precision, for a retry; None where the scene has one."""
     if not setup.choices.single_operator.on:
         return None
     return partial(solver_on, setup, setup.slab, setup.choices.numerics.tolerance, np.float64)
@@ -197,14 +197,14 @@ def describe_scene(scene: Scene) -> Iterator[str]:
 
 
 def _motion(setup: Setup) -> Motion:
-    """How the surface moves."""
+    """Make the motion of the surface."""
     if not setup.choices.part_cells.on:
         return WholeCells(setup.surface)
     return PartCells(setup.surface) if setup.choices.slides_along_x else AnyFraction(setup.surface)
 
 
 def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) -> tuple[ContactSolver, Operators]:
-    """The contact solver with its workspace, and the operators of the body."""
+    """Make the contact solver with its workspace, and the operators of the body."""
     height, limit = setup.height / setup.units.height, setup.choices.numerics.max_iterations
     operators = _operators(setup, operator_type)
     grids = grids_for(setup.grid.dx, setup.grid.dy)
@@ -224,7 +224,7 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
 def _body_and_energy(
     setup: Setup, folded: FoldedBranches, inverse: AppliedInverse
 ) -> tuple[ElasticBody | ZenerBody, ElasticEnergy | ZenerEnergy | None]:
-    """The body, and its energies if the job asks for them, with the `inverse` of the operator if that is at hand."""
+    """Make the body, and its energies if the job asks for them, with the `inverse` of the operator if it is at hand."""
     chosen, slab, integrator = setup.choices, setup.slab, setup.choices.numerics.integrator
     unit = setup.units.pressure * setup.units.height * setup.grid.dx * setup.grid.dy
     if not chosen.viscoelasticity.on:

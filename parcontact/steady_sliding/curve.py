@@ -31,8 +31,8 @@ SAME = (*marker.SCENE, *(f"numerics.{key}" for key in ("kernel", "precision", "s
 
 @dataclass(frozen=True)
 class Request:
-    """Which steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa], at each
-    of the temperatures [deg C], if there are any."""
+    """Request of steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa], at
+    each of the temperatures [deg C], if there are any."""
 
     velocities: tuple[float, ...]
     pressures: tuple[float, ...]

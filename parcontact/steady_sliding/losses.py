@@ -1,4 +1,4 @@
-"""What the branches of a body hold, and lose, in a steady state.
+"""Maps of the branches of a body in a steady state, and the power that they lose.
 
 A wave u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with A its displacement over its pressure for a modulus
 of 1 and the frequency w with which it passes a point.

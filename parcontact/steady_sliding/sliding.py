@@ -69,7 +69,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Level:
-    """One grid: who owns which rows, its transform, and the heights."""
+    """One grid: the rows of each rank, its transform, and the heights."""
 
     slab: Slab
     fft: FFT
@@ -261,5 +261,5 @@ class SteadySliding:
 
 
 def tolerance_of(asked: float) -> float:
-    """On the certificate of a steady state, where a job asks for one."""
+    """Return the tolerance on the certificate of a steady state for the one that a job asks for."""
     return max(SHARE * asked, min(LOOSE, asked))

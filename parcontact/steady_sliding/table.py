@@ -115,7 +115,7 @@ class CurveTable:
         self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")
 
     def _sort(self) -> None:
-        """By temperature, then by pressure, then by speed."""
+        """Sort the lines by temperature, then by pressure, then by speed."""
         columns = measures.read(self.path)
         head, *lines = self.path.read_text().splitlines()
         degrees = columns["temperature"] if self.heated else [0.0] * len(lines)
