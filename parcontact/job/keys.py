@@ -54,11 +54,10 @@ def sections() -> list[Section]:
 
 def _parts_of(annotation: Any) -> Iterator[type[Part]]:
     """Yield the parts that an annotation or a field names, in their order."""
-    if isinstance(annotation, type) and issubclass(annotation, Part):
-        yield annotation
-    for inner in get_args(getattr(annotation, "annotation", annotation)):
-        yield from _parts_of(inner)
-    if isinstance(inner := getattr(annotation, "annotation", None), type):
+    kind = getattr(annotation, "annotation", annotation)
+    if isinstance(kind, type) and issubclass(kind, Part):
+        yield kind
+    for inner in get_args(kind):
         yield from _parts_of(inner)
 
 

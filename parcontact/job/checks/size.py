@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ..sections.settings import Grid, Output
 
-MAPS, MAPS_FREE = 9.0, 18.0  # of 8 bytes per point that any run holds, at least; free ones have padded transforms
-MOST_INSTANTS = 10**6  # of fields in one file: each has its place in it from the start
+MAPS, MAPS_FREE = 9.0, 18.0  # tuning: of 8 bytes per point, which any run holds; free ones have padded transforms
+MOST_INSTANTS = 10**6  # tuning: of fields in one file; each has its place in it from the start
 GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
@@ -35,14 +35,11 @@ def beyond_memory(grid: Grid) -> str:
     each, count = _memory(), machines()
     if needed <= each * count:
         return ""
-    have = (
-        f"this machine has {each / GIGA:.3g} GB"
-        if count == 1
-        else f"{count} such machines have {each * count / GIGA:.3g} GB"
-    )
+    have = "this machine has" if count == 1 else f"{count} such machines have"
     return (
         f"grid.points: {grid.nx} x {grid.ny} points need at least {needed / GIGA:.3g} GB of memory on all ranks "
-        f"together, and {have}; use fewer points, or {int(needed / each) + 1} such machines"
+        f"together, and {have} {each * count / GIGA:.3g} GB; use fewer points, or {int(needed / each) + 1} such "
+        "machines"
     )
 
 
@@ -59,18 +56,18 @@ def beyond_file(count: int, output: Output) -> str:
 
 
 def machines() -> int:
-    """On how many machines this program runs, as far as its launcher tells."""
+    """Return on how many machines this program runs, as far as its launcher tells."""
 
-    def told(name: str) -> int:
+    def number(name: str) -> int:
         text = os.environ.get(name, "")
         return int(text) if text.isdecimal() else 0
 
-    ranks, here = told("OMPI_COMM_WORLD_SIZE"), told("OMPI_COMM_WORLD_LOCAL_SIZE")
-    return max(1, told("SLURM_JOB_NUM_NODES"), -(-ranks // here) if here else 1)
+    ranks, here = number("OMPI_COMM_WORLD_SIZE"), number("OMPI_COMM_WORLD_LOCAL_SIZE")
+    return max(1, number("SLURM_JOB_NUM_NODES"), -(-ranks // here) if here else 1)
 
 
 def _memory() -> float:
-    """Bytes of this machine, or those it grants to this program."""
+    """Return the bytes of this machine, or those it grants to this program."""
     whole = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     try:
         return min(whole, float(CGROUP.read_text()))
@@ -79,7 +76,7 @@ def _memory() -> float:
 
 
 def _free(directory: Path) -> float:
-    """Bytes left on the disk of the nearest directory that there is."""
+    """Return the bytes left on the disk of the nearest directory that there is."""
     for place in (directory.absolute(), *directory.absolute().parents):
         try:
             return float(shutil.disk_usage(place).free)

@@ -37,7 +37,7 @@ def unit(part: Part, key: str) -> str:
 
 
 def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
-    """Key, value and unit of everything in a part; each item of a list of parts is one row."""
+    """Yield key, value and unit of everything in a part; each item of a list of parts is one row."""
     for key, value in items(part):
         name = f"{path}{key}"
         if isinstance(value, Part):
@@ -71,7 +71,7 @@ def text(value: Any) -> str:
 
 
 def layout(lines: list[tuple[str, str, str]]) -> str:
-    """Rows of key, value and unit as an aligned table, with an empty line between sections."""
+    """Return rows of key, value and unit as an aligned table, with an empty line between sections."""
     key_width = max(len(key) for key, _, _ in lines)
     value_width = max([len(value) for _, value, unit in lines if unit], default=0)
     out: list[str] = []
