@@ -2,12 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..errors import InputError
@@ -20,8 +18,8 @@ from ..storage.checkpoint import Contents
 from ..storage.directory import ADVICE, Directory
 from ..storage.marker import Claim
 
-SAME = ("grid", "surface", "material", "initial")  # sections that must not change
-SAME_NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
+NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
+SAME = ("grid", "surface", "material", "initial", *NUMERICS)  # sections and keys that must not change
 SAME_STEP = 1e-9  # relative: steps of two histories this close are the same
 
 
@@ -32,16 +30,11 @@ class Origin:
     contents: Contents
     own: bool
 
-    @property
-    def wisdom(self) -> NDArray[np.uint8] | None:
-        """Which transforms FFTW found the fastest in the run that wrote it."""
-        return self.contents.numbers.get("plans/all")
-
 
 def choose(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str
 ) -> tuple[Origin | None, list[str]]:
-    """Where to begin, and warnings about checkpoints that were passed over; collective.
+    """Return where to begin, and warnings about checkpoints that were skipped; collective.
 
     `plain` is the job as plain data, on root; `restart` is `auto`, `never` or the path of a checkpoint. Raises
     InputError when there are checkpoints and none will do, or when results would be lost.
@@ -66,34 +59,32 @@ def choose(
 
 
 def claim(plain: Mapping[str, Any], origin: Origin | None) -> Claim:
-    """What a run says of itself in the marker: its id stays as long as it goes on in its own directory."""
-    data = marker.kept(plain)
-    if origin and origin.own:
-        return Claim(data, origin.contents.run, saved=True) if origin.contents.run else Claim(data, saved=True)
-    return Claim(data)
+    """Return what a run says of itself in the marker: its id stays as long as it goes on in its own directory."""
+    new = Claim(marker.kept(plain))
+    return replace(new, id=origin.contents.run or new.id, saved=True) if origin and origin.own else new
 
 
 def finished_before(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, timeline: Timeline
 ) -> str:
-    """What to say of a run of this job that has finished and was to keep no checkpoint, or ''; collective."""
+    """Return what to say of a run of this job that has finished and was to keep no checkpoint, or ''; collective."""
 
     def look() -> str:
         claim = directory.claim
         if restart != "auto" or job.checkpoint.keep or claim is None or claim.finished is None or directory.saved():
             return ""
-        same = not any(marker.differences(claim.job, plain, (*SAME, *SAME_NUMERICS)))
         steps, at = claim.finished
         whole = reached(at, timeline.end) if timeline.chooses else steps == len(timeline)
-        if not same or not whole or not (directory.path / "measures.csv").exists():
+        other = any(marker.differences(claim.job, plain, SAME))
+        if other or not whole or not (directory.path / "measures.csv").exists():
             return ""
-        return f"finished before, at t = {claim.finished[1]:g} s, without a checkpoint (--restart never: run it afresh)"
+        return f"finished before, at t = {at:g} s, without a checkpoint (--restart never: run it afresh)"
 
     return slab.agree(look() if slab.root else "")
 
 
 def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Contents | str:
-    """A checkpoint from which a job can go on, without its maps, or why it cannot; collective.
+    """Return a checkpoint from which a job can go on, without its maps, or why it cannot; collective.
 
     Raises InputError for a job whose history was another one up to there.
     """
@@ -120,7 +111,7 @@ def _is_own(contents: Contents, directory: Directory) -> bool:
 
 
 def _would_mix(directory: Directory, path: Path) -> str:
-    """Why a run may not go on from the checkpoint of another run in a directory; root only."""
+    """Return why a run may not go on from the checkpoint of another run in a directory; root only."""
     if found := directory.results():
         there = ", ".join(found[:3])
         return f"{path} is of another run than {directory.path}, which holds {there}; --out chooses another directory"
@@ -128,7 +119,7 @@ def _would_mix(directory: Directory, path: Path) -> str:
 
 
 def _would_lose(directory: Directory, plain: Mapping[str, Any]) -> str:
-    """Which results a run that begins anew would replace, though no checkpoint says that it can make them; root only.
+    """Return which results a new run would replace, though no checkpoint says that it can make them; root only.
 
     A run of this job that ended before its first checkpoint has nothing that this one does not make again.
     """
@@ -136,7 +127,7 @@ def _would_lose(directory: Directory, plain: Mapping[str, Any]) -> str:
     if claim is None or not found:
         return ""
     there = f"{directory.path} holds {', '.join(found)}"
-    if different := "; ".join(marker.differences(claim.job, plain, (*SAME, *SAME_NUMERICS))):
+    if different := "; ".join(marker.differences(claim.job, plain, SAME)):
         return f"{there} of another job: {different}; {ADVICE}"
     if claim.saved:
         how = f"a run that has finished at t = {claim.finished[1]:g} s" if claim.finished else "a run"
@@ -145,10 +136,10 @@ def _would_lose(directory: Directory, plain: Mapping[str, Any]) -> str:
 
 
 def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
-    """A checkpoint without its maps, or why it will not do; root only."""
+    """Return a checkpoint without its maps, or why it will not do; root only."""
     try:
         contents = checkpoint.inspect(path)
-        if found := "; ".join(marker.differences(contents.job, plain, (*SAME, *SAME_NUMERICS))):
+        if found := "; ".join(marker.differences(contents.job, plain, SAME)):
             return f"{path} belongs to another job: {found}"
         return contents
     except (InputError, OSError) as error:
@@ -156,7 +147,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 
 def find_changed_step(contents: Contents, job: Job) -> str:
-    """Which of the steps already made would be another one in this job, or ''; those to come may be others."""
+    """Return which of the steps already made would be another one in this job, or ''; those to come may be others."""
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
     old, new = (
@@ -171,6 +162,7 @@ def find_changed_step(contents: Contents, job: Job) -> str:
 
 
 def _apart(old: Step, new: Step) -> Iterator[str]:
+    """Yield in what two steps differ."""
     size = math.hypot(*old.position)
     if old.jump != new.jump:
         yield "was a jump of the load, is none" if old.jump else "was none, is a jump of the load"
