@@ -26,18 +26,6 @@ class Motion(Protocol):
     def at(self, displacement: tuple[float, float]) -> Heights: ...
 
 
-class WholeCells:
-    """Standing, or sliding by whole cells along x on a periodic box: one map, and an index offset."""
-
-    def __init__(self, surface: Surface) -> None:
-        self._cell = surface.cell[0]
-        self._count = surface.slab.nx
-        self._base = surface.heights((0.0, 0.0), surface.slab.empty())
-
-    def at(self, displacement: tuple[float, float]) -> Heights:
-        return Heights(self._base, round(displacement[0] / self._cell) % self._count)
-
-
 class AnyFraction:
     """Any fraction of a cell in any direction: the heights are made anew when the surface has moved."""
 
@@ -54,21 +42,19 @@ class AnyFraction:
         return Heights(self._map)
 
 
-class PartCells:
-    """Sliding along x on a periodic box, not by whole cells at times: one map, made anew when the part of a cell beside
-    the whole ones has changed, and an index offset for these."""
+class AlongX:
+    """Sliding along x on a periodic box, by whole cells or (PARTS) by parts of a cell: one map, made anew when the part
+    of a cell beside the whole ones has changed, and an index offset for these."""
 
-    def __init__(self, surface: Surface) -> None:
-        self._surface = surface
-        self._cell = surface.cell[0]
-        self._part = 0
+    def __init__(self, surface: Surface, parts: int = 1) -> None:
+        self._surface, self._parts, self._part = surface, parts, 0
         self._map = surface.heights((0.0, 0.0), surface.slab.empty())
 
     def at(self, displacement: tuple[float, float]) -> Heights:
-        cells = displacement[0] / self._cell
-        whole, part = divmod(round(cells * PARTS), PARTS)
+        cell = self._surface.cell[0]
+        whole, part = divmod(round(displacement[0] / cell * self._parts), self._parts)
         if part != self._part:
             self._surface.slab.tally["shift"] += 1
-            self._surface.heights((part / PARTS * self._cell, 0.0), self._map)
+            self._surface.heights((part / self._parts * cell, 0.0), self._map)
             self._part = part
         return Heights(self._map, whole % self._surface.slab.nx)

@@ -63,10 +63,10 @@ def _sums(p, u, above, below, along_x, along_y, cyclic):
         row_force, start, end = 0.0, 0, 0
         while end < nx:
             start = end
-            while start < nx and not p[j, start] > 0.0:
+            while start < nx and p[j, start] == 0.0:
                 start += 1
             end = start
-            while end < nx and p[j, end] > 0.0:
+            while end < nx and p[j, end] != 0.0:
                 end += 1
             for i in range(start, end):
                 at = i + WIDTH

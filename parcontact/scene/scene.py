@@ -22,7 +22,7 @@ from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
 from ..physics.layer import Layer
 from ..physics.ledger import Ledger
-from ..physics.motion import AnyFraction, Motion, PartCells, WholeCells
+from ..physics.motion import PARTS, AlongX, AnyFraction, Motion
 from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
@@ -199,8 +199,8 @@ def describe_scene(scene: Scene) -> Iterator[str]:
 def _motion(setup: Setup) -> Motion:
     """Make the motion of the surface."""
     if not setup.choices.part_cells.on:
-        return WholeCells(setup.surface)
-    return PartCells(setup.surface) if setup.choices.slides_along_x else AnyFraction(setup.surface)
+        return AlongX(setup.surface)
+    return AlongX(setup.surface, PARTS) if setup.choices.slides_along_x else AnyFraction(setup.surface)
 
 
 def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) -> tuple[ContactSolver, Operators]:

@@ -15,7 +15,7 @@ from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
 from parcontact.physics.embedded import Embedded
 from parcontact.physics.ledger import Ledger
-from parcontact.physics.motion import WholeCells
+from parcontact.physics.motion import AlongX
 from parcontact.physics.slopes import friction_by_energy
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.contact import ContactSolver
@@ -44,7 +44,7 @@ def lasting(planned: Job) -> Counter[str]:
     """The same for a body with or without memory under stages that last; the surface stands or moves by whole cells."""
     slab = Slab(MPI.COMM_SELF, NX, NY)
     base = scene.set_up(planned, slab)
-    path = WholeCells(base.surface)
+    path = AlongX(base.surface)
     memory = base.prony.moduli.size > 0
     body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
     held, (solver, operators) = body.at_rest(), bare_solver(base)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import Heights
-from parcontact.physics.motion import AnyFraction, PartCells, WholeCells
+from parcontact.physics.motion import PARTS, AlongX, AnyFraction
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface
 
@@ -37,7 +37,7 @@ def test_whole_cells(communicators: list[MPI.Intracomm]) -> None:
     """Any number of them, either way, from one map; equal to the heights made anew."""
     for comm in communicators:
         surface = surface_on(comm)
-        path, exact = WholeCells(surface), AnyFraction(surface)
+        path, exact = AlongX(surface), AnyFraction(surface)
         start = path.at((0.0, 0.0))
         for cells in (0, 1, 5, 16, 17, 40, -3, 17001):
             position = (cells * SIZE[0] / NX, 0.0)
@@ -76,7 +76,7 @@ def test_whole_cells_cost_nothing(comm: MPI.Intracomm) -> None:
     surface = surface_on(comm)
     tally = surface.slab.tally
     before = tally.copy()
-    path = WholeCells(surface)
+    path = AlongX(surface)
     assert tally.since(before)["fft"] == 1
     before = tally.copy()
     for cells in range(5):
@@ -88,7 +88,7 @@ def test_part_of_a_cell(communicators: list[MPI.Intracomm]) -> None:
     """The heights made anew where the surface is, to their rounding and 1e-9 of what a cell changes them by."""
     for comm in communicators:
         surface = surface_on(comm)
-        path, exact = PartCells(surface), AnyFraction(surface)
+        path, exact = AlongX(surface, PARTS), AnyFraction(surface)
         for cells in (0.0, 0.3, 1.0 - 1e-9, 7.5, -3.25, 17.3):
             position = (cells * SIZE[0] / NX, 0.0)
             assert_allclose(whole(path.at(position), surface.slab), whole(exact.at(position), surface.slab), atol=1e-14)
@@ -97,7 +97,7 @@ def test_part_of_a_cell(communicators: list[MPI.Intracomm]) -> None:
 def test_a_very_small_part_of_a_cell(comm: MPI.Intracomm) -> None:
     """Steps of 1e-7 of a cell move the surface by that, to 1 %, which is 1e-9 of a cell: stiff bodies feel them."""
     surface = surface_on(comm)
-    path, exact = PartCells(surface), AnyFraction(surface)
+    path, exact = AlongX(surface, PARTS), AnyFraction(surface)
     start = whole(exact.at((0.0, 0.0)), surface.slab)
     for cells in (1e-7, -1e-7, 6e-7):
         position = (cells * SIZE[0] / NX, 0.0)
@@ -110,7 +110,7 @@ def test_the_same_part_of_a_cell_costs_nothing(comm: MPI.Intracomm) -> None:
     """Whatever the rounding of positions, and to the same digits, whichever of them came first."""
     surface = surface_on(comm)
     tally = surface.slab.tally
-    path, other = PartCells(surface), PartCells(surface)
+    path, other = AlongX(surface, PARTS), AlongX(surface, PARTS)
     positions = [(cells + 0.7) * (SIZE[0] / NX) * (1.0 + n * 2e-16) for n, cells in enumerate((2, 3, 5, 1000))]
     first = path.at((positions[0], 0.0))
     before = tally.copy()
