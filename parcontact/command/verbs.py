@@ -275,10 +275,10 @@ def schema(options: argparse.Namespace) -> int:
     import json
     import sys
 
-    from ..job import extension
+    from ..job import added_sections
     from ..job import schema as job_schema
 
-    for text in extension.unusable():
+    for text in added_sections.unusable():
         print(f"warning: {text}; the schema is without it", file=sys.stderr)
     print(json.dumps(job_schema.schema(), indent=1))
     return DONE

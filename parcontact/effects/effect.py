@@ -1,7 +1,7 @@
 """The interface of effects: a decision from the job alone, and what is made, remembered and written where it is on.
 
-An effect that follows the steps is one class, found by the section that it adds to a job (`job.extension`): no other
-file knows it. One that takes the place of a part (another body, operator or path) has its decision in
+An effect that follows the steps is one class, found by the section that it adds to a job (`job.added_sections`): no
+other file knows it. One that takes the place of a part (another body, operator or path) has its decision in
 `scene/choices.py`, and `scene/scene.py` makes it where it makes that part.
 """
 

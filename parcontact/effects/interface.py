@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike
 from pydantic import Field
 
 from ..job.sections.part import Part, Rule
-from ..job.sections.values import Positive
+from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..physics.entries import Entry
 from ..physics.interface import InterfaceFriction

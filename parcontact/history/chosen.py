@@ -12,8 +12,8 @@ from itertools import islice
 from typing import Any, NamedTuple, Protocol
 
 from ..job.checks.limits import one_cell
+from ..job.sections.calculation import Grid, Numerics
 from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
-from ..job.sections.settings import Grid, Numerics
 from ..job.sections.stages import Initial, Stage
 
 SAME_TIME = 1e-9  # accuracy: a duration this close, relatively, to a whole number of steps is one

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ..job.checks.limits import first_step
-from ..job.sections.settings import Grid
+from ..job.sections.calculation import Grid
 from ..job.sections.stages import AUTO, GeometricStep, Stage
 from .chosen import RAMP_STEPS, SAME_TIME, reached
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import takewhile
 from typing import NamedTuple
 
-from ..job.sections.settings import Grid
+from ..job.sections.calculation import Grid
 from ..job.sections.stages import GeometricStep, Ramp, Stage
 from .chosen import ChosenEnds, ChosenSteps, MadeStep, Planned, reached
 from .given import GivenEnds, divide

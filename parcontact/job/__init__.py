@@ -3,6 +3,7 @@
 from ..errors import JobError
 from .model import Job, describe
 from .reading import Case, choose, load, load_cases
+from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import (
     Cylinder,
     Flat,
@@ -18,9 +19,8 @@ from .sections.geometry import (
 from .sections.height_arrays import HeightArray
 from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .sections.part import Part
-from .sections.settings import Body, Checkpoint, Grid, Numerics, Output, Study
+from .sections.quantities import Positive, log_range
 from .sections.stages import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
-from .sections.values import Positive, log_range
 
 __all__ = [
     "AUTO",

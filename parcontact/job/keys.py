@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from . import extension
+from . import added_sections
 from .model import Job
 from .schema import SchemaOfKeys
 from .sections.part import Part, kind_key, literal_words
@@ -47,7 +47,7 @@ def sections() -> list[Section]:
     found: dict[type[Part], Section] = {Job: Section("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)
-    for name, effect in extension.effects_of(extension.OURS).items():
+    for name, effect in added_sections.effects_of(added_sections.OURS).items():
         _collect(name, effect.section, found)
     return list(found.values())
 

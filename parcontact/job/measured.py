@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from .sections.geometry import Topography
 from .sections.part import Origin
-from .sections.values import FROM_SURFACE
+from .sections.quantities import FROM_SURFACE
 from .text.places import UNREADABLE, Source
 from .text.python_data import is_array
 

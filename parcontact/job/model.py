@@ -14,13 +14,13 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from . import extension
+from . import added_sections
 from .checks import advice, limits, meaning, size
 from .sections import height_arrays, listing
+from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
 from .sections.materials import Dma, Elastic, Material, Zener, heated
 from .sections.part import Origin, Part, Rule
-from .sections.settings import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.stages import Initial, Stage, Steady
 from .text.overrides import Included
 from .text.python_data import is_array
@@ -78,7 +78,7 @@ class Job(Part):
         """Let a model that knows the sections of effects read a job that has such sections."""
         if cls is Job and isinstance(data, dict):
             others = [key for key, value in data.items() if key not in cls.model_fields and value is not None]
-            if added := extension.effects_of(others):
+            if added := added_sections.effects_of(others):
                 return extended(tuple(sorted(added))).model_validate(data, context=info.context)
         return handler(data)
 
@@ -166,7 +166,7 @@ SEPARATOR = ":"  # of sections in the name of an extended job, by which other ra
 @cache
 def extended(sections: tuple[str, ...]) -> type[Job]:
     """Return the model of a job that may have these sections of effects too."""
-    effects = extension.effects_of(sections)
+    effects = added_sections.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))
         for name, effect in effects.items()

@@ -11,11 +11,11 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core.core_schema import BeforeValidatorFunctionSchema, ComputedField, ModelField, TypedDictField
 
-from . import extension
+from . import added_sections
 from .model import extended
 from .sections.materials import Dma, Elastic, Zener
+from .sections.quantities import FROM_SURFACE, along_x, both, listed
 from .sections.stages import numbers
-from .sections.values import FROM_SURFACE, along_x, both, listed
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -43,7 +43,7 @@ class SchemaOfKeys(GenerateJsonSchema):
 
 def schema() -> Schema:
     """Return the schema of a whole job, with the sections of all effects that are installed."""
-    kind = extended(tuple(extension.find_effects()))
+    kind = extended(tuple(added_sections.find_effects()))
     found = kind.model_json_schema(schema_generator=SchemaOfKeys)
     properties = found["properties"]
     properties["material"] = {"anyOf": [_included(found["$defs"]), properties["material"]]}

@@ -22,8 +22,8 @@ from ..history.chosen import ChosenEnds
 from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
 from ..job.checks.advice import STEPS_PER_WAVE, cells_per_wave
+from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.sections.listing import plain
-from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
 from ..physics.budget import SPOTS_ORDER, per_cent
 from ..physics.time_error import TIME_ORDER
 from .costs import Costs

@@ -11,7 +11,7 @@ from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
-from ..job.sections.settings import BRANCH_SHARE, TOLERANCE_SHARE
+from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March

@@ -17,7 +17,7 @@ from ..effects.interface import interface_of
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
-from ..job import Grid, Job, Numerics, Output, Spectral, extension
+from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..physics.folding import FoldedBranches, fold_branches, keep_all
 from ..physics.interface import InterfaceFriction
 from ..physics.prony import Prony
@@ -58,12 +58,12 @@ class Choices:
     def effects(self) -> list[Decision]:
         """Every effect that there is, on or off, and why."""
         own = [getattr(self, name) for name, part in vars(Choices).items() if isinstance(part, Decided)]
-        return own + [effect.decide(self.job) for effect in extension.find_effects().values()]
+        return own + [effect.decide(self.job) for effect in added_sections.find_effects().values()]
 
     @cached_property
     def followers(self) -> dict[str, type[Effect]]:
         """The effects that the job's further sections ask for, by their names in checkpoints."""
-        found = extension.effects_of(type(self.job).model_fields).values()
+        found = added_sections.effects_of(type(self.job).model_fields).values()
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}
 
     # -- the body -----------------------------------------------------------------------------------------------------

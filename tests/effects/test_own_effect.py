@@ -19,7 +19,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact import __main__, job, scene
-from parcontact.job import Job, JobError, extension, model
+from parcontact.job import Job, JobError, added_sections, model
 from parcontact.manual import texts
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
@@ -43,7 +43,7 @@ WEAR = {**DATA, "wear": {"coefficient": COEFFICIENT}}
 
 def forget() -> None:
     """What was found before is looked for anew."""
-    for found in (extension._registered, extension._load, extension.why_unusable, model.extended):
+    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
         found.cache_clear()
     sys.modules.pop("tread_wear", None)
 

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from conftest import WORLD, Main
 
-from parcontact.job import extension, model
+from parcontact.job import added_sections, model
 from parcontact.manual import texts
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
@@ -39,7 +39,7 @@ CHANGES = {
 
 
 def forget() -> None:
-    for found in (extension._registered, extension._load, extension.why_unusable, model.extended):
+    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
         found.cache_clear()
     sys.modules.pop("tread_wear", None)
 

@@ -9,9 +9,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ..sections.calculation import Grid, Numerics
 from ..sections.geometry import Rough
 from ..sections.materials import Elastic, Zener
-from ..sections.settings import Grid, Numerics
 from ..sections.stages import AUTO, GeometricStep, Stage
 
 LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ..sections.calculation import Body, Grid, Numerics, Output
 from ..sections.geometry import OnOneMesh, Rough
 from ..sections.height_arrays import HeightArray
 from ..sections.materials import AnyMaterial
-from ..sections.settings import Body, Grid, Numerics, Output
 from ..sections.stages import AUTO, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
 from .advice import SAME_LENGTH

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
+from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
-from ..sections.settings import Grid
 from ..sections.stages import Initial, Stage, Steady
 
 STEEP = 0.5  # physics: rms slope; some tenths are small

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..sections.settings import Grid, Output
+from ..sections.calculation import Grid, Output
 
 MAPS, MAPS_FREE = 9.0, 18.0  # tuning: of 8 bytes per point, which any run holds; free ones have padded transforms
 MOST_INSTANTS = 10**6  # tuning: of fields in one file; each has its place in it from the start

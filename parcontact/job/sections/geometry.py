@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 from ..text.fault import Fault, refuse
 from .height_arrays import HeightArray
 from .part import Part, Rule, chosen, existing_file
-from .values import Flag, Number, Positive, Real, Seed, Whole
+from .quantities import Flag, Number, Positive, Real, Seed, Whole
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]

@@ -13,8 +13,8 @@ from ...errors import InputError
 from ...rubber import compound
 from ..text.fault import Fault, quote, refuse
 from .part import Part, Rule, chosen, existing_file
+from .quantities import NonNegative, Number, Positive
 from .temperature import Celsius, Shift, shifted
-from .values import NonNegative, Number, Positive
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
 Hardness = Annotated[Positive | None, Field(description="a positive pressure [Pa] at which the counterbody yields")]

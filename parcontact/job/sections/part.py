@@ -27,7 +27,7 @@ from pydantic_core import CoreSchema, ErrorDetails
 
 from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse, shorten
 from ..text.overrides import Included
-from .values import from_home
+from .quantities import from_home
 
 
 class Origin(NamedTuple):

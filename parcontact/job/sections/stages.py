@@ -11,8 +11,8 @@ from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, Valida
 
 from ..text.fault import Fault, quote, refuse
 from .part import Origin, Part, Rule
+from .quantities import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 from .temperature import Celsius
-from .values import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 
 Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
 Control = Literal["pressure", "force", "approach"]

@@ -13,7 +13,7 @@ from ...rubber.shift import WLF, Arrhenius, Factors
 from ...rubber.shift import Shift as Law
 from ..text.fault import Fault
 from .part import Part, Rule, chosen
-from .values import Positive, Real
+from .quantities import Positive, Real
 
 LOWEST, HIGHEST = -273.15, 5000.0  # deg C
 LARGEST_SHIFT = 60.0  # log10 of a_T, either way: relaxation times remain numbers that can be computed with

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from ..sections.values import log_range
+from ..sections.quantities import log_range
 from .fault import quote, shorten
 from .places import Key, Place, Source
 

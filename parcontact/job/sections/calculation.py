@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..text.fault import Fault
 from .part import Origin, Part, Rule
-from .values import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, Whole, both, from_home, listed
+from .quantities import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, Whole, both, from_home, listed
 
 Integrator = Literal["exponential", "backward-euler"]
 Kernel = Literal["spectral", "love"]
