@@ -15,7 +15,7 @@ from ..history.timeline import Step
 from ..job import Cylinder, Flat, Rough, Wave
 from ..physics.body import BodyMemory, Trial, surface_of
 from ..physics.budget import ErrorBudget, estimate
-from ..physics.embedded import Embedded, IntegratorDifference
+from ..physics.embedded import EmbeddedPair, IntegratorDifference
 from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
@@ -144,14 +144,14 @@ def _look(scene: Scene, observations: Observations, solved: Solved) -> tuple[Obs
     branches = scene.material.branched
     if branches is None:
         return observations, NO_DIFFERENCE
-    pair = Embedded(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
+    pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if measures.contact_area == 0.0:
-        free = pair.look_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
+        free = pair.compare_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
         return replace(observations, pair=LastObservation()), free
     last = observations.pair.once_more(step, ALIKE_STEPS)
     if last is None:
         load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
-        look = pair.look(step.dt, trial, solved.body, contact.p, contact.u, load, measures.contact_area)
+        look = pair.compare(step.dt, trial, solved.body, contact.p, contact.u, load, measures.contact_area)
         last = LastObservation.of(step, *astuple(look))
     return replace(observations, pair=last), IntegratorDifference(*last.observed)
 

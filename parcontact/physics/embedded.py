@@ -38,13 +38,13 @@ class IntegratorDifference:
     angle: float = 0.0
 
 
-class Embedded:
+class EmbeddedPair:
     """Observations at the steps of a relaxing body on cells of length `dx`; allocates nothing."""
 
     def __init__(self, slab: Slab, material: ZenerBody, dx: float) -> None:
         self.slab, self.material, self.dx = slab, material, dx
 
-    def look(
+    def compare(
         self,
         dt: float,
         trial: Trial,
@@ -54,8 +54,9 @@ class Embedded:
         load: float,
         share: float,
     ) -> IntegratorDifference:
-        """Look at a step, with the `memory` of the body after it: the solver's pressure, whose sum over all ranks is
-        `load`, on a `share` of the points, and displacement, `A p/alpha`; one message, or two; collective."""
+        """Compare the integrators in a step, with the `memory` of the body after it: the solver's pressure, whose sum
+        over all ranks is `load`, on a `share` of the points, and displacement, `A p/alpha`; one message, or two;
+        collective."""
         seen, *sums = self._add(dt, trial, memory, pressure, displacement, self.stride(share))
         if abs(self.stride(share) * seen - load) > MISSED * load:
             seen, *sums = self._add(dt, trial, memory, pressure, displacement, 1)
@@ -67,9 +68,9 @@ class Embedded:
         angle = math.sqrt(turned / seen / variance) if variance > LEAST_VARIANCE * square / seen else 0.0
         return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, slope, self._order(dt), angle)
 
-    def look_without_load(self, dt: float, trial: Trial, memory: BodyMemory) -> IntegratorDifference:
-        """Look at a step in which nothing presses, with the `memory` of the body after it: the difference over the
-        displacement, both as rms; collective."""
+    def compare_without_load(self, dt: float, trial: Trial, memory: BodyMemory) -> IntegratorDifference:
+        """Compare the integrators in a step in which nothing presses, with the `memory` of the body after it: the
+        difference over the displacement, both as rms; collective."""
         u = surface_of(memory)
         _, apart, size, *_ = self._add(dt, trial, memory, np.ones_like(u), u, self.stride(1.0))
         return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._order(dt))

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, ZenerBody
-from parcontact.physics.embedded import SAMPLED_ROWS, Embedded
+from parcontact.physics.embedded import SAMPLED_ROWS, EmbeddedPair
 from parcontact.physics.prony import Prony
 
 from .held import HeldBody
@@ -16,19 +16,19 @@ PRONY = Prony(0.5, np.array([2.0, 1.0, 4.0]), np.array([1e-3, 1e-1, 3.0]))
 DX = 0.25
 
 
-def march(comm: MPI.Intracomm, name: str, nx: int, ny: int, dt: float) -> tuple[Embedded, list[np.ndarray], float]:
+def march(comm: MPI.Intracomm, name: str, nx: int, ny: int, dt: float) -> tuple[EmbeddedPair, list[np.ndarray], float]:
     """Two steps of a body under displacements that are given; the look at the second, and its maps on all rows."""
     slab = Slab(comm, nx, ny)
     body = HeldBody(ZenerBody(slab, PRONY, name))
     dice = np.random.default_rng(3)
     heights, first, second, p = (dice.normal(size=(ny, nx))[slab.rows] for _ in range(4))
-    pair = Embedded(slab, body.body, DX)
+    pair = EmbeddedPair(slab, body.body, DX)
     for u, step in ((first, 2e-3), (second, dt)):
         trial = body.begin(step, Heights(heights, 2))
         displacement = u + trial.effective - np.roll(heights, 2, axis=1)  # so that u is the new displacement
         body.commit(trial, displacement)
     pressure = np.maximum(p, 0.0)
-    look = pair.look(dt, trial, body.memory, pressure, displacement, slab.sum(float(pressure.sum()))[0], 1.0)
+    look = pair.compare(dt, trial, body.memory, pressure, displacement, slab.sum(float(pressure.sum()))[0], 1.0)
     found = [body.u.copy(), pressure, displacement * trial.alpha, np.roll(heights, 2, axis=1)]
     return pair, [*found, np.array([look.difference, look.slope, look.angle])], trial.alpha
 
@@ -80,7 +80,7 @@ def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
     for comm in communicators:
         assert_allclose(march(comm, "exponential", 8, 200, 1e-2)[1][4], whole, rtol=1e-12)
     for ny in (1, 31, 64, 200, 1024, 4096):
-        pair = Embedded(Slab(MPI.COMM_SELF, 4, ny), ZenerBody(Slab(MPI.COMM_SELF, 1, 1), PRONY, "exponential"), DX)
+        pair = EmbeddedPair(Slab(MPI.COMM_SELF, 4, ny), ZenerBody(Slab(MPI.COMM_SELF, 1, 1), PRONY, "exponential"), DX)
         assert len(range(0, ny, pair.stride(1.0))) <= 2 * SAMPLED_ROWS
         assert len(range(0, ny, pair.stride(1.0))) >= min(ny, SAMPLED_ROWS)
         assert len(range(0, ny, pair.stride(0.01))) >= min(ny, 10 * SAMPLED_ROWS)
@@ -92,7 +92,7 @@ def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None
     """Pressure on a single row of 200: all ranks see what is on it, and find the same as if that was all the map."""
     slab = Slab(comm, 8, 200)
     body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
-    pair = Embedded(slab, body.body, DX)
+    pair = EmbeddedPair(slab, body.body, DX)
     pressure = slab.zeros()
     if row in range(*slab.rows.indices(200)):
         pressure[row - slab.rows.start] = 1.0
@@ -104,10 +104,12 @@ def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None
     alone = HeldBody(ZenerBody(line, PRONY, "exponential"))
     one = alone.begin(1e-2, Heights(np.zeros((1, 8))))
     alone.commit(one, np.ones((1, 8)))
-    expected = Embedded(line, alone.body, DX).look(1e-2, one, alone.memory, np.ones((1, 8)), np.ones((1, 8)), 8.0, 1.0)
+    expected = EmbeddedPair(line, alone.body, DX).compare(
+        1e-2, one, alone.memory, np.ones((1, 8)), np.ones((1, 8)), 8.0, 1.0
+    )
     assert expected.difference > 0.0
     assert_allclose(
-        pair.look(1e-2, trial, body.memory, pressure, displacement, 8.0, 1.0).difference,
+        pair.compare(1e-2, trial, body.memory, pressure, displacement, 8.0, 1.0).difference,
         expected.difference,
         rtol=1e-12,
     )
@@ -117,11 +119,11 @@ def test_nothing_pressed_and_jumps() -> None:
     """No pressure: no difference. A jump relaxes nothing, in either integrator."""
     slab = Slab(MPI.COMM_SELF, 4, 4)
     body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
-    pair = Embedded(slab, body.body, DX)
+    pair = EmbeddedPair(slab, body.body, DX)
     trial = body.begin(0.0, Heights(slab.zeros()))
     body.commit(trial, np.ones((4, 4)))
-    assert pair.look(0.0, trial, body.memory, np.ones((4, 4)), np.ones((4, 4)), 16.0, 1.0).difference == 0.0
-    assert pair.look(1.0, trial, body.memory, np.zeros((4, 4)), np.ones((4, 4)), 0.0, 0.0).difference == 0.0
+    assert pair.compare(0.0, trial, body.memory, np.ones((4, 4)), np.ones((4, 4)), 16.0, 1.0).difference == 0.0
+    assert pair.compare(1.0, trial, body.memory, np.zeros((4, 4)), np.ones((4, 4)), 0.0, 0.0).difference == 0.0
 
 
 def test_second_order_of_a_step() -> None:
@@ -130,11 +132,11 @@ def test_second_order_of_a_step() -> None:
     found = []
     for count in (64, 128):
         body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
-        pair, dt = Embedded(slab, body.body, DX), 1e-3 / count
+        pair, dt = EmbeddedPair(slab, body.body, DX), 1e-3 / count
         for step in range(1, count + 1):
             trial = body.begin(dt, Heights(slab.zeros()))
             body.commit(trial, np.sin(3e3 * step * dt) + trial.effective)
-        found.append(pair.look(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0).difference)
+        found.append(pair.compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0).difference)
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
 
 
@@ -149,5 +151,5 @@ def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: flo
     body = HeldBody(ZenerBody(slab, prony, "exponential"))
     trial = body.begin(dt, Heights(slab.zeros()))
     body.commit(trial, np.ones((1, 4)))
-    look = Embedded(slab, body.body, DX).look(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
+    look = EmbeddedPair(slab, body.body, DX).compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
     assert look.order == pytest.approx(order, rel=1e-5)

@@ -13,7 +13,7 @@ from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
-from parcontact.physics.embedded import Embedded
+from parcontact.physics.embedded import EmbeddedPair
 from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import AlongX
 from parcontact.physics.slopes import friction_by_energy
@@ -65,8 +65,8 @@ def lasting(planned: Job) -> Counter[str]:
         if isinstance(body, ZenerBody) and step.dt != dt:
             # The error budget looks at what the other integrator would have done, once for some steps that are alike.
             load, dt = found.pressure * slab.points / (alpha * base.units.pressure), step.dt
-            pair = Embedded(slab, body, base.job.grid.dx / base.units.length)
-            pair.look(step.dt, trial, held, contact.p, contact.u, load, found.contact_area)
+            pair = EmbeddedPair(slab, body, base.job.grid.dx / base.units.length)
+            pair.compare(step.dt, trial, held, contact.p, contact.u, load, found.contact_area)
             friction_by_energy(slab, contact.p, contact.u, (1.0, 1.0), (1.0, 0.0), True)  # as often
         earlier, last, p = last, p, earlier
     return slab.tally.copy()
