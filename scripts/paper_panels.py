@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import Job
 from parcontact.plotting import style
-from parcontact.storage import measures
+from parcontact.storage import tables
 from parcontact.summary import sweep_table, theory_settings
 
 QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
@@ -30,7 +30,7 @@ def there(path: Path) -> Path:
 
 
 def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray]:
-    return {key: np.array(values) for key, values in measures.read(there(directory / name)).items()}
+    return {key: np.array(values) for key, values in tables.read(there(directory / name)).items()}
 
 
 def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..parallel.slab import Array
-from ..storage import measures
+from ..storage import tables
 from ..storage.row import UNITS
 from . import style, units
 from .charts import Axis, Chart, Series
@@ -61,7 +61,7 @@ def _beside_theory(chart: Chart, run: Run) -> Chart:
     table = run.directory / "theory.csv"
     if column is None or run.backwards or not table.is_file():
         return chart
-    theory = {name: np.array(values) for name, values in measures.read(table).items()}
+    theory = {name: np.array(values) for name, values in tables.read(table).items()}
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
     lines = [replace(own, name="simulation"), Series("theory", theory[over], theory[column], style.line(1))]

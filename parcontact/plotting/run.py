@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..storage import measures
+from ..storage import tables
 from . import units
 from .charts import FRACTION, Axis
 
@@ -138,7 +138,7 @@ def frame_labels(run: Run, file: h5py.File) -> dict[int, str]:
 
 def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """Return columns of a table by name; raises InputError where one of those that are needed is missing."""
-    columns = {name: np.array(values, dtype=float) for name, values in measures.read(path).items()}
+    columns = {name: np.array(values, dtype=float) for name, values in tables.read(path).items()}
     if missing := [name for name in names if name not in columns]:
         raise InputError(f"{path} has no column {', '.join(missing)}")
     return columns

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from ..storage import fields, hdf5, measures, row
+from ..storage import fields, hdf5, row, tables
 from .jobs import path_of
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     path = path_of(directory)
     if not (path / "measures.csv").is_file():
         raise InputError(f"{path} holds no measures.csv: it is no output directory of a run")
-    columns = measures.read(path / "measures.csv")
+    columns = tables.read(path / "measures.csv")
     steps, times = np.array(columns["step"], dtype=int), columns["time"]
     found: dict[str, Any] = {name: ("step", values, _units(name)) for name, values in columns.items()}
     del found["step"], found["time"]

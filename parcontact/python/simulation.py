@@ -24,7 +24,7 @@ from ..run import restart, runner
 from ..run.run import Options
 from ..scene import choices
 from ..steady_sliding import start
-from ..storage import checkpoint, heights, measures, wisdom
+from ..storage import checkpoint, heights, tables, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.fields import UNITS
 from .jobs import Given, agree, all_ranks, path_of, read, warn_of
@@ -154,7 +154,7 @@ class Simulation:
         file, march, slab = path_of(path), self._march, self._slab
         self._wait_for_all(f"saves {file}")
         plain = on_root(self.comm, lambda: identity.plain_job(self.job))
-        last = ",".join(measures.texts(self.row.values()))
+        last = ",".join(tables.texts(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
         heights.store(self.job.surface, file.parent, slab)
         march.save(file, Facts(plain, provenance, table=Table(last=last)))

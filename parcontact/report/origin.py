@@ -7,14 +7,15 @@ from pathlib import Path
 
 import h5py
 
-from ..storage import hdf5, measures, provenance
+from ..storage import hdf5, provenance
+from ..storage.tables import read as read_table
 from . import budget, log
 from .parts import Section, Table
 
 
 def costs(table: Path, found: log.Log, accuracy: float) -> Iterator[Section]:
     """Yield the errors of a run or a curve, given by its table, then wall time, operator calls and what was counted."""
-    columns = measures.read(table)
+    columns = read_table(table)
     yield budget.section(columns, found.estimates, accuracy, table.name == "steady.csv")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [

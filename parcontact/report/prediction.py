@@ -20,7 +20,7 @@ from ..physics.layer import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
 from ..steady_sliding.curve import Request
-from ..storage import files, hdf5, measures
+from ..storage import files, hdf5, tables
 from ..summary import theory_settings
 from ..summary.theory_settings import TheorySettings
 from ..theory import full_contact, persson, persson_rings
@@ -63,7 +63,7 @@ def _times_of_run(job: Job) -> dict[int, float]:
     path = job.output.directory / "measures.csv"
     if not Timeline.of(job).chooses or not path.is_file():
         return {}
-    columns = measures.read(path)
+    columns = tables.read(path)
     return dict(zip(map(int, columns["step"]), columns["time"], strict=True))
 
 

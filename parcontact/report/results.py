@@ -15,7 +15,7 @@ from .. import progress
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import spread
 from ..plotting.run import Run, box, frame_labels, load_of
-from ..storage import hdf5, measures
+from ..storage import hdf5, tables
 from ..storage.row import UNITS
 from ..summary import slide, sweep_table, theory_settings
 from .parts import RC, Browser, Section, Table, of_chart, uri_of
@@ -37,7 +37,7 @@ MAP_SIZE = (4.2, 3.5)  # [inch]
 
 def of_run(directory: Path) -> Section:
     """Return histories, the largest and last values, and the maps over time."""
-    run, columns = Run(directory), measures.read(directory / "measures.csv")
+    run, columns = Run(directory), tables.read(directory / "measures.csv")
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
         (_words(name), *map(cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
@@ -55,7 +55,7 @@ def of_run(directory: Path) -> Section:
 
 def of_curve(directory: Path) -> Section:
     """Return the points of a friction curve, and their maps."""
-    columns = measures.read(directory / "steady.csv")
+    columns = tables.read(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     known = {**UNITS, "velocity": "m/s", "temperature": "°C"}
     head = [f"{_words(name)} [{known[name]}]" if name in known else _words(name) for name in names]

@@ -24,7 +24,7 @@ from ..job import Job, Rough
 from ..job.sections.listing import plain
 from ..parallel.slab import Slab
 from ..physics.budget import ErrorBudget, compared_with_half_mesh
-from ..storage import measures
+from ..storage import tables
 from ..storage.row import Row
 
 DIRECTORY = "half_mesh"  # below that of the run
@@ -66,7 +66,7 @@ class HalfMesh:
     @classmethod
     def read(cls, job: Job, slab: Slab) -> "HalfMesh":
         """From the table that it has left; collective. Raises InputError where that cannot be read."""
-        found = measures.read(job.output.directory / "measures.csv") if slab.root else {}
+        found = tables.read(job.output.directory / "measures.csv") if slab.root else {}
         times, friction, area, errors = slab.agree([found.get(name, []) for name in COLUMNS])
         waves = any(isinstance(shape, Rough) for shape in job.surface)
         return cls(times, friction, area, waves, errors if Timeline.of(job).chooses else ())

@@ -16,7 +16,7 @@ from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
 from ..scene import sanity
-from ..storage import measures
+from ..storage import tables
 from ..storage.checkpoint import Contents, Facts
 from ..storage.console import always
 from ..storage.directory import Directory
@@ -210,7 +210,7 @@ class Run:
             return STOPPED_EARLY
         if self.slab.root and slides:
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
-                rows = measures.read(self.directory.path / "measures.csv")
+                rows = tables.read(self.directory.path / "measures.csv")
                 for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
                     console.say(text)
         finished = row.step >= len(self.timeline)

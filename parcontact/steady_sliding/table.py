@@ -9,10 +9,10 @@ from .. import progress
 from ..effects.interface import InterfaceColumns
 from ..job.checks.advice import describe_sample
 from ..physics.budget import advice, describe
-from ..storage import curve_points, files, measures
+from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
-from ..storage.files import GrowingTable
+from ..storage.tables import GrowingTable
 from .sliding import Point, SteadySliding
 
 COLUMNS = (
@@ -47,7 +47,7 @@ class CurveTable:
         """The points that are there; a line that was not finished is removed."""
         if not self.path.exists():
             return []
-        columns = measures.read(self.path)
+        columns = tables.read(self.path)
         if list(columns) != self._names:
             files.put_aside(self.path)
             return []
@@ -116,7 +116,7 @@ class CurveTable:
 
     def _sort(self) -> None:
         """Sort the lines by temperature, then by pressure, then by speed."""
-        columns = measures.read(self.path)
+        columns = tables.read(self.path)
         head, *lines = self.path.read_text().splitlines()
         degrees = columns["temperature"] if self.heated else [0.0] * len(lines)
         points = zip(degrees, columns["pressure"], columns["velocity"], strict=True)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, RunError
 from ..parallel.slab import Array, Slab
 from ..physics.entries import Entry
-from . import files, hdf5, layout
+from . import files, hdf5
 from .provenance import Link, Provenance, read_chain
 
 FORMAT = 1
@@ -93,21 +93,21 @@ def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in
     def build(file: h5py.File) -> None:
         facts.write(file)
         for name, rows in maps.items():
-            layout.fixed(file, name, (slab.ny, slab.nx), rows.dtype)
+            hdf5.fixed(file, name, (slab.ny, slab.nx), rows.dtype)
         for name, entry in entries.items():
             if name in maps:
-                layout.fixed(file, f"{SUMS}/{name}", (slab.ny,), np.uint32)
+                hdf5.fixed(file, f"{SUMS}/{name}", (slab.ny,), np.uint32)
             else:
                 file[name] = entry.value
             file[name].attrs["unit"], file[name].attrs["symbol"] = entry.unit, entry.symbol
 
     def finish() -> None:
-        layout.put(part, {f"{SUMS}/{name}": np.concatenate([sums[name] for sums in everyone]) for name in maps})
+        hdf5.put(part, {f"{SUMS}/{name}": np.concatenate([sums[name] for sums in everyone]) for name in maps})
         _seal(part)
 
     try:
         size = sum(rows.itemsize for rows in maps.values()) * slab.nx * slab.ny
-        layout.lay_out(part, slab, build, size, SEAL)
+        hdf5.lay_out(part, slab, build, size, SEAL)
         hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()], in_turn)
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.on_root(slab, finish, f"cannot write {part}")
@@ -154,7 +154,7 @@ def is_one(path: Path) -> bool:
 
 def _seal(path: Path) -> None:
     with h5py.File(path, "r") as hdf:
-        regions = layout.regions(hdf)
+        regions = hdf5.regions(hdf)
     with path.open("r+b") as file:
         size = file.seek(0, os.SEEK_END)
         facts = {"bytes": size, "maps": regions, "checksum": _outside(file, size, regions)}
@@ -184,7 +184,7 @@ def _broken(path: Path) -> str:
 def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> int:
     """CRC-32 of all bytes that are neither in the seal nor in a map."""
     total = 0
-    for start, stop in layout.outside(size, regions, SEAL):
+    for start, stop in hdf5.outside(size, regions, SEAL):
         total = zlib.crc32(os.pread(file.fileno(), stop - start, start), total)
     return total
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from . import files, hdf5, layout
+from . import files, hdf5
 from .provenance import Provenance
 
 UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m"}
@@ -63,7 +63,7 @@ class FieldsFile:
         self.steps = {n: i for i, n in enumerate(sorted({*kept, *(n for n in self.steps if n >= step)}))}
         self._kept = frozenset(kept)
         if found and found.steps == tuple(self.steps) and set(found.names) == set(self.names):
-            layout.change(self.path, self.slab, provenance.renew)
+            hdf5.change(self.path, self.slab, provenance.renew)
             self._stamp(self.path, slice(len(kept), None), np.nan)
             self._draw()
         else:
@@ -77,7 +77,7 @@ class FieldsFile:
     def renew(self, provenance: Provenance) -> None:
         """Put what has changed of its origin into the file."""
         self.provenance = provenance
-        layout.change(self.path, self.slab, provenance.renew)
+        hdf5.change(self.path, self.slab, provenance.renew)
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
         """Put the maps of one instant into their place."""
@@ -100,17 +100,17 @@ class FieldsFile:
     def _build(self, file: h5py.File) -> None:
         file.attrs["kind"] = KIND
         self.provenance.write(file)
-        layout.add_coordinate(file, "t", np.full(len(self.steps), np.nan), "s")
-        step = layout.fixed(file, "step", (len(self.steps),), np.int64)
+        hdf5.add_coordinate(file, "t", np.full(len(self.steps), np.nan), "s")
+        step = hdf5.fixed(file, "step", (len(self.steps),), np.int64)
         step[...] = list(self.steps)
         step.dims[0].attach_scale(file["t"])
-        layout.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, "t")
+        hdf5.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, "t")
 
     def _replace(self, found: "SavedFields | None", kept: Sequence[int] = ()) -> None:
         """Lay a new file out, and copy the maps of the steps that are `kept`; one that was not saved then is NaN."""
         new = self.slab.agree(files.unused(self.path))
-        size = len(self.steps) * len(self.names) * self.slab.nx * self.slab.ny * layout.DOUBLE
-        layout.lay_out(new, self.slab, self._build, size)
+        size = len(self.steps) * len(self.names) * self.slab.nx * self.slab.ny * hdf5.DOUBLE
+        hdf5.lay_out(new, self.slab, self._build, size)
         if found:
             self._copy(found, kept, new)
         hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
@@ -133,7 +133,7 @@ class FieldsFile:
             with h5py.File(path, "r", locking=False) as file:  # the output directory is ours
                 times = file["t"][...]
             times[index] = time
-            layout.put(path, {"t": times})
+            hdf5.put(path, {"t": times})
 
         hdf5.on_root(self.slab, stamp, f"cannot write {path}")
 
@@ -162,7 +162,7 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
 
     def take_back() -> None:
         if found is not None:
-            layout.put(path, {"t": np.where(np.array(found.steps) > step, np.nan, found.times)})
+            hdf5.put(path, {"t": np.where(np.array(found.steps) > step, np.nan, found.times)})
 
     hdf5.on_root(slab, take_back, f"cannot write {path}")
     return problem

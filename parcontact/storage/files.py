@@ -3,7 +3,7 @@
 import os
 import secrets
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -66,34 +66,3 @@ def put_aside(path: Path) -> Path | None:
         target = path.with_name(f"{path.name}.aside-{number}")
     path.rename(target)
     return target
-
-
-class GrowingTable:
-    """A csv table that grows line by line while others read it; a last line without a newline is not finished."""
-
-    def __init__(self, path: Path, names: Sequence[str]) -> None:
-        """Continue the file, or begin it with the names of the columns; raises OSError."""
-        self.path = path
-        self._file = path.open("ab", buffering=0)
-        if self._file.tell() == 0:
-            self.append(names)
-
-    def append(self, cells: Sequence[str]) -> None:
-        """Add a line; on an error the file is as it was before."""
-        rest, size = memoryview(f"{','.join(cells)}\n".encode()), self._file.tell()
-        try:
-            while rest:
-                rest = rest[self._file.write(rest) :]
-        except OSError:
-            with suppress(OSError):
-                self._file.truncate(size)
-            raise
-
-    def sync(self) -> None:
-        """Wait until all lines are on the disk."""
-        os.fsync(self._file.fileno())
-
-    def close(self) -> None:
-        """Close the file, whose lines have all been written; raises nothing."""
-        with suppress(OSError):
-            self._file.close()

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 from ..errors import InputError, RunError
 from ..parallel.slab import Array
-from . import fields, hdf5, measures
+from . import fields, hdf5
 from .checkpoint import Contents, Table
 from .console import Console
 from .directory import Directory
 from .fields import FieldsFile
-from .measures import MeasuresFile
 from .provenance import Provenance
-from .row import Row
+from .row import MeasuresFile, Row, cut_back_table
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Recorder:
         def cut_back() -> None:
             nonlocal kept
             if saved is not None:
-                kept, lost = measures.cut_back(table, saved.step, saved.table, *columns)
+                kept, lost = cut_back_table(table, saved.step, saved.table, *columns)
                 self.warnings += lost
 
         def begin_log() -> None:

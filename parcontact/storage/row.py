@@ -1,14 +1,19 @@
-"""A row of measures.csv: the numbers of one instant, their columns and units."""
+"""measures.csv: one row per step and one for the initial state, written by root; its columns and their units."""
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
+from pathlib import Path
 
 from ..errors import InputError
 from ..physics.budget import ErrorBudget
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
+from . import files
+from .checkpoint import Table
+from .tables import MEND, GrowingTable, lines_of, texts
 
 
 @dataclass(frozen=True)
@@ -97,3 +102,53 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
 def numbers(row: Row, branches: int) -> list[float]:
     """Return the numbers of a row, in the order of `columns`; NaN for what was not asked for."""
     return [*_first(row), *row.branch_dissipation[:branches], *_last(row), *row.added]
+
+
+class MeasuresFile(GrowingTable):
+    """The growing file of a run; `table` is what it holds."""
+
+    def __init__(self, path: Path, table: Table, branches: int = 0, added: Sequence[str] = ()) -> None:
+        """Continue the file, which holds this `table`, or begin it."""
+        super().__init__(path, columns(branches, added))
+        self.table, self._branches = table, branches
+
+    def write(self, row: Row) -> None:
+        """Append a row; on an error the file is as it was before, but `table` has the row, which the next run adds."""
+        cells = texts(numbers(row, self._branches))
+        self.table = Table(self.table.rows + 1, ",".join(cells))
+        self.append(cells)
+
+
+def cut_back_table(
+    path: Path, step: int, then: Table, branches: int = 0, added: Sequence[str] = ()
+) -> tuple[Table, list[str]]:
+    """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
+
+    `then` is what the file held when the checkpoint was written: a last row for which the disk had no room is added.
+    Returns what the file holds now, and what is lost. Raises InputError, and changes nothing, for a damaged file.
+    """
+    if not path.exists():
+        return Table(), [f"{path} is missing: the rows up to step {step} are lost"]
+    found, wanted = lines_of(path), columns(branches, added)
+    names = next(found, [])
+    if "step" not in names:
+        raise InputError(f"{path}, line 1, does not name the columns, step among them; move it away or mend it")
+    last, kept, problems = -1, Table(), list[str]()
+    with files.replaced(path) as new:
+        new.write(f"{','.join(wanted)}\n".encode())
+        for number, cells in enumerate(found, 2):
+            row = dict(zip(names, cells, strict=True))
+            if not row["step"].isdecimal():
+                raise InputError(f"{path}, line {number}: the step {row['step']!r} is not a whole number; {MEND}")
+            if int(row["step"]) > step:
+                break
+            last, kept = int(row["step"]), Table(kept.rows + 1, ",".join(row.get(name, "") for name in wanted))
+            new.write(f"{kept.last}\n".encode())
+        if last < step and kept.rows + 1 == then.rows and names == wanted:
+            kept = then
+            new.write(f"{then.last}\n".encode())
+        elif last < step:
+            problems = [f"{path} ends with step {last}: the rows up to step {step} are lost"]
+        new.flush()
+        os.fsync(new.fileno())
+    return kept, problems

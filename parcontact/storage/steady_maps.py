@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 
 from ..parallel.slab import Array, Slab
-from . import files, hdf5, layout
+from . import files, hdf5
 from .fields import UNITS
 from .provenance import Provenance
 
@@ -46,7 +46,7 @@ class SteadyMaps:
                 axes = {name: file[name][...] for name in self.axes}
             for name, value in zip(self.axes, self.points[index], strict=True):
                 axes[name][index] = value
-            layout.put(self.path, axes)
+            hdf5.put(self.path, axes)
 
         hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
 
@@ -66,13 +66,13 @@ class SteadyMaps:
 
     def _make(self, provenance: Provenance) -> None:
         new = self.slab.agree(files.unused(self.path))
-        size = len(self.points) * len(self.names) * self.slab.nx * self.slab.ny * layout.DOUBLE
-        layout.lay_out(new, self.slab, lambda file: self._build(file, provenance), size)
+        size = len(self.points) * len(self.names) * self.slab.nx * self.slab.ny * hdf5.DOUBLE
+        hdf5.lay_out(new, self.slab, lambda file: self._build(file, provenance), size)
         hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
 
     def _build(self, file: h5py.File, provenance: Provenance) -> None:
         file.attrs["kind"] = KIND
         provenance.write(file)
         for name, unit in self.axes.items():
-            layout.add_coordinate(file, name, np.full(len(self.points), np.nan), unit)
-        layout.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, list(self.axes))
+            hdf5.add_coordinate(file, name, np.full(len(self.points), np.nan), unit)
+        hdf5.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, list(self.axes))

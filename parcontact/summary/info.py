@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..job.resolved import RESOLVED, shown_job
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
-from ..storage import checkpoint, curve_points, fields, hdf5, marker, measures
+from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
 from ..storage.console import warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
@@ -146,7 +146,7 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     table = directory / "measures.csv"
     if not table.exists():
         return
-    columns, claim = measures.read(table), claims.get("run")
+    columns, claim = tables.read(table), claims.get("run")
     if not columns["step"]:
         yield "  run: no step yet"
         return
@@ -165,7 +165,7 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     table = directory / theory_settings.TABLE
     if table.exists():
-        count = f"  Persson's theory: {len(measures.read(table)['time'])} rows, "
+        count = f"  Persson's theory: {len(tables.read(table)['time'])} rows, "
         try:
             settings = theory_settings.read(directory)
         except InputError:
@@ -176,7 +176,7 @@ def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     table = directory / "steady.csv"
-    if table.exists() and (speeds := (columns := measures.read(table))["velocity"]):
+    if table.exists() and (speeds := (columns := tables.read(table))["velocity"]):
         best = int(np.argmax(columns["friction"]))
         yield (
             f"  friction curve: {len(speeds)} points from {min(speeds):g} to {max(speeds):g} m/s; the largest friction "

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
-from ..storage import curve_points, files, measures
+from ..storage import curve_points, files, tables
 from . import slide
 
 TABLE = "sweep.csv"
@@ -71,7 +71,7 @@ def _row(case: Case) -> dict[str, Any]:
     row: dict[str, Any] = {"case": case.number, **case.settings, "state": state(case)}
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
         there = (directory / name).is_file()
-        columns: dict[str, list[float]] = measures.read(directory / name) if there else {"time": []}
+        columns: dict[str, list[float]] = tables.read(directory / name) if there else {"time": []}
         if columns["time"]:
             found = slide.measure(case.job.history, columns)
             row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
@@ -91,7 +91,7 @@ def state(case: Case) -> str:
     table = directory / ("measures.csv" if case.job.history else "steady.csv")
     if not table.is_file():
         return "-"
-    columns = measures.read(table)
+    columns = tables.read(table)
     if not case.job.history:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]

@@ -14,7 +14,7 @@ from parcontact.job.sections.part import Origin
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
 from parcontact.run.run import Options
-from parcontact.storage import fields, measures
+from parcontact.storage import fields, tables
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def test_dissipation_per_branch(run: Callable[..., Path]) -> None:
     assert [row(job(material=RUBBER, output=out), name).on for out in (off, energies, on)] == [False, False, True]
     assert not row(job(output=on), name).on
     found = [
-        measures.read(run(str(n), material=RUBBER, output=out) / "measures.csv")
+        tables.read(run(str(n), material=RUBBER, output=out) / "measures.csv")
         for n, out in enumerate((off, energies, on))
     ]
     assert ["dissipated_0" in columns for columns in found] == [False, False, True]

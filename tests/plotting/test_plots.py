@@ -27,7 +27,7 @@ from PIL import Image
 
 from parcontact.__main__ import main
 from parcontact.plotting import style
-from parcontact.storage import measures
+from parcontact.storage import tables
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
 CURVE = "velocity,pressure,friction,contact_area\n"
@@ -177,7 +177,7 @@ def test_panels_axes_and_scales(tmp_path: Path, drawn: list[Figure]) -> None:
     ] * 2
     assert asked(out, "--panels", "friction", "--over", "velocity") == 0
     line = drawn[1].axes[0].get_lines()[0]
-    table = measures.read(out / "measures.csv")
+    table = tables.read(out / "measures.csv")
     last = [table["distance"].index(value) for value in sorted(table["distance"]) if value <= 1.0001e-3][-1]
     assert np.array(line.get_xdata()).tolist() == [0.1, 0.2]
     assert drawn[1].axes[0].get_xlabel() == "sliding velocity [mm/s]"

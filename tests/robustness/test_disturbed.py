@@ -17,7 +17,7 @@ from conftest import WORLD
 from parcontact import __main__
 from parcontact.errors import RunError
 from parcontact.storage import console, hdf5
-from parcontact.storage.files import GrowingTable
+from parcontact.storage.tables import GrowingTable
 from parcontact.streams import printable
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")

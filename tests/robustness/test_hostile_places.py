@@ -14,7 +14,7 @@ from conftest import WORLD, Main
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
-from parcontact.storage import measures
+from parcontact.storage import tables
 from parcontact.summary import info
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
@@ -121,4 +121,4 @@ def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) 
     assert code == BAD_INPUT
     assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
     with pytest.raises(InputError, match="names no column"):
-        measures.read(table)[column]
+        tables.read(table)[column]

@@ -19,7 +19,7 @@ from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER, ErrorBudget,
 from parcontact.run import half_mesh, runner
 from parcontact.run.half_mesh import HalfMesh, place_of
 from parcontact.run.run import STOPPED_EARLY, Options
-from parcontact.storage import measures
+from parcontact.storage import tables
 
 Json = dict[str, Any]
 Series = NDArray[np.float64]
@@ -50,7 +50,7 @@ def run(job: Json, out: Path, comm: MPI.Intracomm = MPI.COMM_SELF) -> int:
 
 
 def columns(out: Path, *names: str) -> list[Series]:
-    table = measures.read(out / "measures.csv")
+    table = tables.read(out / "measures.csv")
     return [np.array(table[name]) for name in names]
 
 
@@ -112,7 +112,7 @@ def test_it_stops_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "cut").mkdir()
     (tmp_path / "cut" / "stop").touch()
     assert run(data(), tmp_path / "cut") == STOPPED_EARLY
-    table = measures.read(tmp_path / "cut" / half_mesh.DIRECTORY / "measures.csv")
+    table = tables.read(tmp_path / "cut" / half_mesh.DIRECTORY / "measures.csv")
     assert len(table["step"]) == 1
     assert "run again" in (tmp_path / "cut" / "run.log").read_text().splitlines()[-1]
     assert run(data(), tmp_path / "cut") == 0

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from restarting import FASTER, SCENES, SLIDE, Bench, cut, rows, same
 
-from parcontact.storage import checkpoint, measures
+from parcontact.storage import checkpoint, tables
 from parcontact.storage.provenance import read_budget
 from parcontact.summary import info
 
@@ -47,7 +47,7 @@ def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:
     assert bench.run(data, whole) == 0
     part = cut(bench, whole, 9)
     assert bench.run(data, part) == 0
-    table = measures.read(part / "measures.csv")
+    table = tables.read(part / "measures.csv")
     slid, friction, errors, area = (
         np.array(column)[1:]
         for column in (

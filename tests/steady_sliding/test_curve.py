@@ -15,7 +15,7 @@ from parcontact.march.loop import run as run_march
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start as steadystart
 from parcontact.steady_sliding.curve import request
-from parcontact.storage.measures import read
+from parcontact.storage.tables import read
 from parcontact.theory import full_contact
 
 WAVE = """\

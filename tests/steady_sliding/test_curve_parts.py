@@ -16,7 +16,7 @@ from parcontact import __main__
 from parcontact.job import load_cases
 from parcontact.solve import constraint
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.measures import read
+from parcontact.storage.tables import read
 from parcontact.summary import sweep_table
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")

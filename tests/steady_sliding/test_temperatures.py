@@ -16,7 +16,7 @@ from parcontact.plotting import steady
 from parcontact.report import prediction
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.measures import read
+from parcontact.storage.tables import read
 from parcontact.theory import full_contact
 
 C1, C2, REFERENCE = 17.4, 51.6, 20.0

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from parcontact.storage import files
-from parcontact.storage.files import GrowingTable
+from parcontact.storage.tables import GrowingTable
 
 
 def test_names_of_unfinished_files_cannot_be_guessed(tmp_path: Path) -> None:

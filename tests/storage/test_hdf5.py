@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Array, Slab
-from parcontact.storage import hdf5, layout
+from parcontact.storage import hdf5
 from parcontact.storage.hdf5 import Part
 
 pytestmark = pytest.mark.mpi
@@ -23,12 +23,12 @@ def field(slab: Slab, seed: int = 0) -> Array:
 def make(path: Path, slab: Slab, names: tuple[str, ...] = ("a", "group/b")) -> None:
     def build(file: h5py.File) -> None:
         for name in names:
-            layout.fixed(file, name, (slab.ny, slab.nx), np.float64)
-        layout.fixed(file, "stack", (3, slab.ny, slab.nx), np.float64)
-        layout.fixed(file, "t", (3,), np.float64)
+            hdf5.fixed(file, name, (slab.ny, slab.nx), np.float64)
+        hdf5.fixed(file, "stack", (3, slab.ny, slab.nx), np.float64)
+        hdf5.fixed(file, "t", (3,), np.float64)
         file.attrs["text"] = np.bytes_("x")
 
-    layout.lay_out(path, slab, build, (len(names) + 3) * slab.ny * slab.nx * layout.DOUBLE)
+    hdf5.lay_out(path, slab, build, (len(names) + 3) * slab.ny * slab.nx * hdf5.DOUBLE)
 
 
 @pytest.mark.parametrize("ny", [1, 2, 7, 16])  # with 3 and 4 ranks, some have no rows
@@ -107,8 +107,8 @@ def test_change_keeps_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     make(path, slab)
     hdf5.write(path, slab, [Part("a", (), field(slab))])
-    layout.change(path, slab, lambda file: file.attrs.modify("text", np.bytes_("y")))
-    hdf5.on_root(slab, lambda: layout.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
+    hdf5.change(path, slab, lambda file: file.attrs.modify("text", np.bytes_("y")))
+    hdf5.on_root(slab, lambda: hdf5.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
     rows = np.empty(slab.shape)
     hdf5.read(path, slab, [Part("a", (), rows)])
     assert np.array_equal(rows, field(slab))
@@ -122,10 +122,10 @@ def test_regions_and_what_is_outside(comm: MPI.Intracomm, shared_path: Path) -> 
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     make(path, slab)
     with h5py.File(path) as file:
-        found = layout.regions(file)
+        found = hdf5.regions(file)
     size = path.stat().st_size
     covered = np.zeros(size, dtype=int)
-    for start, stop in [*found, *layout.outside(size, found)]:
+    for start, stop in [*found, *hdf5.outside(size, found)]:
         covered[start:stop] += 1
     assert (covered == 1).all()
     assert sum(stop - start for start, stop in found) == (2 + 3) * 6 * 9 * 8

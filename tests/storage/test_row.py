@@ -6,10 +6,9 @@ from pathlib import Path
 import pytest
 
 from parcontact.physics.measures import Measures
-from parcontact.storage import measures
+from parcontact.storage import tables
 from parcontact.storage.checkpoint import Table
-from parcontact.storage.measures import MeasuresFile
-from parcontact.storage.row import COLUMNS, LAST, Row
+from parcontact.storage.row import COLUMNS, LAST, MeasuresFile, Row, cut_back_table
 
 
 def row(step: int, lost: tuple[float, ...] = ()) -> Row:
@@ -26,7 +25,7 @@ def written(path: Path, count: int, branches: int = 0) -> None:
 def test_numbers_read_back(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
-    found = measures.read(path)
+    found = tables.read(path)
     assert list(found) == [*COLUMNS, *LAST]
     assert found["step"] == [0, 1, 2]
     assert found["time"] == [0.0, 0.1, 0.2]
@@ -46,7 +45,7 @@ def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: fl
     file = MeasuresFile(tmp_path / "measures.csv", Table(), 1)
     file.write(Row(1, measures=found, branch_dissipation=(0.1,)))
     file.close()
-    table = measures.read(tmp_path / "measures.csv")
+    table = tables.read(tmp_path / "measures.csv")
     assert list(table)[-5:-3] == ["dissipated_0", "friction_x"]
     assert table["friction_x"] == [found.friction_x]
 
@@ -57,7 +56,7 @@ def test_cut_back(tmp_path: Path) -> None:
     whole = path.read_text()
     with path.open("a") as file:
         file.write("6,0.6,0.")  # a row that was cut off
-    assert measures.cut_back(path, 3, Table(), 0)[1] == []
+    assert cut_back_table(path, 3, Table(), 0)[1] == []
     assert path.read_text() == "".join(whole.splitlines(keepends=True)[:5])
     file_again = MeasuresFile(path, Table())
     for step in (4, 5):
@@ -68,19 +67,19 @@ def test_cut_back(tmp_path: Path) -> None:
 
 def test_what_is_lost_is_said(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
-    assert "is missing" in measures.cut_back(path, 3, Table(), 0)[1][0]
+    assert "is missing" in cut_back_table(path, 3, Table(), 0)[1][0]
     written(path, 3)
-    assert "ends with step 2: the rows up to step 5 are lost" in measures.cut_back(path, 5, Table(), 0)[1][0]
+    assert "ends with step 2: the rows up to step 5 are lost" in cut_back_table(path, 5, Table(), 0)[1][0]
 
 
 def test_other_columns(tmp_path: Path) -> None:
     """The dissipation of branches may be asked for later, or no longer."""
     path = tmp_path / "measures.csv"
     written(path, 3)
-    assert measures.cut_back(path, 2, Table(), 2)[1] == []
-    assert list(measures.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1", *LAST]
-    assert math.isnan(measures.read(path)["dissipated_1"][2])
-    assert measures.cut_back(path, 2, Table(), 0)[1] == []
-    assert list(measures.read(path)) == [*COLUMNS, *LAST]
+    assert cut_back_table(path, 2, Table(), 2)[1] == []
+    assert list(tables.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1", *LAST]
+    assert math.isnan(tables.read(path)["dissipated_1"][2])
+    assert cut_back_table(path, 2, Table(), 0)[1] == []
+    assert list(tables.read(path)) == [*COLUMNS, *LAST]
     written(tmp_path / "split.csv", 2, branches=2)
-    assert measures.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]
+    assert tables.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]
