@@ -168,7 +168,7 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
         ("{model: dma}", "material.path is missing"),
         ("{model: dma, path: none.csv}", "must be an existing file"),
         ("{model: dma, path: ~nosuchuser/rubber.csv}", "material.path must be the name of a file, got"),
-        ("{model: dma, path: /dev/null}", "material.path must be a regular file, got '/dev/null'"),
+        ("{model: dma, path: /dev/null}", "material.path must be an existing file, got '/dev/null'"),
         ("{model: dma, path: bad.csv}", "cannot be fitted"),
         ("{model: dma, path: rubber.csv, temperature: -100}", "material.temperature is beyond what the shift allows"),
         ("{model: dma, path: rubber.csv, reference: 200}", "must lie within -20 and 60 C, got 200"),

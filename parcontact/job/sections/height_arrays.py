@@ -34,7 +34,6 @@ class Heights:
         values.flags.writeable = False
         self.values: NDArray[np.float64] | None = values
         self.shape: tuple[int, int] = values.shape
-        self.largest = float(np.abs(values).max(initial=0.0))
         check = _Checksum()
         np.save(check, values)
         self.checksum = f"{check.value:08x}"
