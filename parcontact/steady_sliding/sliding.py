@@ -16,7 +16,6 @@ from ..physics.budget import ErrorBudget, estimate_steady
 from ..physics.convolution import Convolution
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
-from ..physics.prony import Prony
 from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
@@ -108,30 +107,27 @@ class SteadySliding:
 
         Raises RunError, with the certificate reached, when none of the starts leads to one.
         """
-        began = time.perf_counter()
-        mean = pressure / self.setup.units.pressure
-        speed, calls = math.hypot(*velocity), 0.0
-        reduced = self.setup.choices.time_factor * speed
-        for start, solver in self._starts(reduced, pressure):
-            contact, more, by_energy = self._descend(velocity, mean, start, solver)
+        began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
+        what, factor = f"steady sliding at {speed:g} m/s under {pressure:g} Pa", self.setup.choices.time_factor
+        for start, solver in self._starts(factor * speed, pressure):
+            contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start, solver)
             calls += more
             if contact.converged:
                 break
         else:
             raise RunError(
-                f"steady sliding at {speed:g} m/s under {pressure:g} Pa: {contact.failure}. Try a "
-                "velocity nearer to one that works, a finer grid, or another numerics.tolerance."
+                f"{what}: {contact.failure}. Try a velocity nearer to one that works, a finer grid, or another "
+                "numerics.tolerance."
             )
-        self._remember(contact, reduced, pressure)
+        self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
         measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
         if not measures.finite:
-            raise RunError(f"steady sliding at {speed:g} m/s under {pressure:g} Pa: its results would not be finite")
+            raise RunError(f"{what}: its results would not be finite")
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
         friction, errors = self._judge(contact, by_energy, velocity, measures)
-        seconds = time.perf_counter() - began
-        place = velocity, pressure, self.temperature, self.setup.choices.time_factor
+        seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost)
 
     def field(self, name: str) -> Array:
@@ -196,9 +192,6 @@ class SteadySliding:
             yield None, partial(self._solver, narrow=True)
         yield None, self._proximal
 
-    def _remember(self, contact: SteadyContact, speed: float, pressure: float) -> None:
-        self.contact, self._speed, self._pressure = contact, speed, pressure
-
     def _descend(
         self, velocity: Vector, mean: float, start: Array | None, solver: Make
     ) -> tuple[SteadyContact, float, float]:
@@ -225,11 +218,11 @@ class SteadySliding:
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
     def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> tuple[SteadySolver, Convolution]:
-        operator, inverse = self.operators(level, velocity, self.setup.prony)
+        operator, inverse = self._operators(level, velocity)
         return self._solver_for(level, operator, inverse, narrow), operator
 
     def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
-        operator, inverse = self.operators(level, velocity, self.setup.prony)
+        operator, inverse = self._operators(level, velocity)
         kind = self.setup.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
         solver = self._solver_for(level, nearer, nearer_inverse, narrow=True)
@@ -239,25 +232,15 @@ class SteadySliding:
     def _solver_for(
         self, level: Level, operator: Convolution, preconditioner: Convolution, narrow: bool
     ) -> SteadySolver:
-        setup, numerics = self.setup, self.setup.choices.numerics
-        tolerance = tolerance_of(numerics.tolerance)
-        return SteadySolver(
-            level.slab,
-            operator,
-            preconditioner,
-            setup.height / setup.units.height,
-            tolerance if level is self.levels[0] else max(tolerance, COARSE_TOLERANCE),
-            20 * numerics.max_iterations,
-            narrow=narrow,
-        )
+        numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
+        tolerance = max(tolerance_of(numerics.tolerance), 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
+        limit = 20 * numerics.max_iterations
+        return SteadySolver(level.slab, operator, preconditioner, height, tolerance, limit, narrow=narrow)
 
-    def operators(self, level: Level, velocity: Vector, prony: Prony) -> tuple[Convolution, Convolution]:
-        """Pressure -> displacement at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
-        half_space, speed = self.setup.half_space, self.setup.in_units(velocity)
-        return (
-            half_space.sliding_operator(level.fft, speed, prony),
-            half_space.sliding_inverse(level.fft, speed, prony),
-        )
+    def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:
+        """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
+        body, moved = self.setup.half_space, (level.fft, self.setup.in_units(velocity), self.setup.prony)
+        return body.sliding_operator(*moved), body.sliding_inverse(*moved)
 
 
 def tolerance_of(asked: float) -> float:

@@ -31,7 +31,7 @@ class CurveTable:
 
     def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, heated: bool, quiet: bool) -> None:
         self._console, self._job = Console(directory / LOG, quiet, 0), sliding.setup.job
-        self.path, self.heated, self.quiet, self.failed = directory / "steady.csv", heated, quiet, 0
+        self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
         branches = sliding.setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
         self.interface = InterfaceColumns.columns if sliding.setup.choices.interface else ()
         added = (*(HEATED if heated else ()), *self.interface)
@@ -44,7 +44,7 @@ class CurveTable:
         self.say(HEAD)
 
     def _read(self) -> list[Wanted]:
-        """The points that are there; a line that was not finished is removed."""
+        """Return the points that are there; a line that was not finished is removed."""
         if not self.path.exists():
             return []
         columns = tables.read(self.path)
@@ -58,7 +58,7 @@ class CurveTable:
         return curve_points.of_table(columns)
 
     def lacking(self, points: Sequence[Wanted]) -> list[int]:
-        """The numbers of the points that are not there."""
+        """Return the numbers of the points that are not there."""
         found = curve_points.lacking(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
@@ -66,7 +66,7 @@ class CurveTable:
         return found
 
     def pass_on(self) -> None:
-        """A point is done, solved or not."""
+        """Count a point, solved or not."""
         self._bar.step()
 
     def say(self, text: str) -> None:
