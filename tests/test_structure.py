@@ -99,7 +99,7 @@ def test_theory_stands_alone() -> None:
 
 MADE_BY = {  # which modules make objects of a kind
     **{kind: {"scene.scene"} for kind in ("AnyFraction", "AlongX", "ElasticBody", "ElasticEnergy", "ZenerEnergy")},
-    **{kind: {"scene.scene"} for kind in ("ElasticPressure", "AppliedInverse", "Ledger", "Setup", "Scene")},
+    **{kind: {"scene.scene"} for kind in ("ElasticPressure", "AppliedInverse", "Probe", "Setup", "Scene")},
     "ZenerBody": {"scene.scene", "physics.energy"},  # a second one follows A^-1 u
     "ContactSolver": {"scene.scene"},
     "HalfSpace": {"scene.scene", "plan.memory"},

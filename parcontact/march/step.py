@@ -110,7 +110,7 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
         contact, remark = _retry(scene, state, step, problem, contact)
     if step.passed:
         remark = "; ".join(filter(None, (remark, _passed(scene, step))))
-    measures = scene.ledger.measures(
+    measures = scene.probe.measure(
         contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
     )
     if not measures.finite:

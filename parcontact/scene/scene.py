@@ -1,4 +1,4 @@
-"""From a job to what steps are made of: bodies, solver, energies, ledger and followers are made here and nowhere else.
+"""From a job to what steps are made of: bodies, solver, energies, probe and followers are made here and nowhere else.
 
 What is made follows from the job alone, as `choices.py` decides; what a job does not call for is never made.
 Steady sliding takes the setup from here and brings a solver of its own.
@@ -21,8 +21,8 @@ from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, Zen
 from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
 from ..physics.layer import Layer
-from ..physics.ledger import Ledger
 from ..physics.motion import PARTS, AlongX, AnyFraction, Motion
+from ..physics.probe import Probe
 from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
@@ -90,9 +90,9 @@ class Setup:
         """Return a velocity [m/s] in the run's units of length per second."""
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
-    def ledger(self) -> Ledger:
-        """Make a new ledger, with the shear of the interface if the job has one."""
-        return Ledger(self.slab, self.surface, self.units, self.choices.interface)
+    def probe(self) -> Probe:
+        """Make a new probe, with the shear of the interface if the job has one."""
+        return Probe(self.slab, self.surface, self.units, self.choices.interface)
 
 
 @dataclass
@@ -105,7 +105,7 @@ class Scene:
     material: ElasticBody | ZenerBody
     solver: ContactSolver
     operators: Operators
-    ledger: Ledger
+    probe: Probe
     energy: ElasticEnergy | ZenerEnergy | None
     followers: dict[str, Effect] = field(default_factory=dict)
 
@@ -155,7 +155,7 @@ def build_on(setup: Setup) -> Scene:
     solver, operators = _solver(setup, chosen.numerics.tolerance, chosen.operator_type)
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
     material, energy = _body_and_energy(setup, folded, inverse)
-    scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.ledger(), energy)
+    scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
     scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}
     values_of(scene.followers)  # refuses those that do not fit, before anything is written
     return scene

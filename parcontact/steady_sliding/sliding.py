@@ -86,7 +86,7 @@ class SteadySliding:
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
-        self.ledger = setup.ledger()
+        self.probe = setup.probe()
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
         finest, *coarser = nested.levels_of(setup.slab, heights)
         self.levels = [Level(setup.slab, setup.fft, finest.heights)]
@@ -100,7 +100,7 @@ class SteadySliding:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
         if temperature != self.temperature:
             self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
-            self.ledger, self.temperature = self.setup.ledger(), temperature
+            self.probe, self.temperature = self.setup.probe(), temperature
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
@@ -121,7 +121,7 @@ class SteadySliding:
             )
         self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
-        measures = self.ledger.measures(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
+        measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
         if not measures.finite:
             raise RunError(f"{what}: its results would not be finite")
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)

@@ -61,6 +61,13 @@ def test_all_of_it_is_there_right_after_it_is_restored(tmp_path: Path, data: dic
     assert all(np.array_equal(entries[name].value, entry.value) for name, entry in old.entries().items())
 
 
+def test_further_pressures_are_named_by_their_age() -> None:
+    """As the manual has them, of slides that choose their steps."""
+    march = begun(job(RUBBER, CHOSEN))
+    further = [name for name in march.entries() if name.endswith("steps ago")]
+    assert further == ["contact/pressure 3 steps ago", "contact/pressure 4 steps ago"]
+
+
 @pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
 @pytest.mark.parametrize("precision", ["mixed", "double"])
 def test_to_save_a_run_does_not_change_it(tmp_path: Path, precision: str, integrator: str) -> None:

@@ -14,8 +14,8 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
 from parcontact.physics.embedded import EmbeddedPair
-from parcontact.physics.ledger import Ledger
 from parcontact.physics.motion import AlongX
+from parcontact.physics.probe import Probe
 from parcontact.physics.slopes import friction_by_energy
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.contact import ContactSolver
@@ -30,13 +30,13 @@ def bare(planned: Job) -> Counter[str]:
     heights = base.surface.heights((0.0, 0.0), slab.empty())
     solver, operators = bare_solver(base)
     last, p = slab.zeros(), slab.zeros()
-    ledger = Ledger(slab, base.surface, base.units)
+    probe = Probe(slab, base.surface, base.units)
     for stage in planned.history:
         load = MeanPressure(stage.load.end / (base.prony.modulus_inf * base.units.pressure))
         p[...] = last
         contact = solver.solve(Problem(*operators, heights, NonNegative(), load), p)
         last, p = p, last
-        ledger.measures(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, (0.0, 0.0))
+        probe.measure(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, (0.0, 0.0))
     return slab.tally.copy()
 
 
@@ -48,7 +48,7 @@ def lasting(planned: Job) -> Counter[str]:
     memory = base.prony.moduli.size > 0
     body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
     held, (solver, operators) = body.at_rest(), bare_solver(base)
-    ledger = Ledger(slab, base.surface, base.units)
+    probe = Probe(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
     moduli, cells, dt = [0.0, 0.0], 0, -1.0
     for step in Timeline.of(planned):
@@ -60,7 +60,7 @@ def lasting(planned: Job) -> Counter[str]:
         moduli, cells = [moduli[1], alpha], heights.offset
         load_of_step = MeanPressure(step.load / (alpha * base.units.pressure))
         contact = solver.solve(Problem(*operators, trial.effective, NonNegative(), load_of_step), p)
-        found = ledger.measures(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
+        found = probe.measure(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
         held = body.commit(held, trial, contact.u, p if held.displacement is None else held.displacement)
         if isinstance(body, ZenerBody) and step.dt != dt:
             # The error budget looks at what the other integrator would have done, once for some steps that are alike.

@@ -15,8 +15,8 @@ from short_job import JOB
 from parcontact.__main__ import main
 from parcontact.history.timeline import Timeline
 from parcontact.march.failure import StepError
-from parcontact.physics.ledger import Ledger
 from parcontact.physics.measures import Measures
+from parcontact.physics.probe import Probe
 from parcontact.solve.certificate import Certificate
 
 NAN, INF = math.nan, math.inf
@@ -50,12 +50,12 @@ def test_heights_that_are_not_finite(wrong: float) -> None:
 @pytest.fixture
 def overflowing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measures one of which overflows, of solves that are as they should be."""
-    measures = Ledger.measures
+    measures = Probe.measure
 
-    def overflow(self: Ledger, *words: Any) -> Measures:
+    def overflow(self: Probe, *words: Any) -> Measures:
         return replace(measures(self, *words), force_y=INF)
 
-    monkeypatch.setattr(Ledger, "measures", overflow)
+    monkeypatch.setattr(Probe, "measure", overflow)
 
 
 @pytest.mark.usefixtures("overflowing")

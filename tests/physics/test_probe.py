@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.ledger import Ledger
 from parcontact.physics.measures import SIDE, Measures
+from parcontact.physics.probe import Probe
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface, single_wave
 from parcontact.physics.units import Units
@@ -47,7 +47,7 @@ def test_pressure_ahead_of_a_wave(comm: MPI.Intracomm, waves: tuple[int, int], c
     shift = cells[0] * LX / NX, cells[1] * LY / NY
     p, h, d = slab.empty(), surface.heights(shift, slab.empty()), 0.25
     p[...] = p0 + p1 * np.cos(angle(slab, waves) - moved - lead)
-    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, h + d, h, d, shift)
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h + d, h, d, shift)
     q = 2 * np.pi * np.array([waves[0] / LX, waves[1] / LY])
     force = -0.5 * p1 * PRESSURE * HEIGHT * math.sin(lead) * q * LX * LY
     assert_allclose([found.force_x, found.force_y], force, rtol=1e-12, atol=1e-13 * np.abs(force).max())
@@ -64,7 +64,7 @@ def test_central_differences(comm: MPI.Intracomm) -> None:
     slab = surface.slab
     p, u = slab.empty(), slab.zeros()
     p[...] = 2.0 + np.sin(angle(slab, (3, 0)))
-    forces = [Ledger(slab, kind, UNITS).measures(p, ALPHA, u, u, 0.0, (0.0, 0.0)).force_x for kind in (surface, exact)]
+    forces = [Probe(slab, kind, UNITS).measure(p, ALPHA, u, u, 0.0, (0.0, 0.0)).force_x for kind in (surface, exact)]
     step = 2 * np.pi * 3 / NX
     assert_allclose(forces[0] / forces[1], math.sin(step) / step, rtol=1e-12)
 
@@ -77,7 +77,7 @@ def test_partial_contact(comm: MPI.Intracomm) -> None:
     p[:, :4] = 1.5
     u += 0.5
     h -= 0.25
-    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, u, h, -0.125, (0.0, 0.0))
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, h, -0.125, (0.0, 0.0))
     assert found.contact_area == 0.25
     assert_allclose(found.pressure, 0.25 * 1.5 * PRESSURE, rtol=1e-15)
     assert_allclose(found.mean_gap, 0.875 * UNITS.height, rtol=1e-15)
@@ -93,7 +93,7 @@ def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
     for row in range(NY)[slab.rows]:
         if row == NY // 2:
             p[row - slab.rows.start, NX // 2 + 2] = 3.0
-    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, u, u, 0.0, (LX / NX, 0.0))
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, u, 0.0, (LX / NX, 0.0))
     distance = LX / NX  # two cells from where the centre was, which has moved by one
     assert_allclose(found.force_x, 3.0 * PRESSURE * (LX / NX) * (LY / NY) * (-distance / 1e-2), rtol=1e-13)
     assert_allclose(found.friction, distance / 1e-2, rtol=1e-13)
@@ -113,7 +113,7 @@ def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int
     pressed = np.random.default_rng(seed).random((ny, nx)) < 0.5
     p, none = slab.zeros(), slab.zeros()
     p[...] = pressed[slab.rows]
-    found = Ledger(slab, surface, UNITS).measures(p, ALPHA, none, none, 0.0, (0.0, 0.0))
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, none, none, 0.0, (0.0, 0.0))
     if periodic:
         sides = sum(np.count_nonzero(pressed != np.roll(pressed, 1, axis)) for axis in (0, 1))
     else:
@@ -126,6 +126,6 @@ def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:
     surface = wave(comm, (1, 0))
     none = surface.slab.zeros()
     h = surface.heights((0.0, 0.0), surface.slab.empty())
-    found = Ledger(surface.slab, surface, UNITS).measures(none, ALPHA, none, h, -1.0, (0.0, 0.0))
+    found = Probe(surface.slab, surface, UNITS).measure(none, ALPHA, none, h, -1.0, (0.0, 0.0))
     assert found == Measures(approach=-UNITS.height, mean_gap=found.mean_gap)
     assert_allclose(found.mean_gap, UNITS.height, rtol=1e-14)  # the wave has no mean

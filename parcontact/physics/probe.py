@@ -20,15 +20,15 @@ from .units import Units
 
 
 @dataclass(frozen=True)
-class Ledger:
-    """Turns the maps of a solved step into measures."""
+class Probe:
+    """What turns the maps of a solved step into measures."""
 
     slab: Slab
     surface: Surface
     units: Units
     interface: InterfaceFriction | None = None
 
-    def measures(
+    def measure(
         self, p: Array, alpha: float, u: Array, h: Array, d: float, displacement: Vector, velocity: Vector = (0.0, 0.0)
     ) -> Measures:
         """Of the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving with
