@@ -168,13 +168,13 @@ def fit(options: argparse.Namespace) -> int:
 def study(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..parallel.slab import Slab
-    from ..study import runner
+    from ..study import study as whole_study
 
     def make(changes: Sequence[str]) -> Job:
         return on_root(world, lambda: _load(options, changes))
 
     job = make(())
-    return runner.run(job, make, Slab(world, *job.grid.points), options.quiet)
+    return whole_study.run(job, make, Slab(world, *job.grid.points), options.quiet)
 
 
 @ranks.root_alone

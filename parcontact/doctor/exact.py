@@ -5,7 +5,7 @@ import numpy as np
 from ..physics import prony as viscoelastic
 from ..theory import full_contact, hertz, lee_radok, persson, persson_rings, westergaard
 from .bench import Bench
-from .jobs import (
+from .small_jobs import (
     CELL,
     GLASSY,
     HEIGHT,

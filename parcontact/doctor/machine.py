@@ -19,7 +19,7 @@ from ..run import runner
 from ..run.run import Options
 from ..storage import header
 from .bench import Bench
-from .jobs import GLASSY, crossed, zener
+from .small_jobs import GLASSY, crossed, zener
 
 if TYPE_CHECKING:
     from mpi4py import MPI

@@ -20,7 +20,7 @@ from ..steady_sliding import curve
 from ..steady_sliding.sliding import Point, SteadySliding
 from ..steady_sliding.table import describe_missed
 from ..storage.curve_points import Wanted
-from .jobs import Given, all_ranks, read, warn_of
+from .given_jobs import Given, all_ranks, read, warn_of
 
 Array = NDArray[np.float64]
 Values = str | float | Sequence[float] | Array | None

@@ -14,7 +14,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..physics import prony
 from ..scene import set_up
-from .jobs import of_parts
+from .given_jobs import of_parts
 
 Array = NDArray[np.float64]
 Surface = Mapping[str, Any] | NDArray[Any] | Sequence[Mapping[str, Any] | NDArray[Any]]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..storage import fields, hdf5, row, tables
-from .jobs import path_of
+from .given_jobs import path_of
 
 if TYPE_CHECKING:
     import xarray

@@ -27,7 +27,7 @@ from ..steady_sliding import start
 from ..storage import checkpoint, heights, tables, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.fields import UNITS
-from .jobs import Given, agree, all_ranks, path_of, read, warn_of
+from .given_jobs import Given, agree, all_ranks, path_of, read, warn_of
 from .row import Row
 
 

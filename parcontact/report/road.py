@@ -14,7 +14,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 from ..plotting import style, surface, units
 from ..road import statistics, treatment
-from ..road.surface import prepare
+from ..road.prepared_map import prepare
 from ..scene import rigid_surface
 from .parts import Section, Table, of_panel
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..job import Topography
-from . import files
+from . import map_files
 
 Points = tuple[int, int]
 Size = tuple[float, float]
@@ -27,6 +27,6 @@ def of(part: Topography, box: Any = None) -> tuple[Points, Size]:
 
 @lru_cache(maxsize=4)  # the cases of a sweep have the same map
 def _read(path: Path, _: int, unit: str | None, size: Size | None, channel: str | None) -> tuple[Points, Size]:
-    found = files.read(path, unit, size, channel)
+    found = map_files.read(path, unit, size, channel)
     ny, nx = found.heights.shape
     return (nx, ny), found.size

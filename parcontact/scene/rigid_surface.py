@@ -92,7 +92,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, notes: list[str]) -> Spect
     if isinstance(part, jobs.RoughSpectrum):
         return _measured_spectrum(part, grid, fft, notes)
     if isinstance(part, jobs.Topography):
-        from ..road import surface as road  # with much of scipy, which is slow to import
+        from ..road import prepared_map as road  # with much of scipy, which is slow to import
 
         rows, done = road.rows_of(part, grid, fft.slab)
         notes += done

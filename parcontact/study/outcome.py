@@ -22,7 +22,7 @@ from ..parallel.tally import Tally
 from ..steady_sliding import start
 from ..storage import files
 from ..storage.row import Row
-from .settings import Settings
+from .ladders import Settings
 
 FIRST_STEPS = 2
 LAST_SHARE = 0.25  # of the last stage that slides (or lasts): its mean is taken for what has settled

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from .extrapolation import Limit, extrapolate
+from .ladders import Ladders, Settings
 from .outcome import QUANTITIES, Outcome
-from .settings import Ladders, Settings
 
 TARGETS = (0.05, 0.03, 0.01, 0.003)
 NEEDED = ("mu_max", "mu_dyn", "area_corrected")  # what the sentences hold the settings to

@@ -3,7 +3,7 @@
 import numpy as np
 
 from parcontact.doctor.bench import Bench
-from parcontact.doctor.jobs import (
+from parcontact.doctor.small_jobs import (
     CELL,
     CREEP,
     GLASSY,

@@ -14,8 +14,8 @@ from parcontact.job import load
 from parcontact.parallel.slab import Slab
 from parcontact.study import outcome, verdict
 from parcontact.study.extrapolation import Limit
+from parcontact.study.ladders import Settings, ladders, overrides
 from parcontact.study.outcome import Outcome
-from parcontact.study.settings import Settings, ladders, overrides
 
 WAVE = """
 grid: {points: [32, 1], size: [2.5e-4, 2.5e-4]}

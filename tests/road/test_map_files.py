@@ -11,7 +11,7 @@ import SurfaceTopography
 from numpy.testing import assert_allclose
 
 from parcontact.errors import InputError
-from parcontact.road import files
+from parcontact.road import map_files
 
 SIZE = (6e-5, 4e-5)
 HEIGHTS = 1e-6 * np.random.default_rng(5).standard_normal((16, 24))  # (ny, nx) [m]
@@ -37,7 +37,7 @@ def write(folder: Path) -> dict[str, tuple[Path, str | None, tuple[float, float]
 @pytest.mark.parametrize("name", ["road.nc", "road.x3p", "road.gwy", "headed.txt", "road.npy", "road.txt", "road.xyz"])
 def test_all_formats_give_the_same_map(tmp_path: Path, name: str) -> None:
     """To 1e-12 of its height; headed.txt is written with fewer digits by SurfaceTopography."""
-    found = files.read(*write(tmp_path)[name], None)
+    found = map_files.read(*write(tmp_path)[name], None)
     assert found.heights.shape == HEIGHTS.shape
     assert_allclose(found.heights, HEIGHTS, rtol=0.0, atol=1e-12 * np.ptp(HEIGHTS))
     assert_allclose(found.size, SIZE, rtol=1e-12)
@@ -53,7 +53,7 @@ def test_missing_points(tmp_path: Path) -> None:
     table = np.stack([x.ravel(), y.ravel(), holed.ravel()], axis=1)
     np.savetxt(tmp_path / "road.xyz", table[np.isfinite(table[:, 2])])
     for name, size in (("road.npy", SIZE), ("road.txt", SIZE), ("road.xyz", None)):
-        found = files.read(tmp_path / name, "m", size, None)
+        found = map_files.read(tmp_path / name, "m", size, None)
         assert np.array_equal(np.isnan(found.heights), np.isnan(holed))
 
 
@@ -116,7 +116,7 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
     else:
         save(path, content)
     with pytest.raises(InputError) as failure:
-        files.read(path, *given)
+        map_files.read(path, *given)
     assert sentence in str(failure.value)
     assert "\n" not in str(failure.value)
 
@@ -127,7 +127,7 @@ def test_a_header_of_gigabytes(tmp_path: Path) -> None:
         file.write(b"\x93NUMPY\x02\x00\xff\xff\xff\xe0")
         file.truncate(3_900_000_000)
     with pytest.raises(InputError, match="its header claims to be larger than 1 MB"):
-        files.read(tmp_path / "road.npy", "m", SIZE, None)
+        map_files.read(tmp_path / "road.npy", "m", SIZE, None)
 
 
 @pytest.mark.parametrize("ending", ["x3p", "gwy", "nc"])
@@ -136,7 +136,7 @@ def test_half_a_file(tmp_path: Path, ending: str) -> None:
     path = write(tmp_path)[f"road.{ending}"][0]
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(InputError, match=r"road\.\w+ (cannot be read|is damaged)"):
-        files.read(path, None, None, None)
+        map_files.read(path, None, None, None)
 
 
 def test_an_increment_that_is_no_number(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_an_increment_that_is_no_number(tmp_path: Path) -> None:
         for name, data in parts.items():
             new.writestr(name, data)
     with pytest.raises(InputError, match=r"its map would be nan x nan m, which is no size"):
-        files.read(path, None, None, None)
+        map_files.read(path, None, None, None)
 
 
 def test_a_header_that_claims_too_much(tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ def test_a_header_that_claims_too_much(tmp_path: Path) -> None:
     with path.open("wb") as file:
         np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)})
     with pytest.raises(InputError, match="cannot be read: "):
-        files.read(path, "m", SIZE, None)
+        map_files.read(path, "m", SIZE, None)
 
 
 def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,5 +168,5 @@ def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     write(tmp_path)
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     with pytest.raises(InputError, match="pip install 'parcontact"):
-        files.read(tmp_path / "road.x3p", None, None, None)
-    assert files.read(tmp_path / "road.npy", "um", SIZE, None).heights.shape == (16, 24)
+        map_files.read(tmp_path / "road.x3p", None, None, None)
+    assert map_files.read(tmp_path / "road.npy", "um", SIZE, None).heights.shape == (16, 24)

@@ -12,8 +12,8 @@ from ..plotting import study as study_plots
 from ..storage import files, marker, stopfile
 from ..storage.directory import Directory
 from . import outcome, verdict
+from .ladders import Ladders, Settings, describe_chosen_steps, ladders, overrides
 from .outcome import Outcome, read_outcomes, write_outcomes
-from .settings import Ladders, Settings, describe_chosen_steps, ladders, overrides
 
 DONE, AGAIN = 0, 3  # exit codes
 HEAD = f"  {'case':80} {'friction max':>13} {'area':>9} {'CPU [s]':>8}"

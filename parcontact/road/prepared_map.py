@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..job import Grid, Topography
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from . import files, treatment
+from . import map_files, treatment
 from .treatment import Treated
 
 SLACK = 1e-6  # of a length: a box this much longer than the map is as long
@@ -41,7 +41,7 @@ class Prepared:
 
 def prepare(part: Topography, grid: Grid) -> Prepared:
     """Root's work. Raises InputError for a map that cannot be read or is smaller than the box."""
-    found = files.read(part.path, part.unit, part.size, part.channel)
+    found = map_files.read(part.path, part.unit, part.size, part.channel)
     periodic = part.periodic or ("smooth" if grid.boundary == "periodic" else "none")
     copies = 2 if periodic == "mirror" else 1
     rows, columns = (

@@ -8,7 +8,7 @@ import pytest
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
-from parcontact.study.settings import Ladders, Settings, describe_chosen_steps, ladders, overrides
+from parcontact.study.ladders import Ladders, Settings, describe_chosen_steps, ladders, overrides
 
 TEXT = """
 grid: {points: [64, 32], size: [1.0e-3, 5.0e-4]}
