@@ -1,7 +1,7 @@
 """How honest the error budget is: estimated over true errors of friction and area, for solver and time steps.
 
-    .venv/bin/python scripts/error_budget.py [--points 64] [--finer 8] [--surfaces 4] [--seed 0] [--velocity 1]
-        [--cells 1]
+    .venv/bin/python scripts/error_budget.py [scene ...] [--points 64] [--finer 8] [--surfaces 4] [--seed 0]
+        [--velocity 1] [--cells 1]
 
 Each scene is marched with its own settings, with a tolerance 1e-4 of that, and with time steps so many times finer (and
 the small tolerance). The first two differ by the solver's error, the last two by that of the time steps. Errors are
@@ -89,11 +89,14 @@ def main() -> None:
         velocity=(1.0, "times as fast"),
         cells=(1.0, "per step"),
     )
+    options.add_argument("scenes", nargs="*", help=f"of {'; '.join(scenes(64, 1.0, 1.0))}")
     asked = options.parse_args()
     print(f"{'estimated/true':32}" + "".join(f"{part:>24}" for part in PARTS))
     table = []
     for integrator in ("exponential", "backward-euler"):
         for name, data in scenes(asked.points, asked.velocity, asked.cells).items():
+            if asked.scenes and name not in asked.scenes:
+                continue
             surfaces = [data]
             if data["surface"]["shape"] == "rough":
                 seeds = range(asked.seed, asked.seed + asked.trials)

@@ -1,6 +1,6 @@
 """Whether steps that choose themselves keep what numerics.accuracy asks for, and what that costs.
 
-    .venv/bin/python scripts/time_steps.py [points] [scene ...]
+    .venv/bin/python scripts/time_steps.py [points] [scene ...] [--accuracies 0.05 ...] [--ladder 4 2 1 ...]
 
 Each scene is marched with `time_step: auto` at an accuracy of 5, 1 and 0.3 %, and with a ladder of steps made by hand:
 a cell of sliding per step, or a factor of 1.2 at rest, and finer and coarser ones. The reference has the finest steps,
@@ -10,7 +10,7 @@ area there, each over the accuracy asked for; and the operator calls, over those
 keeps all three within the accuracy.
 """
 
-import sys
+import argparse
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from parcontact.job import Grid
 from parcontact.summary.slide import mean_over_end
 
 ACCURACIES = (0.05, 0.01, 0.003)
-LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # cells per step
+LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # cells per step, the finest one last
 REST = {"first": 1e-3, "growth": 1.2}  # of the duration
 JUMPING = ("velocity step", "dwell, then slide", "sphere", "cylinder")
 
@@ -110,13 +110,19 @@ def compare(data: Json, name: str, accuracies: tuple[float, ...], ladder: tuple[
     return ratios
 
 
-def main(points: int = 128, *names: str) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("points", type=int, nargs="?", default=128)
+    parser.add_argument("scenes", nargs="*", help=f"of {', '.join(scenes(128))}")
+    parser.add_argument("--accuracies", type=float, nargs="+", default=ACCURACIES)
+    parser.add_argument("--ladder", type=float, nargs="+", default=LADDER)
+    asked = parser.parse_args()
     heads = ("error over accuracy", "accuracy", "highest", "dynamic", "area", "steps", "calls", "cost")
     print("{:20}{:>8}{:>9}{:>9}{:>9}{:>8}{:>8}{:>8}".format(*heads))
     ratios = list[float]()
-    for name, data in scenes(points).items():
-        if not names or name in names:
-            ratios += compare(data, name, ACCURACIES, LADDER)
+    for name, data in scenes(asked.points).items():
+        if not asked.scenes or name in asked.scenes:
+            ratios += compare(data, name, asked.accuracies, asked.ladder)
     shares, costs = np.array(ratios[::2]), np.array(ratios[1::2])
     known = costs[np.isfinite(costs)]
     print(f"error over accuracy: {shares.max():.2f} at most, {np.median(shares):.2f} in the median; ", end="")
@@ -124,4 +130,4 @@ def main(points: int = 128, *names: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*([int(sys.argv[1])] if sys.argv[1:] else []), *sys.argv[2:])
+    main()

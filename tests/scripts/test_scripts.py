@@ -32,11 +32,11 @@ SMALL = {
         r"in all.*planned.*each branch.*solve: speed of 2 ranks",
     ),
     "error_budget": Small(
-        ["--points", "48", "--finer", "2", "--surfaces", "1"],
+        ["rough", "--points", "48", "--finer", "4", "--surfaces", "1"],
         r"(?s)rough, exp .*time friction: estimates are 0\.\d+ to \d\.?\d* times ",
     ),
     "error_coverage": Small(
-        ["--scenes", "3", "--from", "13"], r"(?s)first half: 3 \| both .*3 scenes, .*written: ", (0, 1)
+        ["--scenes", "2", "--from", "13"], r"(?s)first half: 2 \| both .*2 scenes, .*written: ", (0, 1)
     ),
     "faults": Small(
         ["--kinds", "kill,damage", "--trials", "2", "--flips", "4", "--shorter", "4"], r"2 made: 0 with faults; "
@@ -51,7 +51,9 @@ SMALL = {
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),
     "random_steady": Small(["--trials", "2", "--points", "64"], r"2 made: 0 with faults; .*2 solved"),
     "steady_table": Small(["128"], r"(?m)^[0-2] are off", (0, 1)),  # at 512 points none is
-    "time_steps": Small(["48", "cylinder"], r"(?m)^error over accuracy: 0\.\d\d at most.* cost .*: 1\.[0-4]\d at"),
+    "time_steps": Small(
+        ["48", "cylinder", "--accuracies", "0.05", "--ladder", "2", "1", "0.5"], r"(?m)^error over accuracy: 0\.\d\d at"
+    ),
 }
 
 
