@@ -32,6 +32,7 @@ FORMAT = 1
 TITLE = "parcontact checkpoint, format "
 SEAL = 4096  # bytes set aside for it
 SUMS = "checksums"
+PIECE = 1 << 16  # bytes read at a time
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def is_one(path: Path) -> bool:
 
 def _seal(path: Path) -> None:
     with h5py.File(path, "r") as hdf:
-        regions = hdf5.regions(hdf)
+        regions = find_regions(hdf)
     with path.open("r+b") as file:
         size = file.seek(0, os.SEEK_END)
         facts = {"bytes": size, "maps": regions, "checksum": _outside(file, size, regions)}
@@ -184,9 +185,30 @@ def _broken(path: Path) -> str:
 def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> int:
     """CRC-32 of all bytes that are neither in the seal nor in a map."""
     total = 0
-    for start, stop in hdf5.outside(size, regions, SEAL):
+    for start, stop in pieces_outside(size, regions, SEAL):
         total = zlib.crc32(os.pread(file.fileno(), stop - start, start), total)
     return total
+
+
+def find_regions(file: h5py.File) -> list[tuple[int, int]]:
+    """Return where in a file its maps are, from byte to byte, in order; those next to each other as one."""
+    names: list[str] = []
+    file.visit(names.append)
+    items = (file[name] for name in names)
+    maps = [item for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
+    places = [(item.id.get_offset(), item.nbytes) for item in maps if item.id.get_offset() is not None]
+    merged: list[tuple[int, int]] = []
+    for start, length in sorted(place for place in places if place[1]):
+        merged.append((merged.pop()[0] if merged and merged[-1][1] == start else start, start + length))
+    return merged
+
+
+def pieces_outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterator[tuple[int, int]]:
+    """Yield all that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
+    for first, last in [*found, (size, size)]:
+        for position in range(start, first, PIECE):
+            yield position, min(position + PIECE, first)
+        start = last
 
 
 def _contents(path: Path, file: h5py.File) -> Contents:

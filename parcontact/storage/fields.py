@@ -64,7 +64,7 @@ class FieldsFile:
         self._kept = frozenset(kept)
         if found and found.steps == tuple(self.steps) and set(found.names) == set(self.names):
             hdf5.change(self.path, self.slab, provenance.renew)
-            self._stamp(self.path, slice(len(kept), None), np.nan)
+            hdf5.mark(self.path, self.slab, slice(len(kept), None), {"t": np.nan})
             self._draw()
         else:
             self._replace(found, kept)
@@ -81,10 +81,7 @@ class FieldsFile:
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
         """Put the maps of one instant into their place."""
-        index = self.steps[step]
-        rows = {name: np.ascontiguousarray(maps[name], dtype=np.float64) for name in self.names}
-        hdf5.write(self.path, self.slab, [hdf5.Part(name, (index,), rows[name]) for name in self.names])
-        self._stamp(self.path, index, time)
+        hdf5.save_maps(self.path, self.slab, self.steps[step], {name: maps[name] for name in self.names}, {"t": time})
         if self.slab.agree(clock.monotonic() - self._drawn > XDMF_SECONDS):
             self._draw()
 
@@ -125,17 +122,8 @@ class FieldsFile:
                     hdf5.read(self.path, self.slab, [hdf5.Part(name, (found.steps.index(step),), rows)])
                 hdf5.write(new, self.slab, [hdf5.Part(name, (self.steps[step],), rows)])
         times = [found.times[found.steps.index(step)] for step in kept]
-        self._stamp(new, [self.steps[step] for step in kept], times)
+        hdf5.mark(new, self.slab, [self.steps[step] for step in kept], {"t": times})
         hdf5.sync(new, self.slab)
-
-    def _stamp(self, path: Path, index: int | slice | list[int], time: float | list[float]) -> None:
-        def stamp() -> None:
-            with h5py.File(path, "r", locking=False) as file:  # the output directory is ours
-                times = file["t"][...]
-            times[index] = time
-            hdf5.put(path, {"t": times})
-
-        hdf5.on_root(self.slab, stamp, f"cannot write {path}")
 
     def _draw(self) -> None:
         target = self.path.with_suffix(".xdmf")
@@ -159,12 +147,8 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
     if not slab.agree(path.exists()):
         return ""
     found, problem = _found(path, slab)
-
-    def take_back() -> None:
-        if found is not None:
-            hdf5.put(path, {"t": np.where(np.array(found.steps) > step, np.nan, found.times)})
-
-    hdf5.on_root(slab, take_back, f"cannot write {path}")
+    if found:
+        hdf5.mark(path, slab, np.array(found.steps) > step, {"t": np.nan})
     return problem
 
 

@@ -9,7 +9,7 @@ import errno
 import io
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,7 +25,6 @@ from ..parallel.slab import Array, Slab
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
-PIECE = 1 << 16  # bytes read at a time
 DOUBLE = 8  # bytes of a number in a map
 RESERVE = 1 << 20  # bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
 
@@ -224,25 +223,23 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
             overwrite(target.fileno(), numbers.astype(types[name]).tobytes(), places[name])
 
 
-def regions(file: h5py.File) -> list[tuple[int, int]]:
-    """Return where in a file its maps are, from byte to byte, in order; those next to each other as one."""
-    names: list[str] = []
-    file.visit(names.append)
-    items = (file[name] for name in names)
-    maps = [item for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
-    places = [(item.id.get_offset(), item.nbytes) for item in maps if item.id.get_offset() is not None]
-    merged: list[tuple[int, int]] = []
-    for start, length in sorted(place for place in places if place[1]):
-        merged.append((merged.pop()[0] if merged and merged[-1][1] == start else start, start + length))
-    return merged
+def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
+    """Put maps of one instant or point into their place, and then its coordinates, the `marks`; collective."""
+    write(path, slab, [Part(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()])
+    mark(path, slab, index, marks)
 
 
-def outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterator[tuple[int, int]]:
-    """Yield all that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
-    for first, last in [*found, (size, size)]:
-        for position in range(start, first, PIECE):
-            yield position, min(position + PIECE, first)
-        start = last
+def mark(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
+    """Set coordinates of instants or points, which tell that their maps are saved (NaN: not saved); collective."""
+
+    def act() -> None:
+        with h5py.File(path, "r", locking=False) as file:
+            axes = {name: file[name][...] for name in marks}
+        for name, value in marks.items():
+            axes[name][index] = value
+        put(path, axes)
+
+    on_root(slab, act, f"cannot write {path}")
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:

@@ -38,17 +38,8 @@ class SteadyMaps:
 
     def save(self, index: int, maps: Mapping[str, Array]) -> None:
         """Put the maps of a point into their place; raises RunError."""
-        rows = [hdf5.Part(name, (index,), np.ascontiguousarray(maps[name], dtype=np.float64)) for name in self.names]
-        hdf5.write(self.path, self.slab, rows)
-
-        def stamp() -> None:
-            with h5py.File(self.path, "r", locking=False) as file:
-                axes = {name: file[name][...] for name in self.axes}
-            for name, value in zip(self.axes, self.points[index], strict=True):
-                axes[name][index] = value
-            hdf5.put(self.path, axes)
-
-        hdf5.on_root(self.slab, stamp, f"cannot write {self.path}")
+        marks = dict(zip(self.axes, self.points[index], strict=True))
+        hdf5.save_maps(self.path, self.slab, index, {name: maps[name] for name in self.names}, marks)
 
     def _fits(self) -> bool:
         """Return whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from parcontact.errors import RunError
 from parcontact.parallel.slab import Array, Slab
-from parcontact.storage import hdf5
+from parcontact.storage import checkpoint, hdf5
 from parcontact.storage.hdf5 import Part
 
 pytestmark = pytest.mark.mpi
@@ -122,10 +122,10 @@ def test_regions_and_what_is_outside(comm: MPI.Intracomm, shared_path: Path) -> 
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     make(path, slab)
     with h5py.File(path) as file:
-        found = hdf5.regions(file)
+        found = checkpoint.find_regions(file)
     size = path.stat().st_size
     covered = np.zeros(size, dtype=int)
-    for start, stop in [*found, *hdf5.outside(size, found)]:
+    for start, stop in [*found, *checkpoint.pieces_outside(size, found)]:
         covered[start:stop] += 1
     assert (covered == 1).all()
     assert sum(stop - start for start, stop in found) == (2 + 3) * 6 * 9 * 8
