@@ -67,7 +67,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     """Draw a chart; `log` names the axes of logarithmic scale. The legend of many lines is beside a panel that has the
     whole width."""
     log_x, log_y = "none" not in log and (chart.log_x or "x" in log), "y" in log
-    series = [_on_axes(one, log_x, log_y) for one in chart.series]
+    series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
     for one in series:
         axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
@@ -76,17 +76,17 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     set_scale(axes, "x", chart.x.name, chart.x.unit, log_x)
     set_scale(axes, "y", chart.y.name, chart.y.unit, log_y)
     if not log_y:
-        _limit(axes, chart, series, log_x)
+        _set_limits(axes, chart, series, log_x)
         if chart.peak:
             _name_peak(axes, series[0], chart.x.unit)
         units.label(axes.yaxis, chart.y.name, chart.y.unit)
-    _mark(axes, chart.stages, chart.named)
+    _mark_stages(axes, chart.stages, chart.named)
     if names := len(axes.get_legend_handles_labels()[1]):
         place = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {"ncols": 1 + (names > 4)}
         axes.legend(title=chart.legend_title or None, **place)
 
 
-def _on_axes(one: Series, log_x: bool, log_y: bool) -> Series:
+def _drop_hidden_points(one: Series, log_x: bool, log_y: bool) -> Series:
     """Return a line without the points that logarithmic axes cannot show."""
     x, y = np.asarray(one.x, dtype=float), np.asarray(one.y, dtype=float)
     there = np.isfinite(x) & ((x > 0.0) | (not log_x)) & ((y > 0.0) | (not log_y))
@@ -117,7 +117,7 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
         axis.set_label_text(f"{name} [{unit}]" if unit else name)
 
 
-def _limit(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> None:
+def _set_limits(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> None:
     """Show zero, and room above bars of errors up to the whole of a value; leave out a spike, whose height is told."""
     ys = np.concatenate([one.y for one in series])
     highest = _highest(ys)
@@ -150,7 +150,7 @@ def _name_peak(axes: Axes, one: Series, unit: str) -> None:
         axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=told, scalex=False, scaley=False)
 
 
-def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -> None:
+def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -> None:
     """Show where stages begin, and their names above: on several levels where they would touch, else turned."""
     for _, start, _ in stages[1:]:
         axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
@@ -161,7 +161,8 @@ def _mark(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -
     ends = np.clip(places, 0.0, 1.0).reshape(-1, 2)  # from 0 at the left to 1 at the right
     names = [style.plain(name, MAX_NAME) for name, _, _ in stages]
     middles = width * ends.mean(axis=1)
-    levels = _levels(middles, [TextPath((0, 0), name, size=NAMES).get_extents().width + NAMES / 2 for name in names])
+    widths = [TextPath((0, 0), name, size=NAMES).get_extents().width + NAMES / 2 for name in names]
+    levels = _choose_levels(middles, widths)
     turned = max(levels) >= LEVELS
     if turned:  # those of the longest stages, as near to them as they may be without touching
         longest = np.sort(np.argsort(ends[:, 0] - ends[:, 1], kind="stable")[: int(width / LINE)])
@@ -180,7 +181,7 @@ def _panels_beside(axes: Axes) -> int:
     return place.get_gridspec().ncols if place else 1
 
 
-def _levels(middles: Array, widths: Sequence[float]) -> list[int]:
+def _choose_levels(middles: Array, widths: Sequence[float]) -> list[int]:
     """Return the lowest levels on which texts of given middles and widths, in order, do not touch."""
     ends: list[float] = []
     levels = []
@@ -191,7 +192,7 @@ def _levels(middles: Array, widths: Sequence[float]) -> list[int]:
     return levels
 
 
-def compared(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
+def compare(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
     """Return charts of several runs: the same measures in one, the lines of each run in its colour, named after it."""
     found: dict[tuple[str, Axis, Axis], Chart] = {}
     for number, (name, charts) in enumerate(runs):

@@ -42,11 +42,11 @@ def charts(run: Run, over: str = "") -> list[Chart]:
     """Return panels of what was measured; none of a single solve. Raises InputError where nothing can be drawn."""
     if not run.curves:
         return []
-    along = _abscissa(run, over)
+    along = _choose_abscissa(run, over)
     log = along.axis.unit == "s" and _steps_grow(along.values)
-    found = [replace(chart, stages=along.stages, log_x=log) for chart in _charts(run, along)]
+    found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_charts(run, along)]
     found[0] = replace(found[0], named=True)
-    return found if along.marked else [_beside_theory(chart, run) for chart in found]
+    return found if along.marked else [_add_theory(chart, run) for chart in found]
 
 
 def _steps_grow(times: Array) -> bool:
@@ -55,7 +55,7 @@ def _steps_grow(times: Array) -> bool:
     return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
 
 
-def _beside_theory(chart: Chart, run: Run) -> Chart:
+def _add_theory(chart: Chart, run: Run) -> Chart:
     """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
     column = {"friction": "friction", "area": "contact_area"}.get(chart.key)
     table = run.directory / "theory.csv"
@@ -70,7 +70,7 @@ def _beside_theory(chart: Chart, run: Run) -> Chart:
     return replace(chart, series=lines)
 
 
-def _charts(run: Run, along: Abscissa) -> Iterator[Chart]:
+def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
     """Yield the panels that a run has: key, measure, lines by name, and whether there is something to see."""
     columns, free = run.columns, run.free
     signed = run.backwards and not along.marked  # over the speed, no direction is told
@@ -103,7 +103,7 @@ def _charts(run: Run, along: Abscissa) -> Iterator[Chart]:
             yield found if along.marked else replace(found, peak=peak, spikes=not peak)
 
 
-def numbers(run: Run) -> str:
+def describe_solve(run: Run) -> str:
     """Return what the last solve has found, in words."""
     axis, load = run.load
     fraction = run.columns["contact_area"][-1]
@@ -115,7 +115,7 @@ def numbers(run: Run) -> str:
     return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
 
 
-def _abscissa(run: Run, over: str) -> Abscissa:
+def _choose_abscissa(run: Run, over: str) -> Abscissa:
     """Return what was asked for, else the distance if the surface slides whenever time passes, else time, else load."""
     if not over:
         slides = run.slides and all(stage.speed > 0.0 for stage in run.job.history if stage.seconds)
@@ -123,7 +123,7 @@ def _abscissa(run: Run, over: str) -> Abscissa:
     if over == "load":
         return Abscissa(*run.load, marked=True)
     if over == "velocity":
-        return _over_velocity(run)
+        return _choose_velocity(run)
     axis, values = Axis("distance slid" if over == "distance" else over, UNITS[over]), run.columns[over]
     if not np.ptp(values):
         told = f"{over}, which stays {values[-1]:g} {axis.unit}"
@@ -134,7 +134,7 @@ def _abscissa(run: Run, over: str) -> Abscissa:
     return Abscissa(axis, values, stages=stages)
 
 
-def _over_velocity(run: Run) -> Abscissa:
+def _choose_velocity(run: Run) -> Abscissa:
     """Return the last row of each stage that slides, over its speed."""
     ends = [(run.job.history[number].speed, rows[-1]) for number, rows in run.rows_of_stages.items()]
     sliding = sorted((speed, row) for speed, row in ends if speed > 0.0)

@@ -23,12 +23,12 @@ def panels(run: Run, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
     """Yield the panel of a narrow map, or of the only shape of a surface if that is round."""
     shape = run.job.surface[0]
     if narrow:
-        yield _strip(run, fields)
+        yield _make_strip(run, fields)
     elif len(run.job.surface) == 1 and isinstance(shape, Sphere | Cylinder):
-        yield _profile(run, fields, shape)
+        yield _make_profile(run, fields, shape)
 
 
-def _chosen(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], str]:
+def _choose_instants(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], str]:
     """Return some saved instants, evenly, and what tells them apart; and the load of all if it is one, for a title."""
     indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
     instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
@@ -38,7 +38,7 @@ def _chosen(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], str]:
     return [(index, run.instant(step, time)) for index, step, time in instants], ""
 
 
-def _draw(
+def _draw_pressures(
     axes: Axes, curves: Sequence[Curve], along: str, title: str, theory: Sequence[Curve] = (), reach: float = 0.0
 ) -> None:
     """Draw pressures on lines up to `reach` on both sides, if it is given, beside theory."""
@@ -57,22 +57,22 @@ def _draw(
     axes.legend(**style.BESIDE)
 
 
-def _strip(run: Run, fields: Fields) -> style.Panel:
+def _make_strip(run: Run, fields: Fields) -> style.Panel:
     """Return a panel of pressures along the long side of a narrow map."""
     lies = fields.x.size > fields.y.size
-    chosen, load = _chosen(run, fields)
+    chosen, load = _choose_instants(run, fields)
     maps = [(name, fields.file["pressure"][index]) for index, name in chosen]
     curves = [(name, fields.x, field[0]) if lies else (name, fields.y, field[:, 0]) for name, field in maps]
     some = "some of the " if len(curves) < len(fields.shown) else "the "
     title = f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads"
-    return partial(_draw, curves=curves, along="x" if lies else "y", title=title)
+    return partial(_draw_pressures, curves=curves, along="x" if lies else "y", title=title)
 
 
-def _profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
+def _make_profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
     """Return a panel of pressures on a line through the axis, seen from it, beside Hertz's under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
-    chosen, load = _chosen(run, fields)
+    chosen, load = _choose_instants(run, fields)
     curves: list[Curve] = []
     for index, name in chosen:
         moved = run.moved(int(fields.steps[index]))
@@ -84,13 +84,13 @@ def _profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
     theory: list[Curve] = []
     if isinstance(shape, Sphere) and force > 0.0:
         r, poisson = np.linspace(-reach, reach, 401), run.job.material.poisson
-        for name, modulus in _moduli(run):
+        for name, modulus in _find_moduli(run):
             theory.append((name, r, hertz.pressure(np.abs(r), force, shape.radius, modulus, poisson)))
     along, title = f"{'y' if across else 'x'} from the axis", f"pressure on a line through the axis{load}"
-    return partial(_draw, curves=curves, along=along, title=title, theory=theory, reach=reach)
+    return partial(_draw_pressures, curves=curves, along=along, title=title, theory=theory, reach=reach)
 
 
-def _moduli(run: Run) -> list[tuple[str, float]]:
+def _find_moduli(run: Run) -> list[tuple[str, float]]:
     """Return the shear moduli [Pa] of the elastic bodies to compare with."""
     material = run.job.material
     if isinstance(material, Elastic):

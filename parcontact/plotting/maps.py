@@ -39,7 +39,7 @@ STRIP = 8  # points across: a map as narrow as this is drawn as a line
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
 
-def maps(run: Run, at: str = "") -> list[style.Panel]:
+def panels(run: Run, at: str = "") -> list[style.Panel]:
     """Return panels of the last saved instant, or of the one that is asked for; none if nothing was saved.
 
     Raises InputError where nothing is saved at the instant that is asked for.
@@ -67,13 +67,13 @@ def _panels(run: Run, fields: Fields) -> Iterator[style.Panel]:
     instant = run.instant(int(fields.steps[last]), float(fields.times[last]))
     for name, values in found.items():
         if values is not None:
-            yield _panel(fields, name, shown(name, values, pressure), instant, _window(pressure))
+            yield _panel(fields, name, mask(name, values, pressure), instant, _find_window(pressure))
 
 
 def _panel(fields: Fields, name: str, values: Array, instant: str, window: Window) -> style.Panel:
     rows, columns = window
     part = values[window]
-    limits = colour_range(part)
+    limits = find_range(part)
 
     def draw(axes: Axes) -> None:
         beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
@@ -84,7 +84,7 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
     return draw
 
 
-def shown(name: str, values: Array, pressure: Array | None) -> Array:
+def mask(name: str, values: Array, pressure: Array | None) -> Array:
     """Return a map as it is drawn: pressures where there are any, gaps, none negative, where there is no contact."""
     if name == "pressure":
         return np.where(values > 0.0, values, np.nan)
@@ -94,7 +94,7 @@ def shown(name: str, values: Array, pressure: Array | None) -> Array:
     return values
 
 
-def _window(pressure: Array | None) -> Window:
+def _find_window(pressure: Array | None) -> Window:
     """Return the rows and columns around a contact that fills only a part of the box; else all of them."""
     whole = slice(None), slice(None)
     if pressure is None or not (pressure > 0.0).any():
@@ -107,7 +107,7 @@ def _window(pressure: Array | None) -> Window:
     return whole if pressure[cut[0], cut[1]].size > 0.5 * pressure.size else (cut[0], cut[1])
 
 
-def colour_range(values: Array) -> tuple[float, float]:
+def find_range(values: Array) -> tuple[float, float]:
     """Return the range of the colours: from 0 if nothing is negative; few very high points do not darken all others.
 
     Where no point has a value the range is empty, from inf to -inf.
@@ -157,16 +157,16 @@ def _draw_line(
     return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
 
 
-def frames(
+def draw_frames(
     file: h5py.File, name: str, labels: Mapping[int, str], size: tuple[float, float] = (4.5, 4.0), dpi: int = 110
 ) -> Iterator[Image.Image]:
     """Draw a map of shape (instant, y, x) in a file at each index that has a label, with one range of colours."""
 
     def read(index: int) -> Array:
         pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
-        return shown(name, file[name][index], pressure)
+        return mask(name, file[name][index], pressure)
 
-    ranges = [colour_range(read(index)) for index in labels]
+    ranges = [find_range(read(index)) for index in labels]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)
     figure, x, y = Figure(figsize=size, layout="constrained"), file["x"][...], file["y"][...]
     axes = figure.subplots()

@@ -22,7 +22,7 @@ from ..storage import files, hdf5
 from ..summary import sweep_table, theory_settings
 from . import charts, histories, maps, steady, style, sweep
 from .charts import Chart
-from .run import Run, frame_labels
+from .run import Run, label_frames
 
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "steady", "maps")
 MEASURES = "measures.csv"
@@ -56,11 +56,11 @@ class Options:
     def wants(self, key: str) -> bool:
         return not self.panels or key in self.panels
 
-    def chosen(self, found: Sequence[Chart]) -> list[Chart]:
+    def choose(self, found: Sequence[Chart]) -> list[Chart]:
         """Return the charts that are asked for, in that order."""
         return [chart for name in self.panels for chart in found if chart.key == name] if self.panels else list(found)
 
-    def drawn(self, found: Sequence[Chart]) -> list[style.Panel]:
+    def to_panels(self, found: Sequence[Chart]) -> list[style.Panel]:
         return [partial(charts.draw, chart, log=self.log) for chart in found]
 
 
@@ -73,20 +73,20 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
         raise InputError("--out names one picture: give one directory, or --compare several in one")
     with style.drawing():
         if options.movie:
-            return [_movie(directory, options) for directory in directories]
+            return [_write_movie(directory, options) for directory in directories]
         if options.compare:
-            return [_save(_comparison(directories, options), Path("comparison"), options)]
-        return [_save(_picture(directory, options), directory / "picture", options) for directory in directories]
+            return [_save(_draw_comparison(directories, options), Path("comparison"), options)]
+        return [_save(_draw_directory(directory, options), directory / "picture", options) for directory in directories]
 
 
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        title, panels = _wrapped(steady.title(table.parent)), Options().drawn(steady.charts(table.parent))
+        title, panels = _wrap(steady.title(table.parent)), Options().to_panels(steady.charts(table.parent))
         return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
 
 
-def _wrapped(title: str) -> str:
+def _wrap(title: str) -> str:
     return "\n".join(textwrap.wrap(title, style.LINE))
 
 
@@ -101,7 +101,7 @@ def _save(figure: Figure, stem: Path, options: Options = Options()) -> Path:
         raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
 
 
-def _movie(directory: Path, options: Options) -> Path:
+def _write_movie(directory: Path, options: Options) -> Path:
     """Write all saved instants of a map as a GIF, with one range of colours."""
     path, name = directory / "fields.h5", options.movie
     target = options.out or directory / f"{name}.gif"
@@ -109,14 +109,14 @@ def _movie(directory: Path, options: Options) -> Path:
         raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
     try:
         with h5py.File(path, "r", locking=False) as file:
-            labels = frame_labels(Run(directory), file)
+            labels = label_frames(Run(directory), file)
             there = [key for key in maps.LOOKS if key in file]
             if name not in there or not labels:
                 raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
-            chosen = spread(labels, FRAMES)
+            chosen = choose_evenly(labels, FRAMES)
             duration = int(1000 / np.clip(round(len(chosen) / SECONDS), SLOWEST, FASTEST))  # of a frame [ms]
             with files.replaced(target, files.is_marked) as movie:
-                first, *others = maps.frames(file, name, chosen)
+                first, *others = maps.draw_frames(file, name, chosen)
                 look: dict[str, Any] = {"append_images": others, "duration": duration, "loop": 0}
                 first.save(movie, "GIF", save_all=True, comment=files.MARK.encode(), **look)
     except hdf5.FAILURES as error:
@@ -124,45 +124,43 @@ def _movie(directory: Path, options: Options) -> Path:
     return target
 
 
-def spread(labels: dict[int, str], most: int) -> dict[int, str]:
+def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
     """Return at most so many instants, evenly, the first and the last among them."""
     indices = list(labels)
     kept = np.linspace(0, len(indices) - 1, min(len(indices), most)).astype(int)
     return {indices[k]: labels[indices[k]] for k in kept}
 
 
-def _picture(directory: Path, options: Options) -> Figure:
+def _draw_directory(directory: Path, options: Options) -> Figure:
     """Draw all that there is in a directory."""
     has_run, has_curve, has_sweep = ((directory / name).is_file() for name in (MEASURES, steady.TABLE, sweep.TABLE))
     groups: list[Sequence[style.Panel]] = []
     titles = []
     if has_run:
         run = Run(directory)
-        found = _wrapped(run.job.title or directory.absolute().name)
-        titles.append(found if run.curves else f"{found}\n{histories.numbers(run)}")
-        groups.append(options.drawn(options.chosen(histories.charts(run, options.over))))
+        found = _wrap(run.job.title or directory.absolute().name)
+        titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
+        groups.append(options.to_panels(options.choose(histories.charts(run, options.over))))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
     if has_curve and options.wants("steady"):
-        titles.append(_wrapped(steady.title(directory)))
-        groups.append(options.drawn(steady.charts(directory, options.over)))
+        titles.append(_wrap(steady.title(directory)))
+        groups.append(options.to_panels(steady.charts(directory, options.over)))
     if has_run and options.wants("maps"):
-        groups.append(maps.maps(run, options.at or ""))
+        groups.append(maps.panels(run, options.at or ""))
     if has_sweep:
-        titles.append(_wrapped(sweep.title(directory) or directory.absolute().name))
-        groups += [options.drawn([chart]) for chart in options.chosen(sweep.charts(directory))]
+        titles.append(_wrap(sweep.title(directory) or directory.absolute().name))
+        groups += [options.to_panels([chart]) for chart in options.choose(sweep.charts(directory))]
     if not (has_run or has_curve or has_sweep):
-        raise InputError(
-            f"{directory} holds no run and no friction curve: it has no {MEASURES} and no {steady.TABLE}"
-            f"{_instead(directory)}"
-        )
+        lacking = f"it has no {MEASURES} and no {steady.TABLE}{_suggest(directory)}"
+        raise InputError(f"{directory} holds no run and no friction curve: {lacking}")
     if options.panels and not any(groups):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
     title = "\n".join(filter(None, (*titles[:1], theory_settings.describe(directory))))
     return style.figure_of(title, groups, legend=has_curve and len(groups) == 1)
 
 
-def _instead(path: Path) -> str:
+def _suggest(path: Path) -> str:
     """Return which directory may have been meant: the first below it that holds something, or that of a job file."""
     if path.is_file():
         return "; give the output directory of a run, as out/job"
@@ -170,32 +168,32 @@ def _instead(path: Path) -> str:
     return f"; did you mean {found[0]}?" if found else ""
 
 
-def _comparison(directories: Sequence[Path], options: Options) -> Figure:
+def _draw_comparison(directories: Sequence[Path], options: Options) -> Figure:
     """Draw the lines of all directories in one picture."""
     for directory in directories:
-        if not _lines(directory, options):
+        if not _find_charts(directory, options):
             raise InputError(f"{directory} holds nothing to compare")
-    return style.figure_of("", [options.drawn(compared_charts(directories, options))], legend=True)
+    return style.figure_of("", [options.to_panels(compare_charts(directories, options))], legend=True)
 
 
-def compared_charts(directories: Sequence[Path], options: Options = Options()) -> list[Chart]:
+def compare_charts(directories: Sequence[Path], options: Options = Options()) -> list[Chart]:
     """Return charts with the lines of all directories that have any."""
-    found = [(name, _lines(path, options)) for name, path in zip(_names(directories), directories, strict=True)]
-    return charts.compared([(name, lines) for name, lines in found if lines])
+    found = [_find_charts(directory, options) for directory in directories]
+    return charts.compare([each for each in zip(_name_directories(directories), found, strict=True) if each[1]])
 
 
-def _lines(directory: Path, options: Options) -> list[Chart]:
+def _find_charts(directory: Path, options: Options) -> list[Chart]:
     found: list[Chart] = []
     if (directory / MEASURES).is_file():
-        found += options.chosen(histories.charts(Run(directory), options.over))
+        found += options.choose(histories.charts(Run(directory), options.over))
     if (directory / steady.TABLE).is_file() and options.wants("steady"):
         found += steady.charts(directory, options.over)
     return found
 
 
-def _names(directories: Sequence[Path]) -> list[str]:
+def _name_directories(directories: Sequence[Path]) -> list[str]:
     """Return what tells directories apart: of cases of one sweep their keys, else the last parts of paths."""
-    if named := _names_of_cases(directories):
+    if named := _name_cases(directories):
         return named
     paths = [directory.absolute() for directory in directories]
     above = os.path.commonpath([path.parent for path in paths])
@@ -203,7 +201,7 @@ def _names(directories: Sequence[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(path.relative_to(above)) for path in paths]
 
 
-def _names_of_cases(directories: Sequence[Path]) -> list[str]:
+def _name_cases(directories: Sequence[Path]) -> list[str]:
     """Return the keys in which cases of one sweep differ, as `velocity 0.1, seed 2`; nothing for other directories."""
     paths = [directory.absolute() for directory in directories]
     table = paths[0].parent.parent / sweep.TABLE if paths else Path()

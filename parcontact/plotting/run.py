@@ -30,7 +30,7 @@ class Run:
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
         self.area = self.job.grid.lx * self.job.grid.ly  # of the box [m^2]
         self.free = self.job.grid.boundary == "free"
-        self._all = table(directory / "measures.csv", MEASURED)
+        self._all = read_table(directory / "measures.csv", MEASURED)
         if not self._all["step"].size:
             raise InputError(f"{directory} holds no step yet")
         first = int(self._all["pressure"][0] == 0.0 and self._all["step"].size > 1)
@@ -39,11 +39,11 @@ class Run:
 
     @property
     def load(self) -> tuple[Axis, Array]:
-        return load_of(self.columns["pressure"], self.area * self.free)
+        return to_load(self.columns["pressure"], self.area * self.free)
 
     @property
     def in_contact(self) -> tuple[Axis, Array]:
-        return contact_of(self.columns["contact_area"], self.area * self.free)
+        return to_contact_area(self.columns["contact_area"], self.area * self.free)
 
     @property
     def backwards(self) -> bool:
@@ -88,7 +88,7 @@ class Run:
             return ""
         if stage >= 0 and self.job.history[stage].control == "approach":
             return f"approach {units.text(self._all['approach'][rows[-1]], 'm')}"
-        axis, loads = load_of(self._all["pressure"], self.area * self.free)
+        axis, loads = to_load(self._all["pressure"], self.area * self.free)
         return units.text(loads[rows[-1]], axis.unit)
 
     def moved(self, step: int) -> tuple[float, float]:
@@ -129,14 +129,14 @@ class Fields:
         return int(self.saved[order[0]])
 
 
-def frame_labels(run: Run, file: h5py.File) -> dict[int, str]:
+def label_frames(run: Run, file: h5py.File) -> dict[int, str]:
     """Return when each map of a run was saved, and what pressed then, by its index."""
     fields = Fields(file)
     told = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)
     return {k: f"{run.instant(step, time)} (step {step})".lstrip() for k, step, time in told}
 
 
-def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
+def read_table(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """Return columns of a table by name; raises InputError where one of those that are needed is missing."""
     columns = {name: np.array(values, dtype=float) for name, values in tables.read(path).items()}
     if missing := [name for name in names if name not in columns]:
@@ -144,7 +144,7 @@ def table(path: Path, names: Sequence[str]) -> dict[str, Array]:
     return columns
 
 
-def box(directory: Path) -> float:
+def find_free_area(directory: Path) -> float:
     """Return the area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
     for name in (STEADY_RESOLVED, RESOLVED):
         if (directory / name).is_file():
@@ -153,11 +153,11 @@ def box(directory: Path) -> float:
     return 0.0
 
 
-def load_of(pressure: Array, area: float) -> tuple[Axis, Array]:
+def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:
     """Return what presses: the force on the box of a free scene of this area, else the mean pressure."""
     return (Axis("force", "N"), pressure * area) if area else (Axis("pressure", "Pa"), pressure)
 
 
-def contact_of(fraction: Array, area: float) -> tuple[Axis, Array]:
+def to_contact_area(fraction: Array, area: float) -> tuple[Axis, Array]:
     """Return the contact area of a free scene, whose box has this area, else its fraction of the nominal one."""
     return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)

@@ -12,7 +12,7 @@ from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from . import style, units
 from .charts import Axis, Chart, Series
-from .run import box, contact_of, load_of, table
+from .run import find_free_area, read_table, to_contact_area, to_load
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
@@ -21,34 +21,34 @@ DIGITS = 6  # in which values agree that are the same but for rounding
 
 def charts(directory: Path, over: str = "") -> list[Chart]:
     """Return panels of a table of steady states; none if it holds no state yet, or is not to be drawn over `over`."""
-    columns, area = table(directory / TABLE, NEEDED), box(directory)
+    columns, area = read_table(directory / TABLE, NEEDED), find_free_area(directory)
     if over in ("time", "distance") or not columns["velocity"].size:
         return []
     axes = {
         "velocity": Axis("sliding velocity", "m/s"),
-        "load": load_of(columns["pressure"], area)[0],
+        "load": to_load(columns["pressure"], area)[0],
         "temperature": Axis("temperature", "°C"),
         "reduced": Axis("shift factor × velocity", "m/s"),
         "friction": Axis("friction coefficient"),
-        "area": contact_of(columns["contact_area"], area)[0],
+        "area": to_contact_area(columns["contact_area"], area)[0],
     }
     _add_derived(columns, area)
     x, by = "velocity", "load"
-    if over == "load" or (not over and _number(columns[x]) < 2 <= _number(columns[by])):
+    if over == "load" or (not over and _count(columns[x]) < 2 <= _count(columns[by])):
         x, by = by, x
-    warm = "temperature" in columns and _number(columns["temperature"]) > 1
+    warm = "temperature" in columns and _count(columns["temperature"]) > 1
     by = "temperature" if warm else by
     panels = [("steady friction", x, "friction", "steady, at"), ("steady area", x, "area", "")]
     if warm and x == "velocity":
         panels.append(("steady master", "reduced", "friction", ""))
     theory = {}
     if x == "velocity" and (directory / THEORY).is_file():
-        theory = table(directory / THEORY, (*NEEDED, "shift_factor"))
+        theory = read_table(directory / THEORY, (*NEEDED, "shift_factor"))
         _add_derived(theory, area)
     found = []
     for key, along, name, title in panels:
-        series = list(_lines(columns, along, name, by, axes[by].unit))
-        series += _theory(theory, along, name, by) if theory else ()
+        series = list(_make_lines(columns, along, name, by, axes[by].unit))
+        series += _make_theory(theory, along, name, by) if theory else ()
         found.append(Chart(key, axes[along], axes[name], series, log_x=True, legend_title=title))
     return found
 
@@ -56,23 +56,23 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
 def title(directory: Path) -> str:
     """Return the title of the job, with the pressure or force if there is one for all points."""
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
-    axis, loads = load_of(table(directory / TABLE, ("pressure",))["pressure"], box(directory))
+    axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))
     name = (job.title if job else "") or "steady sliding"
-    return f"{name}: {units.text(loads[0], axis.unit)}" if _number(loads) == 1 else name
+    return f"{name}: {units.text(loads[0], axis.unit)}" if _count(loads) == 1 else name
 
 
 def _add_derived(columns: dict[str, Array], area: float) -> None:
     """Add what is drawn to the columns of a table: loads, areas as corrected, and speeds at the reference."""
-    columns["load"] = load_of(columns["pressure"], area)[1]
-    columns["area"] = contact_of(columns.get("contact_area_corrected", columns["contact_area"]), area)[1]
+    columns["load"] = to_load(columns["pressure"], area)[1]
+    columns["area"] = to_contact_area(columns.get("contact_area_corrected", columns["contact_area"]), area)[1]
     if "shift_factor" in columns:
         columns["reduced"] = columns["shift_factor"] * columns["velocity"]
 
 
-def _lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Iterator[Series]:
+def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Iterator[Series]:
     """Yield a line for each value of the column `by`."""
     error = columns.get(f"error_{y}")
-    groups = _rounded(columns[by])
+    groups = _round(columns[by])
     for number, value in enumerate(np.unique(groups)):
         rows = np.flatnonzero(groups == value)
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
@@ -80,18 +80,18 @@ def _lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Ite
         yield Series(*shown, None if error is None else error[rows])
 
 
-def _theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[Series]:
+def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[Series]:
     """Yield thin lines of Persson's theory: as many as there are of the simulation, one over a_T v."""
     one = {"one": np.zeros_like(columns[x])} if x == "reduced" else {}
-    for number, line in enumerate(_lines(columns | one, x, y, "one" if one else by, "")):
+    for number, line in enumerate(_make_lines(columns | one, x, y, "one" if one else by, "")):
         color = style.GREY if one else style.line(number)["color"]
         yield Series("" if number else "theory", line.x, line.y, {"color": color, "linestyle": ":"})
 
 
-def _rounded(values: Array) -> Array:
+def _round(values: Array) -> Array:
     return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
-def _number(values: Array) -> int:
+def _count(values: Array) -> int:
     """Return how many values there are, but for rounding."""
-    return np.unique(_rounded(values)).size
+    return np.unique(_round(values)).size

@@ -79,7 +79,7 @@ def line(number: int) -> dict[str, Any]:
 
 def figure_of(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False) -> Figure:
     """Draw groups of panels below each other, each in even rows; with `legend` one for all panels, under the title."""
-    rows = [row for group in groups for row in _rows(group)]
+    rows = [row for group in groups for row in _split_rows(group)]
     height = 0.25 + 0.2 * (title.count("\n") + 1) + HEIGHT * len(rows)
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     if title and not legend:
@@ -92,7 +92,7 @@ def figure_of(title: str, groups: Sequence[Sequence[Panel]], legend: bool = Fals
     return figure
 
 
-def _rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
+def _split_rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
     count = -(-len(group) // COLUMNS)
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
 

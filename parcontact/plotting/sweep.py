@@ -33,15 +33,15 @@ Rows = Sequence[dict[str, Any]]
 def charts(directory: Path) -> list[Chart]:
     """Return panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
     rows = sweep_table.read(directory / TABLE)
-    keys = _keys(rows)
+    keys = _find_keys(rows)
     if not keys:
         return []
     key, *others = keys
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, title, columns in PANELS:
-        wanted = [(name, part, own, column) for part, own in _parts(rows, others) for name, column in columns.items()]
-        series = [line for k, one in enumerate(wanted) for line in _lines(*one, key, style.line(k)["color"])]
+        wanted = [(name, part, own, column) for part, own in _split(rows, others) for name, column in columns.items()]
+        series = [line for k, one in enumerate(wanted) for line in _make_lines(*one, key, style.line(k)["color"])]
         if series:
             dots = next((k for k, one in enumerate(series) if one.look.get("marker") == "."), None)
             if dots is not None:
@@ -58,7 +58,7 @@ def title(directory: Path) -> str:
     return shown_job(jobs[0]).title if jobs else ""
 
 
-def _keys(rows: Rows) -> list[str]:
+def _find_keys(rows: Rows) -> list[str]:
     """Return the keys that have several numbers and are no seeds, the first of those that move together."""
     names = list(rows[0]) if rows else ["case", "state"]
     keys: dict[tuple[int, ...], str] = {}  # by which rows have the same value
@@ -70,7 +70,7 @@ def _keys(rows: Rows) -> list[str]:
     return [name for name in keys.values() if all(isinstance(row[name], float) for row in rows)]
 
 
-def _parts(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
+def _split(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
     """Yield the rows of each line, and its name: those that agree in the second key, if it has few values."""
     values = sorted({row[others[0]] for row in rows}) if others else []
     if not 1 < len(values) <= MAX_LINES:
@@ -81,24 +81,24 @@ def _parts(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
         yield f", {units.text(value, unit)}", [row for row in rows if row[others[0]] == value]
 
 
-def _lines(name: str, part: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
+def _make_lines(name: str, part: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
     """Yield means as a line with its points, all cases as small dots, and the theory."""
-    x, y, theory = (_numbers(rows, wanted) for wanted in (key, column, f"theory_{column}"))
+    x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{column}"))
     if (there := np.isfinite(y)).any():
-        at, means = _means(x[there], y[there])
+        at, means = _average(x[there], y[there])
         yield Series(name + part, at, means, {"marker": "o", "linestyle": "-", "color": color})
         if at.size < there.sum():
             look = {"marker": ".", "linestyle": "none", "color": color, "alpha": 0.5, "markersize": 3}
             yield Series("", x[there], y[there], look)
     if (there := np.isfinite(theory)).any():
-        yield Series("theory" + part, *_means(x[there], theory[there]), {"linestyle": "--", "color": color})
+        yield Series("theory" + part, *_average(x[there], theory[there]), {"linestyle": "--", "color": color})
 
 
-def _means(x: Array, y: Array) -> tuple[Array, Array]:
+def _average(x: Array, y: Array) -> tuple[Array, Array]:
     at = np.unique(x)
     return at, np.array([y[x == value].mean() for value in at])
 
 
-def _numbers(rows: Rows, name: str) -> Array:
+def _read_column(rows: Rows, name: str) -> Array:
     values = [row.get(name) for row in rows]
     return np.array([value if isinstance(value, float) else np.nan for value in values])

@@ -10,13 +10,13 @@ from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
 from ..plotting import plots
 from . import log, material, origin, results, road
-from .parts import Chapter, Section, Table, of_chart, of_file
+from .parts import Chapter, Section, Table, draw_chart, embed_file
 
 KINDS = {  # by the table that each of them has
-    "measures.csv": ("run", results.of_run),
-    "steady.csv": ("friction curve", results.of_curve),
-    "sweep.csv": ("sweep", results.of_sweep),
-    "study.csv": ("study", results.of_study),
+    "measures.csv": ("run", results.describe_run),
+    "steady.csv": ("friction curve", results.describe_curve),
+    "sweep.csv": ("sweep", results.describe_sweep),
+    "study.csv": ("study", results.describe_study),
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
 MORE_TABLES = ("theory.csv", "steady_waves.csv", "steady_theory.csv", "sweep_mean.csv")
@@ -34,13 +34,14 @@ def chapter(directory: Path) -> Chapter:
     if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
         job, warnings = _read_job(resolved)
         title = job.title
-        sections += [_asked(job, resolved.with_name(JOBS[resolved.name])), material.section(job), road.section(job)]
+        asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
+        sections += [asked, material.section(job), road.section(job)]
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job.numerics.accuracy)
         sections.append(Section("Warnings", found.warnings or warnings or ["There was no warning."]))
-    data = [of_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
+    data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
     said = "The tables, in SI units and with all digits, are inside this file:"
-    sections += [origin.section(directory, found), origin.to_cite(), Section("Data", [said], downloads=data)]
+    sections += [origin.section(directory, found), origin.list_citations(), Section("Data", [said], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
     return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if one])
 
@@ -48,10 +49,10 @@ def chapter(directory: Path) -> Chapter:
 def together(directories: Sequence[Path]) -> Iterator[Chapter]:
     """Yield what several directories have in common, in one picture each: lines of a directory have one colour."""
     if len(directories) > 1:
-        found = plots.compared_charts(directories)
+        found = plots.compare_charts(directories)
         shared = [chart for chart in found if len({one.look["color"] for one in chart.series}) > 1]
         if shared:
-            yield Chapter("Comparison", Path(), "", [Section("Together", pictures=[of_chart(one) for one in shared])])
+            yield Chapter("Comparison", Path(), "", [Section("Together", pictures=[draw_chart(one) for one in shared])])
 
 
 def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
@@ -63,7 +64,7 @@ def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
         return shown_job(resolved), ()
 
 
-def _asked(job: Job, given: Path) -> Section:
+def _describe_job(job: Job, given: Path) -> Section:
     """Return a table of all keys with every default, and the job file as it was given, if it is there."""
     rows = [row for row in listing.rows(job) if not row[0].startswith(ELSEWHERE)]
     texts = [("the job file as it was given", given.read_text(errors="replace"))] if given.is_file() else []

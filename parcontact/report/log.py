@@ -50,10 +50,10 @@ def read(directory: Path) -> Log:
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]  # allreduce 12, fft 64x64 3
     counts: list[Sequence[str]] = [part.rsplit(" ", 1) for part in counted[-1].split(", ")] if counted else []
     machine = [line for line in lines if MACHINE.match(line)]
-    return Log(list(dict.fromkeys(warnings)), _estimates(lines), counts, machine)
+    return Log(list(dict.fromkeys(warnings)), _find_estimates(lines), counts, machine)
 
 
-def _estimates(lines: list[str]) -> list[Estimate]:
+def _find_estimates(lines: list[str]) -> list[Estimate]:
     """Return the last ones of a run, which says them again when it goes on; of a curve the largest."""
     found: dict[tuple[str, bool], Estimate] = {}
     for line in lines:

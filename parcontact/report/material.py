@@ -12,7 +12,7 @@ from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
 from ..plotting import style, units
 from ..scene.measured_range import excited_band, excited_bands
-from .parts import Section, Table, of_panel
+from .parts import Section, Table, draw_panel
 
 DECADES = 1.5  # that a picture shows beyond the relaxation times
 POINTS = 400  # of a line
@@ -28,7 +28,7 @@ def section(job: Job) -> Section:
         ("shear modulus at once", units.text(instant, "Pa", 4)),
         ("Poisson's ratio", f"{job.material.poisson:g}"),
         ("relaxing branches", str(series.moduli.size)),
-        *_temperature(job),
+        *_describe_temperature(job),
     ]
     if job.included:
         rows.append(("included from", str(job.included)))
@@ -38,12 +38,12 @@ def section(job: Job) -> Section:
     branches = zip(series.relaxation_times, series.moduli, strict=True)
     listed = [(units.text(float(tau), "s"), units.text(float(modulus), "Pa")) for tau, modulus in branches]
     tables.append(Table(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
-    if (excited := _excited(job)).rows:
+    if (excited := _list_bands(job)).rows:
         tables.append(excited)
-    return Section("Rubber", tables=tables, pictures=[of_panel(partial(_moduli, job=job), CAPTION)])
+    return Section("Rubber", tables=tables, pictures=[draw_panel(partial(_draw_moduli, job=job), CAPTION)])
 
 
-def _temperature(job: Job) -> Iterator[tuple[str, str]]:
+def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
     found = job.material.fitted if isinstance(job.material, Dma) else job.material
     if isinstance(job.material, Dma):
         yield "fitted to", str(job.material.path)
@@ -55,26 +55,26 @@ def _temperature(job: Job) -> Iterator[tuple[str, str]]:
         yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
         yield "shift factor a_T", f"{found.time_factor:.4g}"
     if found.band is not None:
-        yield "measured at, as at the reference", _range(found.band)
+        yield "measured at, as at the reference", _write_band(found.band)
     if found.temperatures is not None:
         yield "measured from", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
 
 
-def _excited(job: Job) -> Table:
+def _list_bands(job: Job) -> Table:
     """Return which frequencies the waves of the surface excite at each temperature, if they move."""
     found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
     degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
-    ranges = ((f"{one.factor:.3g}", _range(one.band), _range(one.reduced)) for one in found)
+    ranges = ((f"{one.factor:.3g}", _write_band(one.band), _write_band(one.reduced)) for one in found)
     rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
     told = "frequencies with which the waves of the surface pass, at all velocities of the job"
     return Table(("temperature", "a_T", "excited by the job", "as at the reference"), rows, told)
 
 
-def _range(band: tuple[float, float]) -> str:
+def _write_band(band: tuple[float, float]) -> str:
     return f"{units.text(band[0], 'Hz')} to {units.text(band[1], 'Hz')}"
 
 
-def _moduli(axes: Axes, job: Job) -> None:
+def _draw_moduli(axes: Axes, job: Job) -> None:
     """Draw storage and loss modulus over frequency, and the loss tangent."""
     series = relaxation_of(job.material)
     ends = np.log10(1.0 / (2 * math.pi * series.relaxation_times))

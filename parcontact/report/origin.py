@@ -60,6 +60,6 @@ def section(directory: Path, found: log.Log) -> Section:
     return Section("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
 
 
-def to_cite() -> Section:
+def list_citations() -> Section:
     """Return what a paper that uses the results should cite."""
     return Section("What to cite", [f"{provenance.PROGRAM}", *provenance.REFERENCES])

@@ -55,27 +55,27 @@ class Chapter:
     sections: Sequence[Section]
 
 
-def of_chart(chart: charts.Chart) -> Picture:
+def draw_chart(chart: charts.Chart) -> Picture:
     """Return a picture of one chart."""
-    return of_panel(partial(charts.draw, chart), f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
+    return draw_panel(partial(charts.draw, chart), f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
 
 
-def of_panel(panel: style.Panel, caption: str) -> Picture:
+def draw_panel(panel: style.Panel, caption: str) -> Picture:
     """Return a picture of one panel, as SVG."""
     file = io.BytesIO()
     with style.drawing(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
         panel(figure.subplots())
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
-    return uri_of(file.getvalue(), "image/svg+xml"), caption
+    return to_uri(file.getvalue(), "image/svg+xml"), caption
 
 
-def of_file(path: Path) -> Download:
+def embed_file(path: Path) -> Download:
     """Return a table to be downloaded from the page."""
     data = path.read_bytes()
-    return path.name, uri_of(data, "text/csv"), len(data)
+    return path.name, to_uri(data, "text/csv"), len(data)
 
 
-def uri_of(data: bytes, kind: str) -> str:
+def to_uri(data: bytes, kind: str) -> str:
     """Return data as a URI: nothing has to be loaded from elsewhere."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"

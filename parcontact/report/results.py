@@ -13,12 +13,12 @@ from PIL import Image
 
 from .. import progress
 from ..plotting import histories, maps, steady, style, sweep, units
-from ..plotting.plots import spread
-from ..plotting.run import Run, box, frame_labels, load_of
+from ..plotting.plots import choose_evenly
+from ..plotting.run import Run, find_free_area, label_frames, to_load
 from ..storage import hdf5, tables
 from ..storage.row import UNITS
 from ..summary import slide, sweep_table, theory_settings
-from .parts import RC, Browser, Section, Table, of_chart, uri_of
+from .parts import RC, Browser, Section, Table, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -35,12 +35,12 @@ COLORS = 256  # of a picture: less than half of the bytes that true colours need
 MAP_SIZE = (4.2, 3.5)  # [inch]
 
 
-def of_run(directory: Path) -> Section:
+def describe_run(directory: Path) -> Section:
     """Return histories, the largest and last values, and the maps over time."""
     run, columns = Run(directory), tables.read(directory / "measures.csv")
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
-        (_words(name), *map(cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
+        (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
         for name, values in known.items()
         if values
     ]
@@ -49,64 +49,64 @@ def of_run(directory: Path) -> Section:
         *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
         theory_settings.describe(directory),
     ]
-    pictures = [of_chart(chart) for chart in histories.charts(run)]
+    pictures = [draw_chart(chart) for chart in histories.charts(run)]
     return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse_run(run))
 
 
-def of_curve(directory: Path) -> Section:
+def describe_curve(directory: Path) -> Section:
     """Return the points of a friction curve, and their maps."""
     columns = tables.read(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     known = {**UNITS, "velocity": "m/s", "temperature": "°C"}
-    head = [f"{_words(name)} [{known[name]}]" if name in known else _words(name) for name in names]
-    table = _shortened(head, list(zip(*(columns[name] for name in names), strict=True)))
-    pictures = [of_chart(chart) for chart in steady.charts(directory)]
+    head = [f"{_to_words(name)} [{known[name]}]" if name in known else _to_words(name) for name in names]
+    table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
+    pictures = [draw_chart(chart) for chart in steady.charts(directory)]
     return Section("Friction curve", (), [table], pictures, _browse_curve(directory))
 
 
-def of_sweep(directory: Path) -> Section:
+def describe_sweep(directory: Path) -> Section:
     """Return what the cases have come to."""
     rows = sweep_table.read(directory / "sweep.csv")
-    used = [name for name in (rows[0] if rows else ()) if any(cell(row[name]) not in ("", "–") for row in rows)]
-    table = _shortened(used, [[row[name] for name in used] for row in rows])
+    used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
+    table = _shorten(used, [[row[name] for name in used] for row in rows])
     told = list(filter(None, [theory_settings.describe(directory)]))
-    return Section("Sweep", told, [table], [of_chart(chart) for chart in sweep.charts(directory)])
+    return Section("Sweep", told, [table], [draw_chart(chart) for chart in sweep.charts(directory)])
 
 
-def of_study(directory: Path) -> Section:
+def describe_study(directory: Path) -> Section:
     """Return settings, their errors and costs."""
     with (directory / "study.csv").open(newline="") as file:
         names, *rows = list(csv.reader(file)) or [[]]
     kept = [k for k, name in enumerate(names) if name != "fingerprint"]
-    table = _shortened([names[k] for k in kept], [[_number(row[k]) for k in kept] for row in rows])
+    table = _shorten([names[k] for k in kept], [[_parse_number(row[k]) for k in kept] for row in rows])
     told = directory / "study.txt"
     sentences = told.read_text(errors="replace").splitlines() if told.is_file() else ["The study is not finished."]
     pictures = [
-        (uri_of((directory / name).read_bytes(), "image/png"), caption)
+        (to_uri((directory / name).read_bytes(), "image/png"), caption)
         for name, caption in STUDY_PICTURES.items()
         if (directory / name).is_file()
     ]
     return Section("What accuracy costs", sentences, [table], pictures)
 
 
-def _words(name: str) -> str:
+def _to_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _shortened(head: Sequence[str], rows: Sequence[Sequence[object]]) -> Table:
+def _shorten(head: Sequence[str], rows: Sequence[Sequence[object]]) -> Table:
     """Return a table that can be read: its first rows, if there are too many."""
     more = f"the first {MOST_ROWS} of {len(rows)} rows; all are in the data" if len(rows) > MOST_ROWS else ""
-    return Table(head, [[cell(value) for value in row] for row in rows[:MOST_ROWS]], more)
+    return Table(head, [[format_cell(value) for value in row] for row in rows[:MOST_ROWS]], more)
 
 
-def cell(value: object) -> str:
+def format_cell(value: object) -> str:
     """Return a number in few digits, a dash for what is not known, or a word."""
     if isinstance(value, float):
         return "–" if math.isnan(value) else f"{value:.{DIGITS}g}"
     return str(value)
 
 
-def _number(text: str) -> object:
+def _parse_number(text: str) -> object:
     try:
         return float(text or "nan")
     except ValueError:
@@ -115,31 +115,31 @@ def _number(text: str) -> object:
 
 def browse_run(run: Run) -> list[Browser]:
     """Return all maps that a run has saved, over time."""
-    return _browsers(run.directory / "fields.h5", partial(frame_labels, run))
+    return _browse_file(run.directory / "fields.h5", partial(label_frames, run))
 
 
 def _browse_curve(directory: Path) -> list[Browser]:
     """Return all maps that a friction curve has saved in a directory, over velocity and load."""
-    return _browsers(directory / "steady.h5", partial(_states, box(directory)))
+    return _browse_file(directory / "steady.h5", partial(_label_states, find_free_area(directory)))
 
 
-def _browsers(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[Browser]:
+def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[Browser]:
     """Return none where the file is missing or cannot be read: a report tells what there is."""
     try:
         with h5py.File(path, "r", locking=False) as file, style.drawing(RC):
-            labels = spread(label(file), MOST_MAPS)
-            return [_browser(file, name, labels) for name in maps.LOOKS if name in file and labels]
+            labels = choose_evenly(label(file), MOST_MAPS)
+            return [_browse_map(file, name, labels) for name in maps.LOOKS if name in file and labels]
     except hdf5.FAILURES:
         return []
 
 
-def _browser(file: h5py.File, name: str, labels: dict[int, str]) -> Browser:
+def _browse_map(file: h5py.File, name: str, labels: dict[int, str]) -> Browser:
     counted = progress.with_bar(list(labels), f"maps of {name}", "map")
-    images = zip(maps.frames(file, name, labels, MAP_SIZE, MAP_DPI), counted, strict=True)
-    return name, [(uri_of(small_png(image), "image/png"), labels[index]) for image, index in images]
+    images = zip(maps.draw_frames(file, name, labels, MAP_SIZE, MAP_DPI), counted, strict=True)
+    return name, [(to_uri(to_small_png(image), "image/png"), labels[index]) for image, index in images]
 
 
-def small_png(image: Image.Image) -> bytes:
+def to_small_png(image: Image.Image) -> bytes:
     """Return a picture with so few colours that all of it, also what is rare, has nearly its own."""
     png = io.BytesIO()
     few = image.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
@@ -147,10 +147,10 @@ def small_png(image: Image.Image) -> bytes:
     return png.getvalue()
 
 
-def _states(area: float, file: h5py.File) -> dict[int, str]:
+def _label_states(area: float, file: h5py.File) -> dict[int, str]:
     """Return speeds and loads of the states that are saved: forces on the box of a free scene of this `area` [m^2]."""
     speeds = file["velocity"][...]
-    axis, loads = load_of(file["load"][...], area)
+    axis, loads = to_load(file["load"][...], area)
     warm = [f", {t:g} °C" for t in file["temperature"][...]] if "temperature" in file else [""] * speeds.size
     known = np.flatnonzero(~np.isnan(speeds)).tolist()
     return {k: f"{units.text(speeds[k], 'm/s')}, {units.text(loads[k], axis.unit)}{warm[k]}" for k in known}

@@ -16,7 +16,7 @@ from ..plotting import style, surface, units
 from ..road import statistics, treatment
 from ..road.prepared_map import prepare
 from ..scene import rigid_surface
-from .parts import Section, Table, of_panel
+from .parts import Section, Table, draw_panel
 
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
 NOT_SELF_AFFINE = "no self-affine range was found"
@@ -79,5 +79,5 @@ def section(job: Job) -> Section:
     ]
     tables = [shapes, Table(("on the grid of the job", "value"), rows)]
     sketch = surface.Sketch(heights, job.grid.size, found)
-    pictures = [of_panel(partial(panel, sketch=sketch), caption) for caption, panel in surface.PANELS.items()]
+    pictures = [draw_panel(partial(panel, sketch=sketch), caption) for caption, panel in surface.PANELS.items()]
     return Section("Surface", told, tables, pictures)

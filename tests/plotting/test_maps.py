@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from parcontact.plotting import maps, plots
-from parcontact.plotting.run import Run, frame_labels
+from parcontact.plotting.run import Run, label_frames
 from parcontact.report import results
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
@@ -53,7 +53,7 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     assert [label for _, label in results.browse_run(Run(out))[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
-            list(maps.frames(file, name, {1: ""}))
+            list(maps.draw_frames(file, name, {1: ""}))
             film = drawn[-1].axes[0]
             ours, theirs = mesh(film), mesh(axes)
             assert ours.get_cmap().name == theirs.get_cmap().name == maps.LOOKS[name].colors
@@ -83,7 +83,7 @@ def test_when_and_under_what_load(tmp_path: Path, drawn: list[Figure], text: str
     }
     run = Run(out)
     with h5py.File(out / "fields.h5") as file:
-        last, label = list(frame_labels(run, file).items())[-1]
+        last, label = list(label_frames(run, file).items())[-1]
         assert label == f"{told} (step {file['step'][last]})"
 
 
@@ -113,7 +113,7 @@ def test_no_scale_of_nothing(
     plots.plot([out])
     (axes,) = (axes for title, axes in maps_of(drawn[0]).items() if title.startswith(name))
     with h5py.File(out / "fields.h5") as file:
-        list(maps.frames(file, name, {len(file["step"]) - 1: ""}))
+        list(maps.draw_frames(file, name, {len(file["step"]) - 1: ""}))
         for found in (mesh(axes), mesh(drawn[-1].axes[0])):
             assert (found.colorbar is None) == (ticks is None)
             if found.colorbar is not None:
@@ -126,5 +126,5 @@ def test_rare_colours_stay() -> None:
     colors = (255 * colormaps["viridis"](scale)[..., :3]).round().astype(np.uint8)
     colors[:200] = 255  # the paper, and grey around letters
     colors[:2] = np.arange(256)[None, :, None]
-    found = np.asarray(Image.open(io.BytesIO(results.small_png(Image.fromarray(colors)))).convert("RGB"))
+    found = np.asarray(Image.open(io.BytesIO(results.to_small_png(Image.fromarray(colors)))).convert("RGB"))
     assert np.abs(found.astype(int) - colors).max() <= 0.02 * 255

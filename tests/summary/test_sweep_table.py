@@ -24,7 +24,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-@pytest.mark.parametrize("read", [sweep.charts, results.of_sweep])
+@pytest.mark.parametrize("read", [sweep.charts, results.describe_sweep])
 def test_what_is_no_table(tmp_path: Path, name: str, read: Callable[[Path], object]) -> None:
     (tmp_path / "sweep.csv").write_text(DAMAGED[name])
     with pytest.raises(InputError, match=r"sweep.csv cannot be read: .*; run the sweep again"):
