@@ -49,17 +49,17 @@ def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
 
 
 def footprint(
-    points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int, lent: bool = False
+    points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int, shared: bool = False
 ) -> tuple[int, int, int]:
     """Bytes of one rank in an `FFT` of these lengths for maps of `points = (nx, ny)`: of its spectrum, which may be
-    lent, of all else that it holds, and what it sends in one transform."""
+    shared, of all else that it holds, and what it sends in one transform."""
     itemsize, waves = 2 * np.dtype(dtype).itemsize, lengths[0] // 2 + 1
     rows, columns = (part.stop - part.start for part in (dealt_to(count, ranks, rank) for count in (points[1], waves)))
     height = _block_height(rows, waves * itemsize, lengths[1], ranks)
     blocks = height * lengths[0] * itemsize // 2 + (height * _pitch(waves, itemsize) * itemsize if ranks > 1 else 0)
     legs = legs_of(rows, height, count_legs(lengths[1] * waves * itemsize, ranks))
     waiting = wire_points(legs, waves - columns) * itemsize
-    between = 0 if ranks > 1 or lent else lengths[1] * (_pitch(waves, itemsize) - waves) * itemsize
+    between = 0 if ranks > 1 or shared else lengths[1] * (_pitch(waves, itemsize) - waves) * itemsize
     return lengths[1] * columns * itemsize, blocks + waiting + between, rows * (waves - columns) * itemsize
 
 
@@ -91,8 +91,8 @@ class FFT:
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)` (default: equal to
     it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either; `measured`: FFTW tries
-    which way is the fastest, else it guesses, the same every time; `lender`, another one of these lengths in double
-    precision, for one in single precision whose spectrum is to be where that of the lender is. Making and calling one
+    which way is the fastest, else it guesses, the same every time; `sharing`, another one of these lengths in double
+    precision, in the memory of whose spectrum one in single precision is to have its own. Making and calling one
     are collective.
     """
 
@@ -102,7 +102,7 @@ class FFT:
         lengths: tuple[int, int] | None = None,
         dtype: DTypeLike = np.float64,
         measured: bool = True,
-        lender: "FFT | None" = None,
+        sharing: "FFT | None" = None,
     ) -> None:
         self.slab, self.measured = slab, measured
         self.mx, self.my = lengths or (slab.nx, slab.ny)
@@ -113,7 +113,7 @@ class FFT:
         dealt = deal(self.mx // 2 + 1, slab.comm.size)
         self.columns = dealt[slab.comm.rank]
         self.shape = (self.my, self.columns.stop - self.columns.start)
-        self.spectrum = self._make_spectrum(lender)
+        self.spectrum = self._make_spectrum(sharing)
         self._name = transform_name((self.mx, self.my), dtype)
         self._make_blocks(dealt)
         self._make_transforms()
@@ -234,12 +234,12 @@ class FFT:
 
     # -- blocks and transforms ----------------------------------------------------------------------------------------
 
-    def _make_spectrum(self, lender: "FFT | None") -> Spectrum:
+    def _make_spectrum(self, sharing: "FFT | None") -> Spectrum:
         rows, columns = self.shape
         shape = (rows, _pitch(columns, self.complex.itemsize) if self.slab.comm.size == 1 else columns)
-        if lender is None:
+        if sharing is None:
             return allocate(shape, self.complex, self.slab.tally)[:, :columns]
-        return reused(lender.spectrum, shape, self.complex)[:, :columns]
+        return reused(sharing.spectrum, shape, self.complex)[:, :columns]
 
     def _make_blocks(self, dealt: list[slice]) -> None:
         """Blocks of rows, leg by leg of the exchange, and of columns."""

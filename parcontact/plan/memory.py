@@ -53,7 +53,7 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
         found["operator"] = symbol * np.dtype(kept).itemsize // 8
     if chosen.mixed_precision.on:
         single, _ = part.transform(grid.points, np.float32)
-        blocks = part.transform(grid.points, np.float32, lent=True)[1]
+        blocks = part.transform(grid.points, np.float32, shared=True)[1]
         found["single transforms and preconditioner"] = blocks + Convolution.footprint(single, grid.ny)
     else:
         found["preconditioner"] = symbol
@@ -143,9 +143,9 @@ class _Part:
         rows = dealt_to(points[1], self.ranks, self.number)
         return (rows.stop - rows.start) * points[0]
 
-    def transform(self, lengths: Points, dtype: DTypeLike = np.float64, lent: bool = False) -> tuple[int, int]:
-        """Bytes of the spectrum of a transform, and of its buffers; the spectrum may be `lent` by another one."""
-        return footprint(self.job.grid.points, lengths, dtype, self.ranks, self.number, lent)[:2]
+    def transform(self, lengths: Points, dtype: DTypeLike = np.float64, shared: bool = False) -> tuple[int, int]:
+        """Bytes of the spectrum of a transform, whose memory may be `shared` with another one, and of its buffers."""
+        return footprint(self.job.grid.points, lengths, dtype, self.ranks, self.number, shared)[:2]
 
     @property
     def own_lengths(self) -> Points | None:

@@ -217,7 +217,7 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
     body = setup.half_space
     if not setup.choices.mixed_precision.on:
         return Operators(body.operator(setup.fft), body.inverse(setup.fft))
-    single = FFT(setup.slab, dtype=np.float32, measured=setup.fft.measured, lender=setup.fft)
+    single = FFT(setup.slab, dtype=np.float32, measured=setup.fft.measured, sharing=setup.fft)
     return Operators(body.operator(single if operator_type == np.float32 else setup.fft), body.inverse(single))
 
 

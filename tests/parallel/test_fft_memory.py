@@ -1,4 +1,4 @@
-"""What transforms hold, where rows of x-wavenumbers begin, and a spectrum that one lends another."""
+"""What transforms hold, where rows of x-wavenumbers begin, and a spectrum whose memory two share."""
 
 import numpy as np
 import pytest
@@ -43,8 +43,8 @@ def test_lent_spectrum(communicators: list[MPI.Intracomm], nx: int, ny: int) -> 
         slab = Slab(comm, nx, ny)
         double, alone = FFT(slab), FFT(slab, dtype=np.float32)
         before = slab.tally["map bytes"]
-        single = FFT(slab, dtype=np.float32, lender=double)
-        _, held, _ = footprint((nx, ny), (nx, ny), np.float32, comm.size, comm.rank, lent=True)
+        single = FFT(slab, dtype=np.float32, sharing=double)
+        _, held, _ = footprint((nx, ny), (nx, ny), np.float32, comm.size, comm.rank, shared=True)
         assert slab.tally["map bytes"] - before == held
         assert np.shares_memory(single.spectrum, double.spectrum) or not single.spectrum.size
         field, out = np.random.default_rng(4).normal(size=(ny, nx))[slab.rows], slab.zeros(np.float32)

@@ -167,6 +167,22 @@ def test_kernels_without_a_bound_are_those_of_pressures_that_are_not_negative(sh
     assert_allclose(sums[1], sums[0], rtol=ROUNDING, atol=ROUNDING)
 
 
+def test_what_is_cut_off_at_both_bounds() -> None:
+    """Cells have the free load, and what was added less what was taken off; a NaN stays one."""
+    random = np.random.default_rng(3)
+    value, p, sums = random.normal(size=(20, 33)), np.empty((20, 33)), np.empty((2, 6))
+    load, cut = Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, 3, sums)
+    kept = np.clip(value, 0.0, 0.5)
+    np.testing.assert_array_equal(p, kept)
+    assert_allclose([load, cut], [kept.sum(), np.abs(kept - value).sum()], rtol=ROUNDING)
+    for j, rows in enumerate((slice(0, 13), slice(13, 20))):
+        for i, columns in enumerate((slice(0, 16), slice(16, 32), slice(32, 33))):
+            cell, change = kept[rows, columns], (kept - value)[rows, columns]
+            assert_allclose(sums[j, [i, i + 3]], [cell[cell < 0.5].sum(), change.sum()], rtol=ROUNDING, atol=ROUNDING)
+    value[2, 2] = np.nan
+    assert np.isnan(Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, 3, sums)).all()
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(-0.01)])
 def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approach) -> None:
