@@ -27,7 +27,7 @@ OURS: dict[str, str] = {
 
 
 def find_effects() -> dict[str, Any]:
-    """Every registered effect that can be used, by the name of its section."""
+    """Return every registered effect that can be used, by the name of its section."""
     return {section: _load(section) for section in _registered() if not why_unusable(section)}
 
 
@@ -44,7 +44,7 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
 
 
 def unusable() -> list[str]:
-    """Sentences on the registered effects that cannot be used."""
+    """Return sentences on the registered effects that cannot be used."""
     return [f"{section} {reason}" for section in _registered() if (reason := why_unusable(section))]
 
 
@@ -61,7 +61,7 @@ def _load(section: str) -> Any:
 
 @cache
 def why_unusable(section: str) -> str:
-    """Why the effect of a section cannot be used; '' if it can."""
+    """Return why the effect of a section cannot be used; '' if it can."""
     try:
         effect = _load(section)
         reason = "" if issubclass(effect.section, Part) else f"its section is no {Part.__module__}.{Part.__name__}"

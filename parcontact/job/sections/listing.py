@@ -27,7 +27,7 @@ def plain(value: Any) -> Any:
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
     """Return the keys of a part that have a value, as they are written in a job."""
-    return ((name, value) for name, value in part if value is not None)
+    return ((name, value) for name in type(part).model_fields if (value := getattr(part, name)) is not None)
 
 
 def unit(part: Part, key: str) -> str:
