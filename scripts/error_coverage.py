@@ -19,9 +19,10 @@ import json
 import multiprocessing
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
+from typing import Any
 
 os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"  # one process, one core
 
@@ -45,17 +46,22 @@ def make(numbers: Iterable[int], to: Path, processes: int, anew: bool) -> None:
     if not table.exists():
         table.write_text(",".join(COLUMNS) + "\n")
     lacking = sorted(set(numbers) - set(pandas.read_csv(table).scene))
-    with (
-        table.open("a", newline="") as file,
-        ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool,
-    ):
+    with table.open("a", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS)
-        made = as_completed([pool.submit(compare, number, to / "references") for number in lacking])
-        for count, done in enumerate(made, start=1):
-            writer.writerow({key: done.result().get(key, "") for key in COLUMNS})
+        for count, line in enumerate(_made(lacking, to / "references", processes), start=1):
+            writer.writerow({key: line.get(key, "") for key in COLUMNS})
             file.flush()
             if count % 20 == 0 or count == len(lacking):
                 print(f"{count} of {len(lacking)} scenes", flush=True)
+
+
+def _made(lacking: list[int], references: Path, processes: int) -> Iterator[dict[str, Any]]:
+    if processes == 1:
+        yield from (compare(number, references) for number in lacking)
+        return
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        for done in as_completed([pool.submit(compare, number, references) for number in lacking]):
+            yield done.result()
 
 
 def write_job(number: int, to: Path) -> Path:
