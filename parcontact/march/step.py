@@ -154,7 +154,7 @@ def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Con
     if would_do and in_double is None:
         return failed, ""
     on, most = partial(solver_on, scene.setup), 1 if would_do else None
-    contact, tried = retry.again(scene.solver, problem, failed, on, in_double, most)
+    contact, tried = retry.retry_solve(scene.solver, problem, failed, on, in_double, most)
     if contact.failure:
         if would_do and _accepts(scene, contact):
             return contact, ""

@@ -1,4 +1,4 @@
-"""In what precision solvers keep search directions, which are as good when they are rounded.
+"""The precision of search directions, which are as good when they are rounded.
 
 Whatever a direction is, the step along it is right, and so is the image of what comes out, which is made anew. The same
 holds of the residuals and of the preconditioner that directions are made of. In partial contact rounding costs contact
@@ -14,5 +14,5 @@ LOOSE = 1e-5  # accuracy: tolerance on a certificate with which they are in sing
 
 
 def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.floating]:
-    """The type of their maps in a solver for which such a tolerance is loose, or not."""
+    """The type of their maps in a solver with such a tolerance."""
     return np.float32 if tolerance >= loose else np.float64

@@ -19,7 +19,7 @@ from .cold_start import SolverOn, start_on_coarse_grids
 SHORT = 0.5  # tuning: length of a safeguarded step over the exact one
 
 
-def again(
+def retry_solve(
     solver: ContactSolver,
     problem: Problem,
     failed: Contact,

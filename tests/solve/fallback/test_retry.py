@@ -39,7 +39,7 @@ def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options:
     body = solver(h, **options)
     first = body.solve(h, control, np.zeros_like(h))
     assert first.failure
-    return body, first, retry.again(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
+    return body, first, retry.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
 
 
 def test_shorter_steps_go_on_from_where_it_stood() -> None:
@@ -62,7 +62,7 @@ def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float
     start[3, 4] = bad
     with np.errstate(invalid="ignore"):
         first = body.solve(h, control, start)
-        contact, tried = retry.again(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
+        contact, tried = retry.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
     expected = good.solve(h, control, np.zeros_like(h))
     assert "not finite" in first.failure
     assert tried == ["a cold start on 3 nested grids"]
@@ -95,7 +95,7 @@ def test_heights_that_are_not_finite_cannot_be_helped() -> None:
     body = solver(h)
     h[0, 0] = np.nan
     with np.errstate(invalid="ignore"):
-        contact, tried = retry.again(
+        contact, tried = retry.retry_solve(
             body.solver, body.problem(h, LOAD), body.solve(h, LOAD, np.zeros_like(h)), factory(1.0)
         )
     assert "not finite" in contact.failure
@@ -110,7 +110,7 @@ def test_grids_that_cannot_be_halved(shape: tuple[int, int], control: MeanPressu
     body = solver(h, tolerance=1e-9)
     with np.errstate(invalid="ignore"):
         first = body.solve(h, control, np.full_like(h, np.inf))
-        contact, tried = retry.again(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
+        contact, tried = retry.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
     assert contact.converged
     grids = {37: 1, 1: 2, 6: 3}[shape[0]]
     assert tried == ["a cold start" if grids == 1 else f"a cold start on {grids} nested grids"]
@@ -126,7 +126,7 @@ def test_all_ranks_agree(comm: MPI.Intracomm) -> None:
     body = Bench(solving, *operators)
     with np.errstate(invalid="ignore"):
         first = body.solve(h, LOAD, np.full_like(h, np.inf))
-        contact, _ = retry.again(body.solver, body.problem(h, LOAD), first, factory(np.ptp(whole)))
+        contact, _ = retry.retry_solve(body.solver, body.problem(h, LOAD), first, factory(np.ptp(whole)))
     alone = solver(whole, tolerance=1e-9).solve(whole, LOAD, np.zeros_like(whole))
     assert contact.converged
     assert_allclose(contact.p, alone.p[slab.rows], atol=1e-7 * alone.p.max())
@@ -139,7 +139,7 @@ def test_an_operator_in_double_precision() -> None:
     body, enough = solver(h), solver(h).solve(h, approach, np.zeros_like(h)).iterations
     first = body.solve(h, approach, np.full_like(h, np.nan))
     double, before = solver(h, max_iterations=enough - 1), body.slab.tally["operator"]
-    contact, tried = retry.again(
+    contact, tried = retry.retry_solve(
         body.solver, body.problem(h, approach), first, factory(np.ptp(h)), lambda: (double.solver, double.operators)
     )
     assert not np.isfinite(first.certificate.worst)
