@@ -23,7 +23,7 @@ MORE_TABLES = ("theory.csv", "steady_waves.csv", "steady_theory.csv", "sweep_mea
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that other sections show
 
 
-def chapter(directory: Path) -> Chapter:
+def describe_directory(directory: Path) -> Chapter:
     """Tell all about a directory. Raises InputError where it holds no results."""
     there = [name for name in KINDS if (directory / name).is_file()]
     if not there:
@@ -46,7 +46,7 @@ def chapter(directory: Path) -> Chapter:
     return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if one])
 
 
-def together(directories: Sequence[Path]) -> Iterator[Chapter]:
+def compare(directories: Sequence[Path]) -> Iterator[Chapter]:
     """Yield what several directories have in common, in one picture each: lines of a directory have one colour."""
     if len(directories) > 1:
         found = plots.compare_charts(directories)

@@ -11,7 +11,7 @@ from .. import progress
 from ..errors import InputError
 from ..storage import files, hdf5
 from ..storage.provenance import PROGRAM
-from .chapters import chapter, together
+from .chapters import compare, describe_directory
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
 
@@ -49,8 +49,8 @@ def _refuse_links(directory: Path) -> None:
 
 def render(directories: Sequence[Path]) -> str:
     """Return the text of the page."""
-    each = [chapter(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
-    chapters = [*together(directories), *each]
+    each = [describe_directory(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
+    chapters = [*compare(directories), *each]
     loader = PackageLoader("parcontact", "report")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
