@@ -37,7 +37,7 @@ PIECE = 1 << 16  # bytes read at a time
 
 @dataclass(frozen=True)
 class Table:
-    """What measures.csv held: how many rows, and the last one."""
+    """The state of measures.csv: how many rows it has, and the last one."""
 
     rows: int = 0
     last: str = ""
@@ -45,7 +45,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Contents:
-    """What a sound checkpoint says: `numbers` and their `units` by name, of maps the type and the checksums of rows."""
+    """Content of a sound checkpoint: `numbers` and their `units` by name; the types of maps, and checksums of their rows."""
 
     path: Path
     step: int
@@ -67,7 +67,7 @@ class Contents:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a checkpoint says of itself: its job as plain data, where the file comes from, and where the run is.
+    """Facts about a checkpoint: its job as plain data, where the file comes from, and where the run is.
 
     `run` is the id of the run that wrote it, the same in all that one directory holds; `table` is of its measures.
     """
@@ -132,7 +132,7 @@ def _publish(part: Path, path: Path) -> None:
 
 
 def row_sums(rows: Array) -> NDArray[np.uint32]:
-    """CRC-32 of each row of a map."""
+    """Return the CRC-32 of each row of a map."""
     return np.array([zlib.crc32(row) for row in rows], dtype=np.uint32)
 
 
@@ -148,7 +148,7 @@ def inspect(path: Path) -> Contents:
 
 
 def is_one(path: Path) -> bool:
-    """Whether a file says that it is a checkpoint; raises OSError."""
+    """Return whether a file says that it is a checkpoint; raises OSError."""
     with path.open("rb") as file:
         return file.read(len(TITLE)) == TITLE.encode()
 
@@ -164,7 +164,7 @@ def _seal(path: Path) -> None:
 
 
 def _broken(path: Path) -> str:
-    """What the seal says is wrong with the file, or ''."""
+    """Return what the seal says is wrong with the file, or ''."""
     with path.open("rb") as file:
         title, facts, *_ = [*file.read(SEAL).split(b"\n"), b""]
         if not title.startswith(TITLE.encode()):
@@ -183,7 +183,7 @@ def _broken(path: Path) -> str:
 
 
 def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> int:
-    """CRC-32 of all bytes that are neither in the seal nor in a map."""
+    """Return the CRC-32 of all bytes that are neither in the seal nor in a map."""
     total = 0
     for start, stop in pieces_outside(size, regions, SEAL):
         total = zlib.crc32(os.pread(file.fileno(), stop - start, start), total)
@@ -258,7 +258,7 @@ def read(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
 
 
 def _datasets(file: h5py.File, dimensions: int) -> list[h5py.Dataset]:
-    """All datasets of so many dimensions but the checksums, by name."""
+    """Return all datasets of so many dimensions but the checksums, by name."""
     names: list[str] = []
     file.visit(names.append)
     items = (file[name] for name in sorted(names) if not name.startswith(SUMS))

@@ -53,8 +53,8 @@ class LogFile(logging.FileHandler):
 
 
 class Console:
-    """What root says to the user and to the log; that of another rank, which has no `log` and `speaks` not, is silent,
-    so that no caller asks who it is."""
+    """Messages of root to the user and to the log. The console of another rank, without a log, does not speak, so that
+    no caller asks who it is."""
 
     def __init__(self, log: Path | None = None, quiet: bool = True, total: int = 0, speaks: bool = True) -> None:
         self._log = LogFile(log) if log is not None else None

@@ -59,7 +59,7 @@ class Directory:
 
     @property
     def claim(self) -> Claim | None:
-        """What this verb has here; on root, None elsewhere."""
+        """The claim of this verb, on root; None elsewhere."""
         return self.claims.get(self.verb)
 
     def checkpoint(self, step: int) -> Path:

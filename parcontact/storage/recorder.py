@@ -85,7 +85,7 @@ class Recorder:
 
     @property
     def table(self) -> Table:
-        """What measures.csv holds; on root."""
+        """The state of measures.csv, on root."""
         return self._measures.table if self._measures else Table()
 
     def write(self, row: Row, field: Callable[[str], Array], total: int = 0) -> None:

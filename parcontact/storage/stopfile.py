@@ -28,7 +28,7 @@ class StopFile:
 
     @property
     def asks(self) -> bool:
-        """Whether to stop."""
+        """True if the program is to stop."""
         return self.own.exists() or _touched(self.path) not in (0, self.before)
 
     def ask_own(self) -> None:
