@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 from .errors import InputError, JobError, RunError
 
 if TYPE_CHECKING:
+    from .leakage.flow import leak
     from .python.curves import steady
     from .python.parts import material, surface
     from .python.results import open
     from .python.simulation import Simulation
 
 __version__ = "0.1.0"
-__all__ = ["InputError", "JobError", "RunError", "Simulation", "material", "open", "steady", "surface"]
+__all__ = ["InputError", "JobError", "RunError", "Simulation", "leak", "material", "open", "steady", "surface"]
 
 _ROOMS = {
     "Simulation": "python.simulation",
@@ -29,6 +30,7 @@ _ROOMS = {
     "open": "python.results",
     "surface": "python.parts",
     "material": "python.parts",
+    "leak": "leakage.flow",
 }
 
 

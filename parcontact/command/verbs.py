@@ -226,6 +226,17 @@ def plot(options: argparse.Namespace) -> int:
     return DONE
 
 
+def leak(options: argparse.Namespace) -> int:
+    world = ranks.start()
+    from ..report import leak as leakage
+
+    for directory in options.directories:
+        for line in leakage.write(directory, options.at or "", world):
+            if not options.quiet:
+                print(line, flush=True)
+    return DONE
+
+
 @ranks.root_alone
 def report(options: argparse.Namespace) -> int:
     from ..report import page

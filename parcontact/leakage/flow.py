@@ -71,6 +71,40 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
     return Flow(conductivity, constriction, position, abs(inflow - outflow) / flow, pressure)
 
 
+@dataclass(frozen=True)
+class Leak:
+    """What a gap lets through along x and along y.
+
+    `flow_x` and `flow_y` are the conductivities K [m^3]: a pressure that falls by `dp` over the length drives
+    `K/(12 eta) dp/length` through each metre of width. `constriction` [m] is the smallest gap on the widest path in the
+    direction that leaks more; 0 where contact closes the gap.
+    """
+
+    along_x: Flow
+    along_y: Flow
+
+    @property
+    def flow_x(self) -> float:
+        return self.along_x.conductivity
+
+    @property
+    def flow_y(self) -> float:
+        return self.along_y.conductivity
+
+    @property
+    def constriction(self) -> float:
+        return max(self.along_x.constriction, self.along_y.constriction)
+
+
+def leak(gap: Map, size: tuple[float, float], periodic: bool = True) -> Leak:
+    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m], along x and along y.
+
+    Contact is where the gap is 0 or less. Sides along the flow are `periodic`, or closed.
+    """
+    gap = np.maximum(np.asarray(gap, dtype=float), 0.0)
+    return Leak(*(solve_flow(gap, size, axis, periodic) for axis in ("x", "y")))
+
+
 def _balance(cubes: Map, wet: NDArray[np.bool_], aspect: float, periodic: bool) -> tuple[sparse.csc_matrix, Map, Map]:
     """Return the matrix of the flows between wet cells, and the conductances to the first and to the last end."""
     number = np.full(wet.shape, -1, dtype=np.int32)

@@ -101,6 +101,20 @@ class Slab:
             row.Free()
         return own
 
+    def to_root(self, field: Array) -> Array | None:
+        """Collective. The whole map, shape (ny, nx), on root; None on the other ranks."""
+        own = np.ascontiguousarray(field)
+        if not self.root:
+            if own.size:
+                self.comm.Send(own, 0)
+            return None
+        whole = np.empty((self.ny, self.nx), own.dtype)
+        whole[self.rows] = own
+        for rank, rows in enumerate(self.dealt[1:], start=1):
+            if rows.stop > rows.start:
+                self.comm.Recv(whole[rows], rank)
+        return whole
+
     def from_all(self, value: T) -> list[T]:
         """Collective. The value of every rank, in order, on every rank."""
         return self.comm.allgather(value)

@@ -17,13 +17,12 @@ layer does not move at all. S tends to 1 for a thick layer. Sources: I. N. Snedd
 bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.special import j0
 
 from ..parallel.slab import Array
 
@@ -93,8 +92,11 @@ class Layer:
         far = np.hypot(x, y) > (FAR - 1.0) * self.thickness
         return np.where(far, 0.0, of_half_space + dx * dy * mean)
 
-    def _correction(self) -> "make_interp_spline":
+    def _correction(self) -> Callable[[Array], Array]:
         """Return the difference to the displacement of a half space, at any distance, under a unit force."""
+        from scipy.interpolate import make_interp_spline  # slow to import, and for isolated layers only
+        from scipy.special import j0
+
         nodes, weights = np.polynomial.legendre.leggauss(NODES)
         q = THICK / self.thickness * (nodes + 1.0) / 2.0
         strength = weights * THICK / self.thickness / 2.0 * (self.compliance_ratio(q) - 1.0)

@@ -9,8 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
-import numpy as np
-
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job, identity
@@ -131,17 +129,7 @@ class Simulation:
 
     def gather(self, name: str) -> Array | None:
         """The whole map, shape (ny, nx), on root; None on the other ranks. Units and errors as for `field`."""
-        own, slab = np.ascontiguousarray(self.field(name)), self._slab
-        if not slab.root:
-            if own.size:
-                self.comm.Send(own, 0)
-            return None
-        whole = np.empty((slab.ny, slab.nx), own.dtype)
-        whole[slab.rows] = own
-        for rank, rows in enumerate(slab.dealt[1:], start=1):
-            if rows.stop > rows.start:
-                self.comm.Recv(whole[rows], rank)
-        return whole
+        return self._slab.to_root(self.field(name))
 
     # -- state --------------------------------------------------------------------------------------------------------
 

@@ -20,10 +20,11 @@ from pydantic import TypeAdapter
 from parcontact import __main__, job
 from parcontact.command.arguments import parse_arguments
 from parcontact.effects.interface import InterfaceColumns
+from parcontact.effects.leakage import LeakageColumns
 from parcontact.job import keys
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
-from parcontact.report import prediction
+from parcontact.report import leak, prediction
 from parcontact.steady_sliding import table as steady_table
 from parcontact.storage import fields, row
 from parcontact.study import outcome
@@ -136,7 +137,8 @@ def test_the_page_has_range_unit_and_default() -> None:
 # -- columns ---------------------------------------------------------------------------------------------------------
 
 COLUMNS = {
-    "measures.csv": [*row.columns(0, InterfaceColumns.columns), "dissipated_K"],
+    "measures.csv": [*row.columns(0, (*InterfaceColumns.columns, *LeakageColumns.columns)), "dissipated_K"],
+    "leak.csv": leak.Instant._fields,
     "steady.csv": [
         *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
         *(*steady_table.HEATED, *InterfaceColumns.columns, *steady_table.ERRORS),

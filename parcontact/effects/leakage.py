@@ -1,0 +1,76 @@
+"""Leakage: the flow of a fluid through the gap of the contact, while a run goes on (`leakage.flow`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import DTypeLike
+from pydantic import Field
+
+from ..job.sections.part import Part
+from ..job.sections.values import Count
+from ..leakage.flow import leak
+from ..physics.entries import Entry
+from ..physics.units import Units
+from .effect import Decision, Instant
+
+NOTHING = (math.nan, math.nan, math.nan)
+
+
+class Leakage(Part):
+    """The `leakage` section: after how many steps the flow is calculated."""
+
+    label: ClassVar[str] = "leakage"
+    every: Count = Field(default=1, description="a positive whole number of steps")
+
+
+class LeakageColumns:
+    """The conductivity K [m^3] of the gap along x and along y, and its critical constriction [m].
+
+    The gap is gathered on root, which solves for the flow.
+    """
+
+    section: ClassVar[type[Part]] = Leakage
+    columns: ClassVar[tuple[str, ...]] = ("flow_x", "flow_y", "constriction")
+
+    @staticmethod
+    def decide(job: Any) -> Decision:
+        section: Leakage | None = job.section("leakage")
+        why = (
+            "there is no leakage section" if section is None else f"the flow is calculated every {section.every} steps"
+        )
+        return Decision("leakage", section is not None, why)
+
+    @staticmethod
+    def maps(job: Any) -> Sequence[DTypeLike]:
+        return ()
+
+    def __init__(self, scene: Any) -> None:
+        self._scene, self._every = scene, scene.job.section("leakage").every
+        self._values = NOTHING
+
+    def follow(self, instant: Instant) -> None:
+        self._values = NOTHING
+        if instant.step.number % self._every:
+            return
+        scene, setup = self._scene, self._scene.setup
+        base, offset = scene.motion.at(instant.step.position).parts
+        approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
+        gap = (instant.displacement - np.roll(base, offset, axis=1) - approach) * scene.units.height
+        whole = scene.slab.to_root(np.where(instant.pressure > 0.0, 0.0, np.maximum(gap, 0.0)))
+        if whole is not None:
+            found = leak(whole, setup.grid.size, setup.grid.boundary == "periodic")
+            self._values = found.flow_x, found.flow_y, found.constriction
+        self._values = scene.slab.agree(self._values)
+
+    def values(self) -> Sequence[float]:
+        return self._values
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """Nothing is remembered."""
+        return {}
+
+    def restore(self, saved: Any) -> None: ...
