@@ -166,7 +166,7 @@ VERBS = (
     Verb("surface", verbs.surface, (_surface,), "say what the surface of a job, or a measured map, is like; draw it"),
     Verb("info", verbs.info, (_info,), "say what checkpoints, files of fields and directories hold, and if sound"),
     Verb("plot", verbs.plot, (_plot,), "draw pictures of runs and friction curves, compare them, make a movie"),
-    Verb("leak", verbs.leak, (_leak, _quiet), "say what leaks through the gaps of a run, into leak.csv; draw it"),
+    Verb("leak", verbs.leak, (_leak,), "say what leaks through the gaps of a run, into leak.csv; draw it"),
     Verb("report", verbs.report, (_report,), "write one HTML file to send: what was asked, results, data, origin"),
     Verb("doctor", verbs.doctor, (_doctor,), "check this installation: exact cases, ranks, files and times"),
     Verb("manual", verbs.manual, (_manual,), "print a page of the manual, or say which there are"),

@@ -104,17 +104,13 @@ def plan(options: argparse.Namespace) -> int:
     from ..plan.memory import count_side_by_side
     from ..plan.planning import Planner
     from ..run import sweep_warnings
-    from ..scene import sanity, set_up
-    from ..scene.measured_range import describe_beyond
 
     chosen = on_root(world, lambda: cases_of(options)[1])
     job, several = chosen[0].job, len(chosen) > 1
     slab = Slab(world, *job.grid.points)
     if several:
         on_root(world, lambda: sweep_warnings.warn_once(chosen))
-    doubts = [] if several else [*job.warnings, *describe_beyond(job)]
-    if sanity.is_quickly_made(job):
-        doubts += sanity.check_heights(set_up(job, slab))
+    doubts = [] if several else [*job.warnings, *on_root(world, lambda: _doubts(job))]
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
     if several:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
@@ -228,12 +224,10 @@ def plot(options: argparse.Namespace) -> int:
 
 def leak(options: argparse.Namespace) -> int:
     world = ranks.start()
-    from ..report import leak as leakage
+    from ..report.leak import write
 
-    for directory in options.directories:
-        for line in leakage.write(directory, options.at or "", world):
-            if not options.quiet:
-                print(line, flush=True)
+    for line in (line for directory in options.directories for line in write(directory, options.at or "", world)):
+        print(line, flush=True)
     return DONE
 
 

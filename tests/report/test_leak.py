@@ -56,7 +56,7 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
     """The saved gaps and the run itself give the same flow, in single and in double precision of the maps; K falls with
     the load, and is that of `pc.leak`."""
     out = run(comm, shared_path)
-    assert __main__.main(["leak", str(out), "--quiet"]) == 0
+    assert __main__.main(["leak", str(out)]) == 0
     comm.Barrier()
     rows, steps = table(out / "leak.csv"), table(out / "measures.csv")
     assert {row["time"] for row in rows} == {row["time"] for row in steps}

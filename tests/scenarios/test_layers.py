@@ -115,6 +115,7 @@ def test_energies_balance_on_a_layer() -> None:
     assert row.work == pytest.approx(row.stored + row.dissipated, rel=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:body.thickness")
 def test_a_layer_costs_no_iterations() -> None:
     """As many calls as on a half space, while the layer is thicker than a fifth of the longest wave; on thinner ones
     contact is in smaller patches, and a factor of 2.5 is the most of a decade of thicknesses."""

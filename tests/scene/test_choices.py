@@ -266,5 +266,5 @@ TESTED = {
         "run on half the mesh",
         "yielding counterbody",
     ),
-    *("fields", "checkpoints", "interface"),  # the last in effects/test_interface.py
+    *("fields", "checkpoints", "interface", "leakage"),  # the last two in effects/test_interface.py, report/test_leak.py
 }
