@@ -48,8 +48,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    others_file = getattr(options, "others_file", None)  # of a sweep
-    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows, others_file)
+    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows, getattr(options, "others_file", None))
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code
@@ -67,8 +66,7 @@ def check(options: argparse.Namespace) -> int:
         print(f"\n{job.included}")
     if steps := describe_steps(job):
         print(f"\ntime steps that are chosen: {steps}")
-    each = [case.job for case in chosen]
-    doubts = [text for job in each for text in (*job.warnings, *_doubts(job))]
+    doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
     for warning in dict.fromkeys(doubts):
         print(f"warning: {warning}")
     if cases[0].settings:
@@ -194,11 +192,9 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    print("\n".join(drawing.describe(job, heights, base.preparation_notes, base.shortest, picture)))
-    for text in doubts:
-        print(f"warning: {text}")
-    for line in measured_maps.start(job, given, options.start) if alone else ():
-        print(line)
+    told = drawing.describe(job, heights, base.preparation_notes, base.shortest, picture)
+    started = measured_maps.start(job, given, options.start) if alone else ()
+    print("\n".join([*told, *(f"warning: {text}" for text in doubts), *started]))
     return DONE
 
 
@@ -226,8 +222,8 @@ def leak(options: argparse.Namespace) -> int:
     world = ranks.start()
     from ..report.leak import write
 
-    for line in (line for directory in options.directories for line in write(directory, options.at or "", world)):
-        print(line, flush=True)
+    for directory in options.directories:
+        print(*write(directory, options.at or "", world), sep="\n", end="\n" if world.rank == 0 else "")
     return DONE
 
 

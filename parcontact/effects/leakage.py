@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike
 from pydantic import Field
 
 from ..job.sections.part import Part
-from ..job.sections.values import Count
+from ..job.sections.quantities import Count
 from ..leakage.flow import leak
 from ..physics.entries import Entry
 from ..physics.units import Units

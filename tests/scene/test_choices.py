@@ -266,5 +266,5 @@ TESTED = {
         "run on half the mesh",
         "yielding counterbody",
     ),
-    *("fields", "checkpoints", "interface", "leakage"),  # the last two in effects/test_interface.py, report/test_leak.py
+    *("fields", "checkpoints", "interface", "leakage"),  # the last ones where they are made
 }
