@@ -16,7 +16,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import leakage
 from ..plotting.run import Fields, Run
-from ..storage import files, hdf5, measures
+from ..storage import files, hdf5, tables
 
 TABLE, PICTURE = "leak.csv", "leak.png"
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
@@ -47,7 +47,7 @@ class Gaps:
     def __init__(self, directory: Path, at: str = "") -> None:
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
         self.size, self.periodic = self.job.grid.size, self.job.grid.boundary == "periodic"
-        self.columns = measures.read(directory / "measures.csv")
+        self.columns = tables.read(directory / "measures.csv")
         try:
             with self._open() as file:
                 if not {"gap", "pressure"} <= set(file):
