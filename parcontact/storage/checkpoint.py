@@ -45,7 +45,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Contents:
-    """Content of a sound checkpoint: `numbers` and their `units` by name; the types of maps, and checksums of their rows."""
+    """Content of a sound checkpoint: `numbers` and their `units` by name; types of maps, checksums of their rows."""
 
     path: Path
     step: int
