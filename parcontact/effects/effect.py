@@ -16,8 +16,9 @@ from ..errors import InputError
 from ..history.timeline import Step
 from ..job.sections.part import Part
 from ..parallel.slab import Array
-from ..physics.entries import Remembers
+from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
+from ..physics.units import Units
 
 
 @dataclass(frozen=True)
@@ -45,11 +46,10 @@ class Instant:
     measures: Measures
 
 
-class Effect(Remembers, Protocol):
+class Effect(Protocol):
     """The class of an effect that is told of every step made; made with a `Scene`, only where the job asks for it.
 
-    It also has the `entries` and `restore` of whatever remembers something, and may have `rules` for the whole job, as
-    sections have them. Methods are collective, unless they say otherwise.
+    It may have `rules` for the whole job, as sections have them. Methods are collective, unless they say otherwise.
     """
 
     section: ClassVar[type[Part]]  # what it adds to a job
@@ -75,6 +75,17 @@ class Effect(Remembers, Protocol):
         """Return what its columns have in the row of the last step, the same on every rank; NaN leaves one empty.
 
         Local to this rank.
+        """
+        ...
+
+    def entries(self, units: Units) -> dict[str, Entry]:
+        """Return what it remembers after the last step, by name; maps are its own, not copies. Local to this rank."""
+        ...
+
+    def restore(self, saved: Saved) -> None:
+        """Go on from what a checkpoint has of the entries, in the run's units, numbers as arrays; local to this rank.
+
+        Maps have been read into those of `entries`.
         """
         ...
 

@@ -6,18 +6,16 @@ Each part names its entries and how it goes on from them where its memory is def
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from .units import Units
 
 Saved = Mapping[str, NDArray[Any]]
 
 
 class MapCount(NamedTuple):
-    """How many maps a part of a run holds, and how many of them its entries have: what a plan adds up."""
+    """Numbers of maps that a part of a run holds, and that its entries have: what a plan adds up."""
 
     held: int
     saved: int = 0
@@ -39,10 +37,12 @@ class Entry:
 
     @property
     def is_map(self) -> bool:
+        """Whether it is a map."""
         return np.ndim(self.value) == 2
 
     @property
     def nbytes(self) -> int:
+        """The bytes of this rank's part."""
         return np.asarray(self.value).nbytes
 
 
@@ -55,18 +55,3 @@ def part_of(part: str, saved: Saved) -> Saved:
     """Return what a checkpoint has of a part, by the part's own names."""
     head = f"{part}/"
     return {name.removeprefix(head): value for name, value in saved.items() if name.startswith(head)}
-
-
-class Remembers(Protocol):
-    """An object that has a memory of its own, as effects that follow the steps have."""
-
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """What is remembered after the last step, by name; maps are the part's own, not copies. Local to this rank."""
-        ...
-
-    def restore(self, saved: Saved) -> None:
-        """Go on from what a checkpoint has of the entries, in the run's units, numbers as arrays; local to this rank.
-
-        Maps have been read into those of `entries`: those in `saved` are the part's own.
-        """
-        ...

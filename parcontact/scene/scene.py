@@ -16,7 +16,7 @@ from ..history.chosen import describe_steps
 from ..job import Grid, Job
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
-from ..physics.body import ElasticBody, ZenerBody
+from ..physics.body import Body, ElasticBody, ZenerBody
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
 from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
@@ -102,7 +102,7 @@ class Scene:
     setup: Setup
     motion: Motion
     folded: FoldedBranches
-    material: ElasticBody | ZenerBody
+    material: Body
     solver: ContactSolver
     operators: Operators
     probe: Probe
@@ -223,7 +223,7 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
 
 def _body_and_energy(
     setup: Setup, folded: FoldedBranches, inverse: AppliedInverse
-) -> tuple[ElasticBody | ZenerBody, ElasticEnergy | ZenerEnergy | None]:
+) -> tuple[Body, ElasticEnergy | ZenerEnergy | None]:
     """Make the body, and its energies if the job asks for them, with the `inverse` of the operator if it is at hand."""
     chosen, slab, integrator = setup.choices, setup.slab, setup.choices.numerics.integrator
     unit = setup.units.pressure * setup.units.height * setup.grid.dx * setup.grid.dy
