@@ -42,8 +42,8 @@ SAME_LEVEL = 1e-6  # of a level
 
 
 def cells_per_step(most: float, whole_soon: bool = True) -> float:
-    """The longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of one; two
-    fifths, too, where it need not be at whole cells soon."""
+    """Return the longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of one;
+    two fifths, too, where it need not be at whole cells soon."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
     count = (1.0 - SAME_LEVEL) / most
@@ -109,7 +109,7 @@ class StepChooser:
         return span.ends.limits
 
     def _level(self, span: Span, dt: float) -> float:
-        """The longest of the lengths that steps may have which is no longer than dt."""
+        """Return the longest of the lengths that steps may have which is no longer than dt."""
         limits = self._bounds(span)
         if dt <= limits.least or dt >= limits.most:
             return min(max(dt, limits.least), limits.most)
@@ -120,7 +120,7 @@ class StepChooser:
         return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
 
     def _first(self, span: Span) -> float:
-        """How long to try the first step of a stage."""
+        """Return how long to try the first step of a stage."""
         limits = self._bounds(span)
         if self._goes_on(span) and self.chosen.next:
             return self._level(span, self.chosen.next)
@@ -129,7 +129,7 @@ class StepChooser:
         return self._level(span, RELAXING * self.scene.material.shortest_time)
 
     def _goes_on(self, span: Span) -> bool:
-        """Whether nothing has changed since the stage before, which chose its steps too."""
+        """Return whether nothing has changed since the stage before, which chose its steps too."""
         if span.index == 0 or span.jumps:
             return False
         before = self.scene.choices.timeline.history[span.index - 1]
@@ -150,7 +150,7 @@ class StepChooser:
         return self._ending(span, number, dt, now + dt, rejected)
 
     def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
-        """How long until the surface is at a multiple of the way of such a step: LEAST_WAY of it, or longer.
+        """Return how long until the surface is at a multiple of the way of such a step: LEAST_WAY of it, or longer.
 
         From half a multiple it is half of one: a step that has just grown is not three times the one before.
         """

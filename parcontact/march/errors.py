@@ -32,7 +32,7 @@ ALIKE_VIEWS = 5  # the same of the two views of friction; odd, as steps may be q
 
 @dataclass(frozen=True)
 class LastObservation:
-    """What was seen in a step of this stage and length [s]; it stands for so many steps `so_far`."""
+    """Memory of what a step of this stage and length [s] has shown; it stands for so many steps `so_far`."""
 
     stage: float = -1.0
     dt: float = 0.0
@@ -51,7 +51,7 @@ class LastObservation:
 
     @property
     def numbers(self) -> list[float]:
-        """What a checkpoint has of it."""
+        """All numbers, as a checkpoint has them."""
         return [self.stage, self.dt, self.so_far, *self.observed]
 
     @classmethod
@@ -85,7 +85,7 @@ class Observations:
 
 @dataclass(frozen=True)
 class Estimate:
-    """How wrong a step is: its budget, None where nothing touches, and the error of its length alone, by which steps
+    """Errors of a step: its budget, None where nothing touches, and the error of its length alone, by which steps
     that are chosen are judged; with the looks after it."""
 
     budget: ErrorBudget | None

@@ -31,7 +31,7 @@ class March:
 
     @property
     def row(self) -> Row:
-        """What the last step is recorded as."""
+        """The record of the last step."""
         return self.state.row
 
     def timeline(self, until: float = 0.0) -> Timeline:

@@ -45,7 +45,7 @@ def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step
 
 
 def _is_relaxed(scene: Scene, state: State, span: Span, number: int) -> bool:
-    """Whether from a step on nothing changes until the end of its stage; collective."""
+    """Return whether from a step on nothing changes until the end of its stage; collective."""
     index = span.place(number)
     if not span.rests:
         return False

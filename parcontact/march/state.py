@@ -72,7 +72,7 @@ class State:
 
     @property
     def position(self) -> tuple[float, float]:
-        """By how much the surface has moved [m]."""
+        """The way of the surface so far [m]."""
         return self.pasts[0].position
 
 
@@ -231,8 +231,8 @@ def _compare(contents: Contents, wanted: dict[str, Entry]) -> None:
 
 
 def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
-    """A branch that relaxed too fast to have a map in the run that wrote the checkpoint may need one now that steps are
-    shorter: then what it remembered is lost."""
+    """Raise InputError where a branch had no map in the run that wrote the checkpoint, as it relaxed too fast, and needs
+    one now that steps are shorter: what it remembered is lost."""
     if "material/frozen" not in contents.numbers:
         return
     for k in scene.folded.kept:

@@ -165,7 +165,7 @@ def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Con
 
 
 def _accepts(scene: Scene, contact: Contact) -> bool:
-    """Whether the job takes a solve that did not reach the tolerance."""
+    """Return whether the job takes a solve that did not reach the tolerance."""
     return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 

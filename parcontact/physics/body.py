@@ -155,7 +155,7 @@ class ElasticBody:
 
 @dataclass(frozen=True)
 class _Coefficients:
-    """Of a step dt: its modulus, how the kept branches advance, what they and u weigh in the effective heights."""
+    """Coefficients of a step dt: its modulus, how the kept branches advance, their and u's weights in the heights."""
 
     dt: float
     alpha: float

@@ -71,7 +71,7 @@ class Parts:
 
     @property
     def total(self) -> float:
-        """All together."""
+        """The sum of all."""
         return self.solver + self.time + self.folded + self.mesh
 
 
@@ -88,14 +88,14 @@ SMALLER = "a smaller numerics.accuracy"  # where it has chosen the setting
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Of one instant. Friction is None where there is none; it may be wrong by more than all of it."""
+    """Errors of one instant. Friction is None where there is none; it may be wrong by more than all of it."""
 
     friction: Parts | None
     area: Parts
 
 
 def estimate(run: RunProperties, observed: StepObservation, points: int) -> ErrorBudget:
-    """The budget of a step on a grid of so many points."""
+    """Return the budget of a step on a grid of so many points."""
     return ErrorBudget(
         _friction(run, observed, points) if observed.friction > 0.0 else None, _area(run, observed, points)
     )
@@ -140,8 +140,8 @@ def compared_with_half_mesh(
     waves: bool,
     coarse_error: float = math.nan,
 ) -> ErrorBudget:
-    """The budget with what another run shows of the mesh: `here` friction and corrected area of an instant, `coarse`
-    those with twice the cell. As errors go with the power p of the cell, the difference is 2^p - 1 of them.
+    """Return the budget with what another run shows of the mesh: `here` friction and corrected area of an instant,
+    `coarse` those with twice the cell. As errors go with the power p of the cell, the difference is 2^p - 1 of them.
 
     With p as above; of the corrected area, whose error falls slower, 1. A run with other time steps has another error
     of time, by which it takes friction for too small: `coarse_error` is that of its friction in all, by its budget, NaN
@@ -222,7 +222,7 @@ class ErrorSums:
         return Parts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: float) -> dict[str, Any]:
-        """As plain data: the accuracy that was asked for, and the relative errors by part, and in all."""
+        """Return as plain data the accuracy that was asked for, and the relative errors by part, and in all."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: asdict(each) | {"total": each.total} for name, each in found.items() if each is not None}
         return {"accuracy": accuracy, **parts}

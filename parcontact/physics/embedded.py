@@ -27,7 +27,7 @@ MISSED = 0.5  # accuracy: of the load, by which that of a sample is off where it
 
 @dataclass(frozen=True)
 class IntegratorDifference:
-    """The relative difference of the pair; the rms slope along x of the surface under the pressure, in the unit of
+    """Relative difference of the pair; the rms slope along x of the surface under the pressure, in the unit of
     heights over that of lengths; the power of the length of the step with which the difference grows; the rms of what
     the displacement changes by in the step over the standard deviation of heights, both under the pressure: in full
     contact the angle by which a wave turns that is as high and changes as much."""
@@ -76,7 +76,7 @@ class EmbeddedPair:
         return IntegratorDifference(math.sqrt(apart / size) if size > 0.0 else 0.0, 0.0, self._order(dt))
 
     def stride(self, share: float) -> int:
-        """From one sampled row to the next, where that share of the points is in contact."""
+        """Return the rows from one sampled row to the next, where that share of the points is in contact."""
         return max(1, int(self.slab.ny * math.sqrt(share) / SAMPLED_ROWS))
 
     def _add(

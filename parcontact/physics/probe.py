@@ -21,7 +21,7 @@ from .units import Units
 
 @dataclass(frozen=True)
 class Probe:
-    """What turns the maps of a solved step into measures."""
+    """Probe that turns the maps of a solved step into measures."""
 
     slab: Slab
     surface: Surface
@@ -31,8 +31,8 @@ class Probe:
     def measure(
         self, p: Array, alpha: float, u: Array, h: Array, d: float, displacement: Vector, velocity: Vector = (0.0, 0.0)
     ) -> Measures:
-        """Of the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving with
-        `velocity` [m/s]; collective."""
+        """Measure the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving
+        with `velocity` [m/s]; collective."""
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
         *sums, largest = loops.measure(p, u, h, rows.before_first(self.slab, p, cyclic), cyclic)
@@ -64,7 +64,7 @@ class Probe:
 
 
 def _largest_at_edge(slab: Slab, p: Array) -> float:
-    """The largest pressure of this rank's points at the edge of the box, across which there is more than one point."""
+    """Return the largest pressure of this rank at the edge of the box, across which there is more than one point."""
     sides = [p[:, 0], p[:, -1]] if slab.nx > 1 else []
     if slab.ny > 1 and len(p):
         sides += [p[0]] * (slab.rows.start == 0) + [p[-1]] * (slab.rows.stop == slab.ny)

@@ -56,7 +56,7 @@ EULER_AREA, EULER_OPEN_POWER = 0.18, 2.0  # of it, times this power of it, and m
 
 @dataclass(frozen=True)
 class RunProperties:
-    """What is known of a run before it begins.
+    """Properties of a run that are known before it begins.
 
     `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
     column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator; `prony`: what
@@ -72,7 +72,7 @@ class RunProperties:
 
 @dataclass(frozen=True)
 class StepObservation:
-    """What a step has shown: the certificate's complementarity; by how much the embedded pair differs, with its order
+    """Observation of a step: the certificate's complementarity; by how much the embedded pair differs, with its order
     in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
     shares; by how many cells the surface slid in it, in how many seconds; the points that penetrate without pressure,
     as a share of those in contact; by what angle a wave turned that is as high as the surface under the pressure
@@ -93,24 +93,24 @@ class StepObservation:
 
     @property
     def correction(self) -> float:
-        """By how much the counted area is more than the corrected one, over that."""
+        """The counted area less the corrected one, over the latter."""
         return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
 
 
 def spot_radius(observed: StepObservation, points: int) -> float:
-    """Of round spots of contact, or of the gaps between them where these are the smaller, in cells; infinite where
-    there are no edges."""
+    """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells;
+    infinite where there are no edges."""
     sides = (observed.area - observed.corrected) * points / SIDE
     return ROUND * min(observed.area, 1.0 - observed.area) * points / sides if sides > 0.0 else math.inf
 
 
 def radius_of(run: RunProperties, observed: StepObservation, points: int) -> float:
-    """Of spots, or half the width of a straight one."""
+    """Return the radius of spots, or half the width of a straight one."""
     return spot_radius(observed, points) / (ROUND if run.straight else 1.0)
 
 
 def count_spots(run: RunProperties, observed: StepObservation, points: int) -> float:
-    """How many spots of contact there are; in full contact as many as half waves of the shortest length."""
+    """Return the number of spots of contact; in full contact as many as half waves of the shortest length."""
     radius = radius_of(run, observed, points)
     if run.cells_per_wave is not None:
         radius = min(radius, 0.5 * run.cells_per_wave)
@@ -119,7 +119,7 @@ def count_spots(run: RunProperties, observed: StepObservation, points: int) -> f
 
 
 def time_error(run: RunProperties, observed: StepObservation, points: int) -> float:
-    """What the length of a step adds to the error of friction, or would where something slides.
+    """Return what the length of a step adds to the error of friction, or would where something slides.
 
     In contacts the error of the exponential integrator goes with the power TIME_ORDER of the step, the difference of
     the pair with `order`.
@@ -137,19 +137,19 @@ def time_error(run: RunProperties, observed: StepObservation, points: int) -> fl
 
 
 def _passing(run: RunProperties, prony: Prony, observed: StepObservation, points: int) -> float:
-    """Of friction, as edges of contact pass a point within a step: of a share x of the radius of spots."""
+    """Return the error of friction as edges of contact pass a point within a step: by a share x of the spot radius."""
     radius = radius_of(run, observed, points)
     x = observed.slid / radius if radius > 0.0 else 0.0
     return PASSING_FRICTION * x * (_late(prony, x, observed.seconds) + PASSING_LOSS * x)
 
 
 def _turning(prony: Prony, observed: StepObservation) -> float:
-    """Of friction in full contact, as waves of the surface turn by an angle within a step."""
+    """Return the error of friction in full contact, as waves of the surface turn by an angle within a step."""
     return FULL_LOSS * observed.angle**2 * (1.0 + _late(prony, observed.angle, observed.seconds))
 
 
 def _late(prony: Prony, angle: float, seconds: float) -> float:
-    """By what share of half a step forces are late, <L>, in the mean over the branches that make friction."""
+    """Return by what share of half a step forces are late, <L>, in the mean over the branches that make friction."""
     z = seconds / prony.relaxation_times
     slow = np.maximum(z, SLOW)
     late = np.where(z > SLOW, 1.0 / np.tanh(0.5 * slow) - 2.0 / slow, z / 6.0)
@@ -159,7 +159,7 @@ def _late(prony: Prony, angle: float, seconds: float) -> float:
 
 
 def share_of_area(run: RunProperties, observed: StepObservation) -> float:
-    """What the error of area by the time steps is of that of friction."""
+    """Return the error of area by the time steps over that of friction."""
     open_share = 1.0 - observed.area
     if run.exponential:
         return EXPONENTIAL_AREA * open_share**EXPONENTIAL_OPEN_POWER

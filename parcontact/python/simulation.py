@@ -53,7 +53,7 @@ class Simulation:
     # -- running ------------------------------------------------------------------------------------------------------
 
     def steps(self) -> Iterator[Row]:
-        """The row of the initial state, then one after each step, made when it is asked for; in memory.
+        """Yield the row of the initial state, then one after each step, made when it is asked for; in memory.
 
         Called again it goes on after the last step made. Raises RunError for a step that could not be made; the state
         is then that before it. All ranks make each step: one that leaves the loop, by `break` or an exception of its
@@ -97,7 +97,7 @@ class Simulation:
 
     @property
     def row(self) -> Row:
-        """What the last step has measured, also one before a restart; of the initial state before the first."""
+        """The measures of the last step, also one before a restart; of the initial state before the first."""
         march, saved = self._march, self._saved
         added = columns_of(march.scene.followers)
         if saved is not None and saved.table.last and march.row.step == saved.step:
@@ -113,11 +113,11 @@ class Simulation:
 
     @property
     def rows(self) -> slice:
-        """Which rows of a map (along y) this rank has."""
+        """The rows of a map (along y) that this rank has."""
         return self._slab.rows
 
     def field(self, name: str) -> Array:
-        """This rank's rows of a map, shape (ny_loc, nx), as a new array: `pressure` [Pa], `displacement` [m] of the
+        """Return this rank's rows of a map, shape (ny_loc, nx), a new array: `pressure` [Pa], `displacement` [m] of the
         body, `height` [m] of the rigid surface where it is now, or `gap` [m] between both.
 
         Raises InputError for another name.
@@ -128,7 +128,7 @@ class Simulation:
         return self._march.field(name)
 
     def gather(self, name: str) -> Array | None:
-        """The whole map, shape (ny, nx), on root; None on the other ranks. Units and errors as for `field`."""
+        """Return the whole map, shape (ny, nx), on root; None on the other ranks. Units and errors as for `field`."""
         return self._slab.to_root(self.field(name))
 
     # -- state --------------------------------------------------------------------------------------------------------
@@ -202,7 +202,7 @@ class Simulation:
 
 @contextmanager
 def _in_a_file(job: Job, slab: Slab) -> Iterator[Job]:
-    """A job that has a file, if only for a moment: a mapping is written to one; collective."""
+    """Give a job a file, if only for a moment: a mapping is written to one; collective."""
     if job.origin.from_file:
         yield job
         return

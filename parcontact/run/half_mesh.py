@@ -33,7 +33,7 @@ LOOSER, LOOSEST = 3.2, 0.05  # times the accuracy of the run, for steps twice as
 
 
 def job_on_half_mesh(job: Job) -> Job:
-    """The job of the run beside another one: no fields, no energies, nothing but its table."""
+    """Return the job of the run beside another one: no fields, no energies, nothing but its table."""
     data: dict[str, Any] = plain(job)
     data["grid"]["points"] = [max(n // 2, 1) for n in job.grid.points]
     data["output"] = {"directory": str(job.output.directory / DIRECTORY)}
@@ -51,7 +51,7 @@ def job_on_half_mesh(job: Job) -> Job:
 
 @dataclass(frozen=True)
 class HalfMesh:
-    """What was measured on half the mesh: friction and corrected contact area at increasing times [s].
+    """Results on half the mesh: friction and corrected contact area at increasing times [s].
 
     `waves`: whether the surface has a shortest wave; `errors`: by what share friction is wrong by the budget there, if
     its time steps are others than those of the run.
@@ -65,7 +65,7 @@ class HalfMesh:
 
     @classmethod
     def read(cls, job: Job, slab: Slab) -> "HalfMesh":
-        """From the table that it has left; collective. Raises InputError where that cannot be read."""
+        """Read them from the table of that run; collective. Raises InputError where that cannot be read."""
         found = tables.read(job.output.directory / "measures.csv") if slab.root else {}
         times, friction, area, errors = slab.agree([found.get(name, []) for name in COLUMNS])
         waves = any(isinstance(shape, Rough) for shape in job.surface)
@@ -76,7 +76,7 @@ class HalfMesh:
         return replace(row, errors=self.judge(row, place_of(timeline, row.step)))
 
     def judge(self, row: Row, place: int) -> ErrorBudget | None:
-        """The error budget of a row of the run; it is the row number `place` of those at its time, from 0."""
+        """Return the error budget of a row of the run; it is the row number `place` of those at its time, from 0."""
         if row.errors is None:
             return None
         m = row.measures
@@ -87,7 +87,7 @@ class HalfMesh:
         )
 
     def _at(self, series: Sequence[float], time: float, place: int) -> float:
-        """A value at an instant: of the row there that stands for the same, or between two."""
+        """Return a value at an instant: of the row there that stands for the same, or between two."""
         first = bisect_left(self.times, time * (1.0 - SAME_TIME))
         there = bisect_right(self.times, time * (1.0 + SAME_TIME)) - first
         if there > 0:
@@ -97,7 +97,7 @@ class HalfMesh:
 
 
 def place_of(timeline: Timeline, step: int) -> int:
-    """How many rows have the time of a step before it; the initial state is one, at 0."""
+    """Return how many rows have the time of a step before it; the initial state is one, at 0."""
     place = 0
     while place < step and _time(timeline, step - place - 1) == _time(timeline, step):
         place += 1

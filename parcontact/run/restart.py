@@ -104,7 +104,7 @@ def _refuse(slab: Slab, problem: str) -> None:
 
 
 def _is_own(contents: Contents, directory: Directory) -> bool:
-    """Whether a checkpoint is of the run in the directory: by its run id, or as one of its files under any name."""
+    """Return whether a checkpoint is of the run in the directory: by its id, or as one of its files under any name."""
     if directory.claim is not None and contents.run:
         return contents.run == directory.claim.id
     return any(contents.path.samefile(path) for _, path in directory.saved())

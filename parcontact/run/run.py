@@ -30,7 +30,7 @@ DONE, STOPPED_EARLY = 0, 3  # exit codes: as asked; stopped early with a good ch
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line adds to a job: where to begin, `until` in s of the history, `wall` in s of this program.
+    """Options beside a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
     A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. A case of a sweep
     ends with the stop file of all, `others_file`, too. Doubts about a scene that are not shown, as `shows` says, go

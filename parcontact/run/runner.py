@@ -30,7 +30,7 @@ from .watch import Watch
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run has ended: its exit code, and where it was left; or the checkpoint at which there was nothing to do."""
+    """End of a run: its exit code, and where it was left; or the checkpoint at which there was nothing to do."""
 
     code: int
     march: March | None

@@ -31,7 +31,7 @@ Act = Callable[[Job, Slab, Shows], int]
 
 @dataclass(frozen=True)
 class Manner:
-    """How a sweep is done: `quiet`; until when at most, `limit` in the time of `time.monotonic`; `told`, the warnings
+    """Manner of a sweep: `quiet`; until when at most, `limit` in the time of `time.monotonic`; `told`, the warnings
     that were shown before. Unless it `runs` its cases, their failures are not noted."""
 
     quiet: bool = False
@@ -70,7 +70,7 @@ def run(
 
 @dataclass(frozen=True)
 class _Turns:
-    """The turns of one group of ranks in a sweep of `cases`."""
+    """Turns of one group of ranks in a sweep of `cases`."""
 
     cases: Sequence[Case]
     groups: Groups

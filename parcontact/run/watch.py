@@ -28,7 +28,7 @@ REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was fou
 
 @dataclass(frozen=True)
 class Verdict:
-    """What all ranks do after a step: `stop` says why the run ends early, `problem` what makes it fail; or ''."""
+    """Decision of all ranks after a step: `stop` says why the run ends early, `problem` what makes it fail; or ''."""
 
     stop: str = ""
     save: bool = False
@@ -55,7 +55,7 @@ class Watch:
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 
     def judge(self, step: int, began: bool, problem: str = "") -> Verdict:
-        """After a step; collective. `began`: a step was made in this run; `problem`: what root could not do."""
+        """Decide after a step; collective. `began`: a step was made in this run; `problem`: what root could not do."""
         now = time.monotonic()
         if began:
             self._steps.append(now - self._last)
@@ -101,7 +101,7 @@ class Watch:
 
 
 def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
-    """When a run must have ended, in the time of `time.monotonic`: after `wall` seconds, or with its batch job.
+    """Return when a run must have ended, in the time of `time.monotonic`: after `wall` seconds, or with its batch job.
 
     The end of a job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME, in seconds since 1970; PBS (Torque) says how long it
     may last, PBS_WALLTIME, which is counted from the start of this program: a little too late. An end before that start
@@ -118,7 +118,7 @@ def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> fl
 
 
 def age() -> float:
-    """For how many seconds this process has been there."""
+    """Return for how many seconds this process has been there."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
         return max(time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK"), 0.0)
