@@ -41,7 +41,7 @@ from ..parallel.slab import Array, reused
 from . import kernels
 from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
-from .local_load import LEAST, LocalLoad
+from .local_load import LEAST_CUT, LocalLoad
 from .preconditioner.extension import ExtendedPreconditioner
 from .problem import Problem
 from .workspace import Workspace
@@ -226,7 +226,7 @@ class ContactSolver:
         for halvings in range(MAX_HALVINGS + 1):
             load, cut = self._local_load.advance(constraint, old_p, work.direction, step, p)
             if mean is not None:
-                near_by = cut > LEAST * load and halvings == 0
+                near_by = cut > LEAST_CUT * load and halvings == 0
                 self._local_load.restore(constraint, p, load, mean * self.slab.points, near_by)
             problem.operator.apply(p, work.other_displacement)
             work.swap_displacements()

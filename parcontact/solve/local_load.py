@@ -15,8 +15,8 @@ from ..parallel.regrid import fetch
 from ..parallel.slab import Array, Slab
 from .constraint import CELL, Constraint
 
-LEAST = 3e-4  # tuning, of the load: less disturbs no long wave, and is better taken from all points alike
-MOST = 0.5  # tuning, of the load of a cell: more is not taken from it
+LEAST_CUT = 3e-4  # tuning, of the load: less disturbs no long wave, and is better taken from all points alike
+MOST_GIVEN_BACK = 0.5  # tuning, of the load of a cell: more is not taken from it
 
 
 class LocalLoad:
@@ -44,7 +44,7 @@ class LocalLoad:
 
     def restore(self, constraint: Constraint, p: Array, load: float, total: float, near_by: bool) -> None:
         """Make `total` the sum of p, which is `load` since it was advanced: what was added is first taken back
-        `near_by`, from the pressure of the same cell, but at most MOST of it; collective."""
+        `near_by`, from the pressure of the same cell, but at most MOST_GIVEN_BACK of it; collective."""
         loads = np.split(self._sums, 2, axis=1)[0]
         shares = np.zeros_like(loads)
         if near_by:
@@ -65,6 +65,8 @@ def _rows_of_cells(part: slice) -> slice:
 
 
 def _shares(sums: Array) -> Array:
-    """Which share of its load each cell gives back, from the loads and the cuts."""
+    """The share of its load that each cell gives back, from the loads and the cuts."""
     loads, cuts = np.split(sums, 2, axis=1)
-    return np.clip(np.divide(cuts, loads, out=np.zeros_like(loads), where=loads > 0.0), -MOST, MOST)
+    return np.clip(
+        np.divide(cuts, loads, out=np.zeros_like(loads), where=loads > 0.0), -MOST_GIVEN_BACK, MOST_GIVEN_BACK
+    )

@@ -42,7 +42,7 @@ from parcontact.solve.problem import Approach, Problem
 def iterations_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """How often the load is restored near by, which takes a message, and a step is made exact, which takes an operator
     call, depends on the pressures."""
-    monkeypatch.setattr(contact_solver, "LEAST", math.inf)
+    monkeypatch.setattr(contact_solver, "LEAST_CUT", math.inf)
     monkeypatch.setattr(contact_solver, "MAX_STEP_RATIO", math.inf)
 
 

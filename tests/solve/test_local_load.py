@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
 from parcontact.solve.constraint import CELL, NonNegative
-from parcontact.solve.local_load import MOST, LocalLoad
+from parcontact.solve.local_load import MOST_GIVEN_BACK, LocalLoad
 
 Map = NDArray[np.float64]
 ROUNDING, TOTAL = 1e-13, 3.0
@@ -37,7 +37,7 @@ def expected(values: Map) -> Map:
         for i in range(0, values.shape[1], CELL):
             cell = np.s_[j : j + CELL, i : i + CELL]
             load = out[cell].sum()
-            share = min((load - values[cell].sum()) / load, MOST) if load > 0.0 else 0.0
+            share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
             out[cell] *= 1.0 - share
     return out
 

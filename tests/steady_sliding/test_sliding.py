@@ -177,7 +177,7 @@ def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monk
         "history: [{pressure: 1.0}]\n"
     )
     near_by = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
-    monkeypatch.setattr(projected, "LEAST", np.inf)
+    monkeypatch.setattr(projected, "LEAST_CUT", np.inf)
     everywhere = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
     assert 2.0 * near_by.operator_calls < everywhere.operator_calls
     assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)

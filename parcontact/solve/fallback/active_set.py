@@ -20,9 +20,9 @@ from .. import kernels
 from ..contact import Contact, ContactSolver
 from ..problem import Problem
 
-SETS = 40  # tuning: guesses after which to give up
-BUDGET = 4  # tuning: times max_iterations, for all sets together: nothing is left to be tried after this
-SHARE = 0.1  # tuning: of the tolerance: the largest gap on a set to which its linear problem is solved
+MAX_SETS = 40  # tuning: guesses after which to give up
+ITERATIONS_RATIO = 4  # tuning: times max_iterations, for all sets together: nothing is left to be tried after this
+GAP_SHARE = 0.1  # tuning: of the tolerance: the largest gap on a set to which its linear problem is solved
 
 
 def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
@@ -33,12 +33,12 @@ def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
     search = _Search(solver, problem, start)
     contact, iterations = solver.judge(problem, start, ""), 0
     search.begin(contact)
-    for count in range(1, SETS + 1):
-        iterations += search.solve_on_set(contact.u, SHARE * solver.tolerance * contact.certificate.length)
+    for count in range(1, MAX_SETS + 1):
+        iterations += search.solve_on_set(contact.u, GAP_SHARE * solver.tolerance * contact.certificate.length)
         chosen = search.next_set(contact.u)
         problem.constraint.clip(start)
-        limit = BUDGET * solver.max_iterations
-        spent = f" in {BUDGET} times max_iterations = {limit}" if iterations >= limit else ""
+        limit = ITERATIONS_RATIO * solver.max_iterations
+        spent = f" in {ITERATIONS_RATIO} times max_iterations = {limit}" if iterations >= limit else ""
         contact = solver.judge(problem, start, f"found no contact among {count} sets of points{spent}")
         if contact.converged or spent or not np.isfinite(contact.certificate.worst):
             break

@@ -16,7 +16,7 @@ from ..problem import Operators, Problem
 from . import active_set
 from .cold_start import SolverOn, start_on_coarse_grids
 
-SHORT = 0.5  # tuning: length of a safeguarded step over the exact one
+SHORT_STEP = 0.5  # tuning: length of a safeguarded step over the exact one
 
 
 def retry_solve(
@@ -60,7 +60,7 @@ def _attempts(
         contact = solver.solve(problem, p)
         yield "an operator in double precision", contact
     if np.isfinite(contact.certificate.worst):
-        yield "shorter steps", solver.solve(problem, p, SHORT)
+        yield "shorter steps", solver.solve(problem, p, SHORT_STEP)
     grids = start_on_coarse_grids(solver, problem, p, solver_on)
     contact = solver.solve(problem, p)
     yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact

@@ -15,7 +15,7 @@ from ...compiled import loop
 from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..constraint import Constraint
-from ..local_load import LEAST, LocalLoad
+from ..local_load import LEAST_CUT, LocalLoad
 from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
 from .gcr import gaps_on, residual, sum_on
@@ -69,7 +69,7 @@ class Projected:
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
         now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
-        self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > LEAST * now)
+        self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > LEAST_CUT * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 

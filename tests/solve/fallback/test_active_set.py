@@ -87,7 +87,7 @@ def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
 
 
 def test_it_says_when_it_has_found_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(active_set, "SETS", 1)
+    monkeypatch.setattr(active_set, "MAX_SETS", 1)
     h = rough(64)
     found = found_by_sets(solver(h), h, MeanPressure(0.1))
     assert found.failure == "found no contact among 1 sets of points"
