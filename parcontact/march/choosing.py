@@ -28,17 +28,17 @@ from ..job.checks.limits import one_cell
 from ..physics.time_error import TIME_ORDER
 from ..scene import Scene
 
-TIME_SHARE = 0.8  # of numerics.accuracy, for the error of a step
-SAFETY = 0.98
-REJECTED = 1.19  # times the error allowed: the error of a slide varies from step to step, and its mean counts
-MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0
-LEVELS = 2  # the power of two of lengths, of steps below a quarter of a cell, per factor of two
-BETWEEN = 2.5  # steps per cell, of those that start no better at whole cells
+TIME_SHARE = 0.8  # accuracy: of numerics.accuracy, for the error of a step
+SAFETY = 0.98  # tuning: of the length with which the error would be the one allowed
+REJECTED = 1.19  # accuracy: times the error allowed; that of a slide varies from step to step, and its mean counts
+MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: of a step over the one before it, or over one rejected
+LEVELS = 2  # tuning: the power of two of the number of lengths, of steps below a quarter of a cell, per factor of two
 REST_LEVELS = 4  # the same at rest
-LEAST_WAY = 0.35  # of a step that ends at a multiple of its length
-STRETCH = 1.1  # of the last step of a stage: no step shorter than a tenth of the one before is left over
-RELAXING = 0.1  # of the shortest relaxation time: the first step at rest after a jump
-SAME_LEVEL = 1e-6  # of a level
+BETWEEN = 2.5  # tuning: steps per cell, of those that start no better at whole cells
+LEAST_WAY = 0.35  # tuning: of a step that ends at a multiple of its length
+STRETCH = 1.1  # tuning: of the last step of a stage: no step shorter than a tenth of the one before is left over
+RELAXING = 0.1  # tuning: of the shortest relaxation time: the first step at rest after a jump
+SAME_LEVEL = 1e-6  # rounding: of a level
 
 
 def cells_per_step(most: float, whole_soon: bool = True) -> float:

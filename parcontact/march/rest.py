@@ -22,7 +22,7 @@ from ..scene import Scene
 from .choosing import StepChooser
 from .state import State
 
-SHARE = 0.1  # of the largest displacement: about the length that certificates compare gaps with
+SHARE = 0.1  # accuracy: of the largest displacement: about the length that certificates compare gaps with
 
 
 def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step:

@@ -231,8 +231,8 @@ def _compare(contents: Contents, wanted: dict[str, Entry]) -> None:
 
 
 def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
-    """Raise InputError where a branch had no map in the run that wrote the checkpoint, as it relaxed too fast, and needs
-    one now that steps are shorter: what it remembered is lost."""
+    """Raise InputError where a branch had no map in the run that wrote the checkpoint, as it relaxed too fast, and
+    needs one now that steps are shorter: what it remembered is lost."""
     if "material/frozen" not in contents.numbers:
         return
     for k in scene.folded.kept:

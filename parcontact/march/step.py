@@ -28,7 +28,7 @@ from .failure import StepError
 from .starts import Past, cells_moved, make_start
 from .state import State, completed
 
-FULL_CONTACT_ROUNDING = 1e-14  # relative to lengths whose sum is compared with 0
+FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 
 
 def make_step(scene: Scene, state: State, step: Step) -> State:

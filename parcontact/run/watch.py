@@ -17,10 +17,10 @@ from ..parallel.slab import Slab
 from ..storage import stopfile
 from ..storage.stopfile import StopFile
 
-LOOK_SECONDS = 0.2  # between two looks for the stop file
+LOOK_SECONDS = 0.2  # tuning: between two looks for the stop file
 RESERVE_SECONDS = 5.0  # of wall time for what is not measured: ending MPI, closing files
-FIRST_WRITE = 50e6  # bytes per second: how fast the first checkpoint is expected to be written
-RECENT = 50  # steps whose longest is expected of the next one
+FIRST_WRITE = 50e6  # tuning: bytes per second: how fast the first checkpoint is expected to be written
+RECENT = 50  # tuning: steps whose longest is expected of the next one
 
 GO, WALL, FILE, SIGNAL = range(4)  # the largest one that any rank sees decides
 REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was found", SIGNAL: "a signal asked for it"}
