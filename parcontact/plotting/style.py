@@ -34,6 +34,7 @@ RC: dict[Any, Any] = {
     "grid.alpha": 0.25,
     "legend.fontsize": 9,
     "legend.title_fontsize": 9,
+    "legend.borderpad": 0.2,
     "legend.framealpha": 0.7,
     "legend.edgecolor": "none",
     "legend.handlelength": 1.6,
