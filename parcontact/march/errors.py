@@ -135,7 +135,8 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
         look.angle,
         apart,
     )
-    return Estimate(estimate(run, observed, points), time_error(run, observed, points), observations)
+    time = time_error(run, observed, points)
+    return Estimate(estimate(run, observed, points, time), time, observations)
 
 
 def _look(scene: Scene, observations: Observations, solved: Solved) -> tuple[Observations, IntegratorDifference]:

@@ -94,11 +94,11 @@ class ErrorBudget:
     area: Parts
 
 
-def estimate(run: RunProperties, observed: StepObservation, points: int) -> ErrorBudget:
-    """Return the budget of a step on a grid of so many points."""
-    return ErrorBudget(
-        _friction(run, observed, points) if observed.friction > 0.0 else None, _area(run, observed, points)
-    )
+def estimate(run: RunProperties, observed: StepObservation, points: int, time: float | None = None) -> ErrorBudget:
+    """Return the budget of a step on a grid of so many points; `time` is its time error, if that is at hand."""
+    time = time_error(run, observed, points) if time is None else time
+    friction = _friction(run, observed, points, time) if observed.friction > 0.0 else None
+    return ErrorBudget(friction, _area(run, observed, points, time))
 
 
 def estimate_steady(run: RunProperties, observed: StepObservation, points: int) -> ErrorBudget:
@@ -110,15 +110,15 @@ def estimate_steady(run: RunProperties, observed: StepObservation, points: int) 
         mesh += share * _by_waves(run) + _by_spots(run, observed, points)
         solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
         friction = Parts(solver, 0.0, run.folded, mesh)
-    return ErrorBudget(friction, replace(_area(run, observed, points), time=0.0))
+    return ErrorBudget(friction, _area(run, observed, points, 0.0))
 
 
-def _friction(run: RunProperties, observed: StepObservation, points: int) -> Parts:
+def _friction(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:
     spots, steep = count_spots(run, observed, points), max(1.0, observed.slope / observed.friction)
     solver = SOLVER_FRICTION * observed.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
     noise = NOISE * max(observed.complementarity, ROUNDING) * observed.slope / observed.friction / math.sqrt(spots)
     mesh = observed.views_apart / observed.friction + _by_waves(run) + _by_spots(run, observed, points)
-    return Parts(max(solver, noise), time_error(run, observed, points), run.folded, mesh)
+    return Parts(max(solver, noise), time, run.folded, mesh)
 
 
 def _by_waves(run: RunProperties) -> float:
@@ -158,15 +158,14 @@ def compared_with_half_mesh(
     return ErrorBudget(found and replace(found, mesh=friction), replace(budget.area, mesh=area))
 
 
-def _area(run: RunProperties, observed: StepObservation, points: int) -> Parts:
+def _area(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:
     open_share = 1.0 - observed.area
     solver = SOLVER_AREA * observed.complementarity**SOLVER_AREA_POWER + PENETRATING * observed.penetrating
     mesh = STRAIGHT_EDGES * observed.correction
     if not run.straight:
         mesh = EDGES * observed.correction + SMALL_SPOTS * observed.correction**2
     mesh = max(mesh, 1.0 / (points * observed.area)) if observed.area > 0.0 else mesh  # it is counted in cells
-    time = share_of_area(run, observed) * time_error(run, observed, points)
-    return Parts(solver, time, run.folded * open_share, mesh)
+    return Parts(solver, share_of_area(run, observed) * time, run.folded * open_share, mesh)
 
 
 def weight_of(slid: float, seconds: float) -> float:
