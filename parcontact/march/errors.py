@@ -116,8 +116,9 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
     points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
     prony = None if branches is None else branches.prony
     run = properties_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
-    observations, look = _look(scene, observations, solved)
-    observations, apart = _compare_views(scene, observations, solved)
+    pair, look = _look(scene, observations.pair, solved)
+    views, apart = _compare_views(scene, observations.views, solved)
+    observations = Observations(pair, views)
     if measures.contact_area == 0.0:
         still = StepObservation(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
         return Estimate(None, time_error(run, still, points), observations)
@@ -139,39 +140,39 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
     return Estimate(estimate(run, observed, points, time), time, observations)
 
 
-def _look(scene: Scene, observations: Observations, solved: Solved) -> tuple[Observations, IntegratorDifference]:
+def _look(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObservation, IntegratorDifference]:
     """Return what the pair shows of a step, or of the one like it that was looked at last; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
     branches = scene.material.branched
     if branches is None:
-        return observations, NO_DIFFERENCE
+        return last, NO_DIFFERENCE
     pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if measures.contact_area == 0.0:
         free = pair.compare_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
-        return replace(observations, pair=LastObservation()), free
-    last = observations.pair.once_more(step, ALIKE_STEPS)
-    if last is None:
+        return LastObservation(), free
+    now = last.once_more(step, ALIKE_STEPS)
+    if now is None:
         load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
         look = pair.compare(step.dt, trial, solved.body, contact.p, contact.u, load, measures.contact_area)
-        last = LastObservation.of(step, *astuple(look))
-    return replace(observations, pair=last), IntegratorDifference(*last.observed)
+        now = LastObservation.of(step, *astuple(look))
+    return now, IntegratorDifference(*now.observed)
 
 
-def _compare_views(scene: Scene, observations: Observations, solved: Solved) -> tuple[Observations, float]:
+def _compare_views(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObservation, float]:
     """Return by how much friction by the slopes of the rigid surface and of the body differ; collective.
 
     Of an elastic body the latter is 0.
     """
     step, measures, grid = solved.step, solved.measures, scene.choices.grid
     if scene.material.branched is None or measures.friction == 0.0:
-        return observations, max(measures.friction - measures.friction_interface, 0.0)
-    last = observations.views.once_more(step, ALIKE_VIEWS)
-    if last is None:
+        return last, max(measures.friction - measures.friction_interface, 0.0)
+    now = last.once_more(step, ALIKE_VIEWS)
+    if now is None:
         direction, own = _viscous(step.velocity, measures)
         maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.boundary == "periodic"
         other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
-        last = LastObservation.of(step, abs(other * scene.units.height - own))
-    return replace(observations, views=last), last.observed[0]
+        now = LastObservation.of(step, abs(other * scene.units.height - own))
+    return now, now.observed[0]
 
 
 def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> RunProperties:

@@ -106,13 +106,19 @@ def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approac
 
 def completed(scene: Scene, state: State) -> State:
     """Return the state with the energies [J] and the columns of effects in its row."""
-    row = replace(state.row, added=values_of(scene.followers))
-    if scene.energy is not None and state.energy is not None:
-        unit, memory = scene.energy.unit, state.energy
-        lost = tuple(float(value) * unit for value in memory.dissipated)
-        work, stored = memory.work * unit, memory.stored * unit
-        row = replace(row, work=work, stored=stored, dissipated=math.fsum(lost), branch_dissipation=lost)
+    work, stored, lost, split = energies_of(scene, state.energy)
+    added = values_of(scene.followers)
+    row = replace(state.row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
     return replace(state, row=row)
+
+
+def energies_of(scene: Scene, memory: EnergyMemory | None) -> tuple[float, float, float, tuple[float, ...]]:
+    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for."""
+    if scene.energy is None or memory is None:
+        return math.nan, math.nan, math.nan, ()
+    unit = scene.energy.unit
+    lost = tuple(float(value) * unit for value in memory.dissipated)
+    return memory.work * unit, memory.stored * unit, math.fsum(lost), lost
 
 
 # -- checkpoints ------------------------------------------------------------------------------------------------------

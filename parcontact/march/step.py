@@ -7,12 +7,11 @@ of the old one in its place when the step has been made. What works in place com
 
 import math
 import time
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from ..effects.effect import Instant
+from ..effects.effect import Instant, values_of
 from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.body import Trial, surface_of
@@ -26,7 +25,7 @@ from . import failure
 from .errors import Solved, estimate_errors
 from .failure import StepError
 from .starts import Past, cells_moved, make_start
-from .state import State, completed
+from .state import State, energies_of
 
 FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 
@@ -47,6 +46,10 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     contact, slid = solved.contact, math.dist(step.position, state.position)
     _tell_effects(scene, solved, slid)
     energy = _advance_energy(scene, state, solved)
+    if state.chosen is not None and verdict is not None:
+        state.chosen.add(verdict)
+    if solved.body.displacement is scene.solver.workspace.pressure:
+        scene.solver.workspace.pressure = surface_of(state.body)
     row = Row(
         step.number,
         step.time,
@@ -55,10 +58,13 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         contact.iterations,
         contact.certificate,
         scene.slab.tally["operator"] - calls,
+        *energies_of(scene, energy),
+        seconds=time.perf_counter() - began,
         remark=solved.remark,
         errors=errors.budget,
+        added=values_of(scene.followers),
     )
-    new = State(
+    return State(
         row,
         (Past(contact.p, solved.trial.alpha, step.position), *state.pasts[:-1]),
         state.pasts[-1].pressure,
@@ -70,11 +76,6 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         state.errors,
         state.chosen,
     )
-    if state.chosen is not None and verdict is not None:
-        state.chosen.add(verdict)
-    if solved.body.displacement is scene.solver.workspace.pressure:
-        scene.solver.workspace.pressure = surface_of(state.body)
-    return completed(scene, replace(new, row=replace(row, seconds=time.perf_counter() - began)))
 
 
 def _advance_energy(scene: Scene, state: State, solved: Solved) -> EnergyMemory | None:
