@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import pytest
-from marching import ROOT
 from mpi4py import MPI
 
 from parcontact import __main__
 from parcontact.doctor import checks, machine
 from parcontact.doctor.bench import Bench, Finding
 from parcontact.doctor.checks import CHECKS, Check, CheckResult, markdown, run_check
+from parcontact.manual import texts
 from parcontact.run import runner
 from parcontact.run.run import Options
 
@@ -50,9 +50,9 @@ def test_verb(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_table_of_the_readme() -> None:
+def test_table_of_the_manual() -> None:
     """It has every check, with what is expected of it."""
-    text = (ROOT / "README.md").read_text()
+    text = texts.page("hard_cases")
     for number, check in enumerate(CHECKS, start=1):
         assert f"| {number} | {check.name} | {check.expected} |" in " ".join(text.split())
 

@@ -40,7 +40,7 @@ WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put
 }
 OTHER_PROGRAMS = {  # in shell blocks; what is parcontact's is parsed
     *("apptainer", "cp", "docker", "env", "env/bin/pip", "module", "python3", "sbatch"),
-    *("scripts/manual", "scripts/setup", "scripts/test", "."),
+    *("scripts/demo", "scripts/manual", "scripts/setup", "scripts/test", "."),
 }
 
 
