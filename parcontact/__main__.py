@@ -1,7 +1,9 @@
 """The program `parcontact`: a command line in, an exit code out."""
 
+import errno
 import gc
 import os
+import resource
 import sys
 import time
 import traceback
@@ -43,6 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     try:
+        _refuse_lost_directory()
         options = parse_arguments(words)
         code = int(options.act(options))
         return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output())
@@ -55,6 +58,14 @@ def _run(words: list[str]) -> int:
         return _end_together(str(error) if isinstance(error, JobError) else f"parcontact: {error}", code)
     except (Exception, KeyboardInterrupt) as error:
         _end_all(error)
+
+
+def _refuse_lost_directory() -> None:
+    try:
+        os.getcwd()
+    except OSError as error:
+        text = f"the working directory cannot be found ({error.strerror}): change to one that is there"
+        raise InputError(text) from None
 
 
 def _judge_output() -> int:
@@ -98,15 +109,26 @@ def _end_all(error: BaseException) -> NoReturn:
     several = world is not None and world.size > 1
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
     said = f": {error}" if str(error) else ""
-    reason = f"ended by {type(error).__name__}"
-    if isinstance(error, MemoryError):
-        reason = "out of memory; free some, allow more by ulimit -v, or take fewer points"
-    elif not isinstance(error, KeyboardInterrupt):
+    reason = _describe_surroundings(error) or f"ended by {type(error).__name__}"
+    if not isinstance(error, KeyboardInterrupt) and not _describe_surroundings(error):
         traceback.print_exception(error)
     print(f"parcontact: {reason}{where}{said}", file=sys.stderr, flush=True)
     if world is not None and several:
         world.Abort(FAILED)
     sys.exit(FAILED)
+
+
+def _describe_surroundings(error: BaseException) -> str:
+    """Return what is wrong around the program, where that has ended it, and what to do; '' for any other error."""
+    limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+    if isinstance(error, MemoryError) or (limited and isinstance(error, ImportError | SystemError)):
+        return "out of memory; free some, allow more by ulimit -v, or take fewer points"
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        return "out of open files; allow more by ulimit -n"
+    frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__) if frame.f_code.co_name == "<module>")
+    if any(frame.f_globals["__name__"] == "matplotlib" for frame in frames):
+        return "Matplotlib cannot start; mend MPLBACKEND, or matplotlibrc in the working directory"
+    return ""
 
 
 if __name__ == "__main__":

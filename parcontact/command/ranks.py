@@ -7,6 +7,7 @@ has not started, the other ranks say nothing and end well: the exit code of root
 from __future__ import annotations
 
 import os
+import resource
 import sys
 from functools import wraps
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     Verb = Callable[[argparse.Namespace], int]
 
 BLANK = " \0"  # what may follow the name of an MPI library
+LEAST_FILES, LEAST_MEMORY = 32, 520e6  # open files and bytes without which MPI and the libraries do not even start
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # say which rank a process is
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # how many were started
 
@@ -56,7 +58,8 @@ def started() -> MPI.Intracomm | None:
 
 
 def start() -> MPI.Intracomm:
-    """All ranks; starts MPI. Raises InputError for a rank that is alone but should not be."""
+    """All ranks; starts MPI. Raises InputError where that must fail, and for a rank that is alone but should not be."""
+    _refuse_surroundings()
     from ..parallel.mpi import MPI
 
     world, count = MPI.COMM_WORLD, launched()
@@ -67,6 +70,23 @@ def start() -> MPI.Intracomm:
             "(see parcontact manual install)."
         )
     return world
+
+
+def _refuse_surroundings() -> None:
+    """Raise InputError for limits and settings of the shell under which MPI ends without a sentence."""
+    files, memory = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_NOFILE, resource.RLIMIT_AS))
+    if 0 <= files < LEAST_FILES:
+        raise InputError(f"only {files} files may be open: set a limit of {LEAST_FILES} or more, by ulimit -n")
+    if scratch := os.environ.get("TMPDIR"):
+        try:
+            os.makedirs(scratch, exist_ok=True)  # as MPI does
+        except OSError as error:
+            text = (
+                f"TMPDIR is {scratch}, which cannot be made ({error.strerror}): name a directory in which you may write"
+            )
+            raise InputError(text) from None
+    if 0 <= memory < LEAST_MEMORY:
+        raise InputError(f"only {memory >> 20} MB of memory may be used: set a limit of 1 GB or more, by ulimit -v")
 
 
 def root_alone(verb: Verb) -> Verb:

@@ -49,8 +49,16 @@ def describe_run(directory: Path) -> Section:
         *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
         theory_settings.describe(directory),
     ]
-    pictures = [draw_chart(chart) for chart in histories.charts(run)]
+    pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)
     return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse_run(run))
+
+
+def _leakage(directory: Path) -> list[tuple[str, str]]:
+    """Return the picture of `parcontact leak`, where there is one."""
+    picture = directory / "leak.png"
+    if not picture.is_file() or picture.is_symlink():
+        return []
+    return [(to_uri(picture.read_bytes(), "image/png"), "where fluid flows through the gap, and how much")]
 
 
 def describe_curve(directory: Path) -> Section:

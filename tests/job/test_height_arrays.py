@@ -98,6 +98,8 @@ MISTAKES = [
     (HEIGHTS + 0j, "got an array of shape (12, 16) of complex128"),
     (np.where(HEIGHTS > 0, HEIGHTS, np.nan), "got 96 of 192 that are not finite"),
     (np.ma.masked_less(HEIGHTS, 0), "got 96 of 192 that are not finite"),
+    (1e-300 * HEIGHTS, "e-3"),  # 1e-305 m, say
+    (1e200 * HEIGHTS, "nothing can be computed"),
     (HEIGHTS.tolist(), "a job file names a file instead"),
 ]
 

@@ -1,6 +1,9 @@
-"""Where the program runs may be hostile: outputs that are full, limits, settings of others."""
+"""Where the program runs may be hostile: outputs that are full, limits, directories that vanish, settings of others."""
 
+import errno
+import os
 import resource
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -73,16 +76,69 @@ def test_limit_of_file_sizes(here: Path, main: Main, fields: str) -> None:
     assert main(*words)[0] == DONE
 
 
-def test_too_little_memory(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line, without a traceback."""
+@pytest.mark.parametrize(
+    ("what", "soft", "said"),
+    [
+        (resource.RLIMIT_NOFILE, 12, "only 12 files may be open: set a limit of 32 or more, by ulimit -n"),
+        (resource.RLIMIT_AS, 300 << 20, "only 300 MB of memory may be used: set a limit of 1 GB or more, by ulimit -v"),
+    ],
+)
+def test_limits_too_narrow_to_start(
+    here: Path, main: Main, monkeypatch: pytest.MonkeyPatch, what: int, soft: int, said: str
+) -> None:
+    """Said before MPI and other libraries end the process in their own ways."""
+    found = resource.getrlimit
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (soft, soft) if kind == what else found(kind))
+    assert main("job.yaml", "--out", "out") == (BAD_INPUT, "", f"parcontact: {said}\n")
+    assert not (here / "out").exists()
 
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MemoryError(), "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"),
+        (ImportError("libx.so: failed to map segment from shared object"), "parcontact: out of memory; "),
+        (SystemError("error return without exception set"), "parcontact: out of memory; "),
+        (OSError(errno.EMFILE, "Too many open files"), "parcontact: out of open files; allow more by ulimit -n: "),
+    ],
+)
+def test_what_the_machine_lacks(main: Main, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str) -> None:
     def fail(*_: object) -> NoReturn:
-        raise MemoryError
+        raise error
 
     monkeypatch.setattr(info, "describe_all", fail)
-    code, _, errors = main("info", "out")
+    with limited(resource.RLIMIT_AS, 1 << 45):
+        code, _, errors = main("info", "out")
     assert code == FAILED
-    assert errors == "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"
+    assert errors.startswith(said)
+    assert len(errors.splitlines()) == 1
+
+
+@pytest.mark.parametrize("verb", ["run", "check", "plot", "report"])
+def test_working_directory_that_was_removed(here: Path, main: Main, verb: str) -> None:
+    (here / "gone").mkdir()
+    os.chdir(here / "gone")
+    (here / "gone").rmdir()
+    code, _, said = main(verb, here / "job.yaml")
+    assert code == BAD_INPUT
+    assert said.startswith("parcontact: the working directory cannot be found (No such file or directory): change to")
+
+
+@pytest.mark.parametrize("kind", ["matplotlibrc", "MPLBACKEND"])
+def test_settings_of_others_with_which_matplotlib_does_not_start(
+    here: Path, main: Main, outside_mpi: dict[str, str], kind: str
+) -> None:
+    assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
+    if kind == "matplotlibrc":
+        (here / kind).write_bytes(b"\xff\xfe: 1")
+    environment = outside_mpi if kind == "matplotlibrc" else {**outside_mpi, kind: "none"}
+    command = [sys.executable, "-m", "parcontact", "plot", "out"]
+    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True)
+    assert done.returncode == FAILED
+    assert done.stderr.splitlines()[-1].startswith(
+        "parcontact: Matplotlib cannot start; mend MPLBACKEND, or matplotlib"
+    )
+    assert "Traceback" not in done.stderr
 
 
 def test_pictures_are_as_without_the_settings_of_others(
@@ -101,6 +157,18 @@ def test_pictures_are_as_without_the_settings_of_others(
             assert drawn, words
             assert not any(drawn), words
         assert mpl.rcParams["text.usetex"]
+
+
+@pytest.mark.parametrize("name", ["/proc/absent", "job.yaml"])
+def test_directory_for_scratch_files_that_cannot_be(
+    here: Path, main: Main, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("TMPDIR", name)
+    code, _, said = main("job.yaml", "--out", "out")
+    assert code == BAD_INPUT
+    assert said.startswith(f"parcontact: TMPDIR is {name}, which cannot be made (")
+    assert len(said.splitlines()) == 1
+    assert not (here / "out").exists()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "grid: 1\nmaterial: {}\n", "title: x\n"])

@@ -156,3 +156,21 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
 def test_mistakes(change: dict[str, Any], message: str) -> None:
     with pytest.raises(pc.JobError, match=message):
         pc.Simulation({**rough(3e4, "free"), **change})
+
+
+@pytest.mark.parametrize(("base", "poisson"), [("bonded", 0.5), ("bonded", 0.3), ("smooth", 0.5)])
+def test_pressure_of_a_wave_in_full_contact(base: Any, poisson: float) -> None:
+    """p = G q h/((1 - nu) S) about the mean, to the tolerance of the solve."""
+    thickness, amplitude, q = 1e-4, 1e-6, 2 * np.pi * 2 / 1e-3
+    job = sliding_wave({"thickness": thickness, "base": base}) | {
+        "material": {"model": "elastic", "shear_modulus": 1e6, "poisson": poisson},
+        "initial": {"state": "virgin"},
+        "history": [{"pressure": 1e6}],
+        "numerics": {"tolerance": 1e-12},
+    }
+    run = pc.Simulation(job, comm=MPI.COMM_SELF)
+    list(run.steps())
+    ratio = float(Layer(thickness, base, poisson).compliance_ratio(np.array(q)))
+    exact = 1e6 * q * amplitude / (1 - poisson) / ratio
+    wave = 2 * np.abs(np.fft.fft(run.field("pressure")[0]))[2] / 32
+    assert wave == pytest.approx(exact, rel=1e-10)

@@ -10,6 +10,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from ..text.fault import Fault, quote, refuse
 from ..text.python_data import is_array
 from .part import Part
+from .quantities import LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,6 +32,11 @@ class Heights:
         values = np.ma.array(found, dtype=np.float64, copy=True, order="C").filled(np.nan)
         if wrong := int(np.count_nonzero(~np.isfinite(values))):
             raise ValueError(f"{wrong} of {values.size} that are not finite")
+        highest = float(np.abs(values).max(initial=0.0))
+        if highest and not SMALLEST <= highest <= LARGEST:
+            raise ValueError(
+                f"heights of {highest:.3g} m: beyond {SMALLEST:g} to {LARGEST:g} m nothing can be computed"
+            )
         values.flags.writeable = False
         self.values: NDArray[np.float64] | None = values
         self.shape: tuple[int, int] = values.shape
