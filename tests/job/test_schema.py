@@ -13,7 +13,7 @@ from parcontact import __main__
 from parcontact.job import keys, schema
 from parcontact.job.text import yamltext
 
-JOBS = sorted((ROOT / "jobs").rglob("*.yaml"))
+JOBS = sorted(path for path in (ROOT / "jobs").rglob("*.yaml") if path.name != "rubber.yaml")
 RIGHT = """
 grid: {points: 64, size: 1.0e-3}
 surface: {shape: rough, hurst: 0.8, long_wavelength: 5.0e-4, short_wavelength: 1.0e-4, rms_slope: 0.1}
