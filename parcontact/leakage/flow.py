@@ -61,9 +61,8 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
     length, width = size[1], size[0]
     aspect = (width / gap.shape[1]) / (length / gap.shape[0])  # of a cell: across over along the flow
     matrix, first, last = _balance(cubes, wet, aspect, periodic_sides)
-    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     # The drop from the first end and the pressure above the last end: each is exact where it is small.
-    drop, above = factors.solve(np.stack([last, first], axis=1)).T
+    drop, above = _solve(matrix, _checkerboard(wet), np.stack([last, first], axis=1)).T
     inflow, outflow = float(first @ drop), float(last @ above)
     flow = 0.5 * (inflow + outflow)
     pressure[wet] = above
@@ -128,6 +127,35 @@ def _balance(cubes: Map, wet: NDArray[np.bool_], aspect: float, periodic: bool) 
     rows, columns = np.concatenate([a, b, every]), np.concatenate([b, a, every])
     matrix = sparse.csc_matrix((np.concatenate([-c, -c, diagonal]), (rows, columns)), shape=(count, count))
     return matrix, first[wet], last[wet]
+
+
+def _checkerboard(wet: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which wet cells are on the white fields of a checkerboard, where none touches another.
+
+    Across periodic sides two would touch where the number of columns is odd: its last column has none.
+    """
+    white = np.add.outer(np.arange(wet.shape[0]), np.arange(wet.shape[1])) % 2 == 0
+    white[:, -1] &= wet.shape[1] % 2 == 0
+    return np.asarray(white[wet])
+
+
+def _solve(matrix: sparse.csc_matrix, white: NDArray[np.bool_], given: Map) -> Map:
+    """Return the solution of a symmetric system, shape (cells, sides).
+
+    White cells are eliminated at once, as they touch black ones only. That leaves half of the cells to the direct
+    solver, in four fifths of its time.
+    """
+    white_cells, black_cells = np.flatnonzero(white), np.flatnonzero(~white)
+    rows = matrix.tocsr()
+    coupling, inverse = rows[black_cells][:, white_cells], 1.0 / matrix.diagonal()[white_cells]
+    eliminated = coupling @ sparse.diags(inverse)
+    reduced = (rows[black_cells][:, black_cells] - eliminated @ coupling.T).tocsc()
+    solution = np.empty_like(given)
+    if black_cells.size:
+        factors = splu(reduced, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        solution[black_cells] = factors.solve(given[black_cells] - eliminated @ given[white_cells])
+    solution[white_cells] = inverse[:, None] * (given[white_cells] - coupling.T @ solution[black_cells])
+    return solution
 
 
 def _faces(a: NDArray[np.int32], b: NDArray[np.int32], c: Map) -> tuple[NDArray[np.int32], NDArray[np.int32], Map]:
