@@ -5,7 +5,7 @@
 
 Each trial is of one kind, by its number. `kill` is SIGKILL of one rank, of all ranks, or of mpirun too, at a random
 instant, every other time inside the writing of a checkpoint; the others are described below. `fill` needs root (it
-mounts a small tmpfs). Exit codes but those of the README, and tracebacks, are faults too. Ends with 0 if nothing was
+mounts a small tmpfs). Exit codes but those of the manual, and tracebacks, are faults too. Ends with 0 if nothing was
 lost, hung or changed.
 """
 
