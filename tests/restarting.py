@@ -80,7 +80,7 @@ class Bench:
         }
         for key, value in changes.items():
             merged = isinstance(value, dict) and not value.keys() & {"shape", "model"}
-            data[key] = {**data[key], **value} if merged else value
+            data[key] = {**data.get(key, {}), **value} if merged else value
         return data
 
     def run(self, data: dict[str, Any], out: Path, **options: Any) -> int:

@@ -10,13 +10,16 @@ closed. Contact is impermeable. Only cells that lie on a path from end to end ma
 directly, since g^3 spans many decades and iterations stall.
 """
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from ..errors import InputError
 from .paths import connected_from_end_to_end, critical_constriction
 
 Map = NDArray[np.float64]
@@ -38,7 +41,7 @@ class Flow:
     constriction: float
     position: tuple[int, int] | None
     imbalance: float
-    pressure: Map
+    pressure: Map = field(repr=False)
 
     @property
     def percolates(self) -> bool:
@@ -95,13 +98,32 @@ class Leak:
         return max(self.along_x.constriction, self.along_y.constriction)
 
 
-def leak(gap: Map, size: tuple[float, float], periodic: bool = True) -> Leak:
+def leak(gap: ArrayLike, size: Sequence[float], periodic: bool = True) -> Leak:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m], along x and along y.
 
-    Contact is where the gap is 0 or less. Sides along the flow are `periodic`, or closed.
+    Contact is where the gap is 0 or less. Sides along the flow are `periodic`, or closed. Raises InputError for gaps
+    that are no such map, or not finite, and for other sizes.
     """
-    gap = np.maximum(np.asarray(gap, dtype=float), 0.0)
-    return Leak(*(solve_flow(gap, size, axis, periodic) for axis in ("x", "y")))
+    try:
+        gaps = np.asarray(gap, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("gap must be a map of numbers [m], shape (ny, nx)") from None
+    if gaps.ndim != 2 or not gaps.size:
+        raise InputError(f"gap must be a map [m] of shape (ny, nx), got one of shape {gaps.shape}")
+    if missing := int(np.count_nonzero(~np.isfinite(gaps))):
+        raise InputError(f"gap must be finite, {missing} of {gaps.size} points are not: fill or close (0) them")
+    lengths = _lengths(size)
+    return Leak(*(solve_flow(np.maximum(gaps, 0.0), lengths, axis, periodic) for axis in ("x", "y")))
+
+
+def _lengths(size: Sequence[float]) -> tuple[float, float]:
+    try:
+        width, height = (float(length) for length in size)
+    except (TypeError, ValueError):
+        raise InputError(f"size must be two lengths (lx, ly) [m], got {size!r}") from None
+    if not (0.0 < width < math.inf and 0.0 < height < math.inf):
+        raise InputError(f"size must be two positive lengths (lx, ly) [m], got {size!r}")
+    return width, height
 
 
 def _balance(cubes: Map, wet: NDArray[np.bool_], aspect: float, periodic: bool) -> tuple[sparse.csc_matrix, Map, Map]:

@@ -69,7 +69,10 @@ class Gaps:
         return np.where(pressure > 0.0, 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:
-        """Return the gap [m] of the undeformed surface that just touches."""
+        """Return the gap [m] of the undeformed surface that just touches; 0 where heights came from a file, which is
+        not read again and shows as flat."""
+        if any(part.shape == "flat" for part in self.job.surface):
+            return np.zeros(self.job.grid.points[::-1])
         setup = scene.set_up(self.job, Slab(MPI.COMM_SELF, *self.job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)

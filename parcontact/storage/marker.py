@@ -16,7 +16,7 @@ MARKER = ".parcontact"
 FORMAT = 1
 MAX_BYTES = 1 << 24
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
-SCENE = ("grid", "surface", "material")  # sections in which all that shares a directory must agree
+SCENE = ("grid", "surface", "material", "body")  # sections in which all that shares a directory must agree
 SECTIONS = (*SCENE, "initial", "numerics", "steady")  # what a marker keeps of a job
 
 

@@ -1,9 +1,12 @@
 """Flow through gaps: closed forms of waves, mazes and checkerboards, closure, and what rotations and scales do."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from parcontact.leakage.flow import Map, solve_flow
+from parcontact.errors import InputError
+from parcontact.leakage.flow import Map, leak, solve_flow
 
 
 def wave(points: int, depth: float) -> Map:
@@ -98,3 +101,28 @@ def test_narrow_gaps_hardly_matter() -> None:
     all_narrow = np.full((8, 8), 1e-5)
     all_narrow[3, 3] = 1.0  # where all paths are narrow they are kept
     assert solve_flow(all_narrow, (1.0, 1.0)).conductivity == pytest.approx(1e-15, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("gap", "size", "told"),
+    [
+        ([["a"]], (1.0, 1.0), "gap must be a map of numbers"),
+        ([[1.0], [1.0, 2.0]], (1.0, 1.0), "gap must be a map of numbers"),
+        (None, (1.0, 1.0), r"shape \(\)"),
+        (np.ones(5), (1.0, 1.0), r"shape \(5,\)"),
+        (np.ones((0, 3)), (1.0, 1.0), r"shape \(0, 3\)"),
+        ([[1.0, np.nan]], (1.0, 1.0), "1 of 2 points are not: fill or close"),
+        (np.ones((4, 4)), 1.0, "two lengths .*, got 1.0"),
+        (np.ones((4, 4)), (1.0, 1.0, 1.0), "two lengths"),
+        (np.ones((4, 4)), (1.0, -1.0), "positive lengths"),
+        (np.ones((4, 4)), (1.0, np.nan), "positive lengths"),
+    ],
+)
+def test_what_is_no_map_of_gaps(gap: Any, size: Any, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        leak(gap, size)
+
+
+def test_what_a_leak_shows() -> None:
+    """A notebook prints its numbers, not its maps."""
+    assert len(repr(leak(np.ones((64, 64)).tolist(), [1.0, 1.0]))) < 300

@@ -19,6 +19,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"surface": {**ROUGH, "rms_slope": None, "rms_height": 1e-6}}, "surface.0.rms_slope was 0.02, is None"),
     ({"material": {"modulus_inf": 2e6}}, "material.modulus_inf was 1000000.0, is 2000000.0"),
     ({"material": ELASTIC}, "material.model was zener, is elastic"),
+    ({"body": {"thickness": 1e-3}}, "body.thickness was None, is 0.001"),
     ({"numerics": {"integrator": "backward-euler"}}, "numerics.integrator was exponential, is backward-euler"),
     ({"numerics": {"kernel": "love"}}, "numerics.kernel was spectral, is love"),
     ({"numerics": {"precision": "mixed"}}, "numerics.precision was double, is mixed"),
