@@ -83,7 +83,7 @@ LAST = {  # after the dissipation of the branches: columns that came later stand
     "error_friction": ("", "error_friction"),
     "error_area": ("", "error_area"),
 }
-UNITS = {name: unit for name, (unit, _) in COLUMNS.items() if unit}  # of the columns that have one
+UNITS = {name: unit for name, (unit, _) in (COLUMNS | LAST).items() if unit}  # of the columns that have one
 _first = attrgetter(*(place for _, place in COLUMNS.values()))
 _last = attrgetter(*(place for _, place in LAST.values()))
 

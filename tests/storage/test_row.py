@@ -46,7 +46,7 @@ def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: fl
     file.write(Row(1, measures=found, branch_dissipation=(0.1,)))
     file.close()
     table = tables.read(tmp_path / "measures.csv")
-    assert list(table)[-5:-3] == ["dissipated_0", "friction_x"]
+    assert list(table).index("friction_x") == list(table).index("dissipated_0") + 1
     assert table["friction_x"] == [found.friction_x]
 
 
