@@ -158,7 +158,7 @@ import sys
 from mpi4py import MPI
 from parcontact import __main__
 from parcontact.errors import RunError
-from parcontact.march import step as march
+from parcontact.march import loop as march
 advance = march.March.advance
 def failing(self, step):
     if step.number == 5 and MPI.COMM_WORLD.rank == 1:

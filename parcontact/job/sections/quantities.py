@@ -13,7 +13,7 @@ from ..text.fault import Fault, quote, refuse, shorten
 
 FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
-SMALLEST, LARGEST = 1e-40, 1e40  # accuracy: of numbers, so that double precision holds what follows from them
+SMALLEST, LARGEST = 1e-60, 1e60  # accuracy: of numbers, so that double precision holds what follows from them
 LONGEST_NUMBER = 400  # characters of a number that is given as a text
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
 
