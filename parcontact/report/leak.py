@@ -45,6 +45,8 @@ class Gaps:
     """The saved gaps of a run, 0 in contact; those of the instant that is asked for, else all."""
 
     def __init__(self, directory: Path, at: str = "") -> None:
+        if not (directory / "measures.csv").is_file():
+            raise InputError(f"{directory} is no output directory of a run; those of a sweep are in its cases/")
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
         self.size, self.periodic = self.job.grid.size, self.job.grid.boundary == "periodic"
         self.columns = tables.read(directory / "measures.csv")

@@ -91,6 +91,11 @@ def test_gap_and_pressure_must_have_been_saved(
     assert not (out / "leak.csv").exists()
 
 
+def test_what_is_no_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert __main__.main(["leak", str(tmp_path)]) == 2
+    assert "is no output directory of a run; those of a sweep are in its cases/" in capsys.readouterr().err
+
+
 def test_random_contacts_close_at_about_42_percent() -> None:
     """Of elastic contacts, at 0.42 of the area in wide boxes; in boxes of eight long waves the mean of 6 surfaces and
     both directions, seen at loads 4 % apart, is within 0.39 and 0.46."""
