@@ -44,7 +44,7 @@ SMALL = {
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
-    "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^2\d pages in pages"),
+    "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_claims": Small(["--from", "nowhere"], r"", (1,)),  # it reads sweeps: tests/scenarios/test_paper.py has some
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
