@@ -31,7 +31,7 @@ def reached(time: float, until: float) -> bool:
 
 
 class Planned(Protocol):
-    """What the steps of a job follow from: these sections of it, and whether its body has a memory."""
+    """Source of the steps of a job: these sections of it, and whether its body has a memory."""
 
     grid: Grid
     surface: tuple[Any, ...]

@@ -1,4 +1,4 @@
-"""What a job is known by in a directory that it shares with others, and in its checkpoints."""
+"""Identity of a job: how it is known in a directory that it shares with others, and in its checkpoints."""
 
 import zlib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the types of the sections say of every key of a job, for the manual."""
+"""Facts about every key of a job, from the types of its sections, for the manual."""
 
 from __future__ import annotations
 

@@ -103,6 +103,7 @@ def write(directory: Path, at: str, comm: MPI.Intracomm) -> Iterator[str]:
     Returns, on root, what to say. Raises InputError for a directory without gaps.
     """
     gaps = Gaps(directory, at)
+    gaps.shown = comm.bcast(gaps.shown)  # a run that goes on may have saved more since another rank has looked
     bare = leak(gaps.bare(), gaps.size, gaps.periodic) if comm.rank == 0 else None
     mine = {index: leak(gaps.read(index), gaps.size, gaps.periodic) for index in gaps.shown[comm.rank :: comm.size]}
     drawn = max((index for index, one in mine.items() if one.constriction > 0.0), default=-1)

@@ -1,4 +1,4 @@
-"""What must fit together in a job: loads and material, surface and mesh, histories and what a run can make."""
+"""Rules on what must fit together in a job: loads and material, surface and mesh, histories and what a run can make."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all sections of a job have in common: frozen pydantic models whose mistakes are sentences, reported all at once.
+"""Base of all sections of a job: frozen pydantic models whose mistakes are sentences, reported all at once.
 
 A `Part` declares its keys as fields. The description of a field completes the sentence "grid.size must be ..." and
 holds its unit, `[m]`. Pydantic checks each field; the base class adds what needs several keys together: `one_of` and
