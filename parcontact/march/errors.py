@@ -135,6 +135,7 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
         max(certificate.members / measures.contact_area - 1.0, 0.0),
         look.angle,
         apart,
+        measures.friction_interface,
     )
     time = time_error(run, observed, points)
     return Estimate(estimate(run, observed, points, time), time, observations)

@@ -33,7 +33,7 @@ per wave make of marches is then added in full.
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import asdict, astuple, dataclass, field, fields, replace
 from typing import Any
 
@@ -97,20 +97,41 @@ class ErrorBudget:
 def estimate(run: RunProperties, observed: StepObservation, points: int, time: float | None = None) -> ErrorBudget:
     """Return the budget of a step on a grid of so many points; `time` is its time error, if that is at hand."""
     time = time_error(run, observed, points) if time is None else time
-    friction = _friction(run, observed, points, time) if observed.friction > 0.0 else None
-    return ErrorBudget(friction, _area(run, observed, points, time))
+    area = _area(run, observed, points, time)
+    friction = lambda body: _friction(run, body, points, time)  # noqa: E731
+    return ErrorBudget(_with_interface(observed, friction, area), area)
 
 
 def estimate_steady(run: RunProperties, observed: StepObservation, points: int) -> ErrorBudget:
     """Return the budget of steady sliding, whose friction is that by energy, on a grid of so many points."""
-    friction = None
-    if observed.friction > 0.0:
-        share = min(max(1.0, 4.0 / (run.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
-        mesh = BY_ENERGY * observed.views_apart / max(observed.friction, PRESSURES * observed.slope)
-        mesh += share * _by_waves(run) + _by_spots(run, observed, points)
-        solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
-        friction = Parts(solver, 0.0, run.folded, mesh)
-    return ErrorBudget(friction, _area(run, observed, points, 0.0))
+    area = _area(run, observed, points, 0.0)
+    friction = lambda body: _steady_friction(run, body, points)  # noqa: E731
+    return ErrorBudget(_with_interface(observed, friction, area), area)
+
+
+def _with_interface(
+    observed: StepObservation, of_body: Callable[[StepObservation], Parts], area: Parts
+) -> Parts | None:
+    """Return the error of friction from that `of_body`, which is relative to its own part, and that of the area, to
+    which friction of the interface is proportional; None where there is no friction."""
+    if observed.friction <= 0.0:
+        return None
+    if not observed.interface:
+        return of_body(observed)
+    own, body = observed.interface / observed.friction, abs(observed.friction - observed.interface)
+    parts = [own * error for error in astuple(area)]
+    if body > 0.0:
+        errors = astuple(of_body(replace(observed, friction=body)))
+        parts = [part + body / observed.friction * error for part, error in zip(parts, errors, strict=True)]
+    return Parts(*parts)
+
+
+def _steady_friction(run: RunProperties, observed: StepObservation, points: int) -> Parts:
+    share = min(max(1.0, 4.0 / (run.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
+    mesh = BY_ENERGY * observed.views_apart / max(observed.friction, PRESSURES * observed.slope)
+    mesh += share * _by_waves(run) + _by_spots(run, observed, points)
+    solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
+    return Parts(solver, 0.0, run.folded, mesh)
 
 
 def _friction(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:

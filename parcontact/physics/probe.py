@@ -45,7 +45,8 @@ class Probe:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
-        own = (0.0, 0.0) if self.interface is None else self.interface.force(count / points * area, velocity)
+        corrected = (count - SIDE * sides) / points
+        own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]
         return Measures(
             pressure=load / points * unit_pressure,
@@ -56,7 +57,7 @@ class Probe:
             approach=d * units.height - self.surface.datum,
             mean_gap=(gaps / points - d) * units.height,
             max_pressure=largest * unit_pressure,
-            contact_area_corrected=(count - SIDE * sides) / points,
+            contact_area_corrected=corrected,
             at_edge=edge > 0.0,
             normal_force=normal,
             friction_interface=math.hypot(*own) / normal if normal > 0.0 else 0.0,

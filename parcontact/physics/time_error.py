@@ -76,7 +76,8 @@ class StepObservation:
     in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
     shares; by how many cells the surface slid in it, in how many seconds; the points that penetrate without pressure,
     as a share of those in contact; by what angle a wave turned that is as high as the surface under the pressure
-    and changes as much; by how much friction by the slopes of the rigid surface and of the body differ."""
+    and changes as much; by how much friction by the slopes of the rigid surface and of the body differ; what an
+    interface adds to friction."""
 
     complementarity: float
     difference: float
@@ -90,6 +91,7 @@ class StepObservation:
     penetrating: float = 0.0
     angle: float = 0.0
     views_apart: float = 0.0
+    interface: float = 0.0
 
     @property
     def correction(self) -> float:

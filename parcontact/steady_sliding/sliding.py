@@ -159,6 +159,7 @@ class SteadySliding:
             corrected=measures.contact_area_corrected,
             penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
             views_apart=abs(slopes - friction),
+            interface=measures.friction_interface,
         )
         return friction, estimate_steady(self._known, seen, setup.slab.points)
 
