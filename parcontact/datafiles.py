@@ -39,6 +39,18 @@ def refuse_no_numbers(path: Path, kind: np.dtype[Any]) -> None:
         raise InputError(f"{path} holds values of type {kind}, which are no heights")
 
 
+def foreign_numbers(path: Path) -> str:
+    """Return why a file of text is no map that can be read, and what to do; '' where nothing is seen at its start."""
+    with path.open("rb") as file:
+        start = file.read(1000)
+    if path.suffix.lower() not in (".txt", ".csv", ".dat", ".asc"):
+        return ""
+    lines = (line for line in start.decode("latin-1").splitlines() if line.strip() and not line.startswith("#"))
+    first = next(lines, "")
+    mark = next((name for letter, name in ((";", "semicolons"), (",", "commas")) if first.count(letter) > 2), "")
+    return f"its numbers are separated by {mark}; save them separated by blanks as .txt, or as .npy" if mark else ""
+
+
 def read_lines(path: Path, expected: str) -> list[tuple[int, str]]:
     """The lines of a text file that say something, with their numbers. Raises InputError, also where there are none."""
     try:

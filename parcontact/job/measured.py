@@ -19,6 +19,10 @@ READER = EntryPoint("extent", "parcontact.road.extent:of", "")  # what reads map
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
 
+class MapError(InputError):
+    """A map that cannot be read: the mistake of the surface, not of the grid."""
+
+
 def take_grid(source: Source, origin: Origin) -> None:
     """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
@@ -31,6 +35,9 @@ def take_grid(source: Source, origin: Origin) -> None:
             raise InputError("a measured map is needed; an array has points, but no size")
         found = {"points": points, "size": size}
         grid.update({key: list(found[key] or ()) for key in wanted})
+    except MapError as error:
+        source.note(source.locate(("surface",)).place, f"surface: {error}")
+        grid.update(dict.fromkeys(wanted, UNREADABLE))
     except InputError as error:
         names = " and ".join(f"grid.{key}" for key in wanted)
         source.note(source.locate(("grid", wanted[0])).place, f"{names}: {FROM_SURFACE}: {error}")
@@ -53,7 +60,10 @@ def _extent(surface: Any, box: Any, origin: Origin) -> Extent:
         part = Topography.model_validate(maps[0], context=origin)
     except ValidationError:
         raise InputError("the surface has mistakes") from None
-    found: Extent = READER.load()(part, box)
+    try:
+        found: Extent = READER.load()(part, box)
+    except InputError as error:
+        raise MapError(str(error)) from error
     return found
 
 

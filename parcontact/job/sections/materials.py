@@ -12,13 +12,15 @@ from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, Validat
 from ...errors import InputError
 from ...rubber import compound
 from ..text.fault import Fault, quote, refuse
-from .part import Part, Rule, chosen, existing_file
+from .part import Instead, Part, Rule, chosen, existing_file
 from .quantities import NonNegative, Number, Positive
 from .temperature import Celsius, Shift, shifted
 
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
 Hardness = Annotated[Positive | None, Field(description="a positive pressure [Pa] at which the counterbody yields")]
 Poisson = Annotated[Number, Field(gt=-1, le=0.5, description="a Poisson ratio [-] above -1 and up to 0.5")]
+YOUNG = ("young_modulus", "youngs_modulus", "elastic_modulus", "young", "e")
+BY_THREE = "moduli here are shear moduli: {} is E/(2 (1 + poisson)), a third of Young's modulus E for rubber"
 
 
 class ZenerBranch(Part):
@@ -90,6 +92,8 @@ class Elastic(Part):
     shear_modulus: Positive = Field(description="a positive shear modulus [Pa]")
     hardness: Hardness = None
 
+    foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("shear_modulus"), ("shear_modulus",)))
+
     @property
     def instant_modulus(self) -> float:
         """Modulus at a sudden strain [Pa]."""
@@ -142,6 +146,7 @@ class Zener(Part):
     temperatures: Measured = None
     hardness: Hardness = None
 
+    foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("each of modulus_inf and branches")))
     rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
 
     @property

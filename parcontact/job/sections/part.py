@@ -9,7 +9,7 @@ right, whatever else is wrong.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
@@ -25,7 +25,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, did_you_mean, quote, refuse, shorten
+from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, closest, did_you_mean, quote, refuse
 from ..text.overrides import Included
 from .quantities import from_home
 
@@ -59,12 +59,20 @@ class Rule(NamedTuple):
     check: Callable[..., Iterator[Fault]]
 
 
+class Instead(NamedTuple):
+    """What to give instead of a word that is no key: advice, and the keys of which one is meant."""
+
+    advice: str
+    keys: tuple[str, ...] = ()
+
+
 class Part(BaseModel):
     """Base of all sections."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     label: ClassVar[str] = ""  # what the part is called, unless its kind says it: "shape sphere"
+    foreign: ClassVar[Mapping[str, Instead]] = {}  # words of other programs
     one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
     at_most_one: ClassVar[tuple[tuple[str, ...], ...]] = ()
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -98,8 +106,10 @@ class Part(BaseModel):
             errors = [error for error in failure.errors() if error["type"] != "too_short" or not error["input"]]
         # a default that was made of a wrong value is no second mistake
         of_user = [error for error in errors if _absent(error) or error["loc"][:1] in {(), *((key,) for key in given)}]
-        faults = [cls._fault(error, filled) for error in of_user or errors]
-        faults += cls._exclusive_faults(given)
+        meant = {word for key in given if key not in known for word in cls._instead(str(key)).keys}
+        told = [error for error in of_user or errors if not (_absent(error) and error["loc"][0] in meant)]
+        faults = [cls._fault(error, filled) for error in told]
+        faults += cls._exclusive_faults(given, meant)
         for rule in cls.rules:
             values = [_value(cls, name, part, filled, errors, info.context) for name in rule.needs]
             if not any(value is WRONG for value in values):
@@ -132,8 +142,8 @@ class Part(BaseModel):
             word = kind_key(cls)
             label = cls.label or (word and f"{word} {cls.model_fields[word].default}")
             what = f"is not a key of {label}" if label else "is not a known key"
-            advice = did_you_mean(shorten(name), cls.words()) or f"; there are {', '.join(cls.words())}"
-            return Fault(what + advice, path, at_key=True)
+            advice = cls._instead(name).advice or f"there are {', '.join(cls.words())}"
+            return Fault(f"{what}; {advice}", path, at_key=True)
         field = cls.model_fields[name]
         words = literal_words(field.annotation) if _absent(error) or kind == "literal_error" else ()
         expected = f"must be {choices(words) if words else field.description}"
@@ -143,11 +153,19 @@ class Part(BaseModel):
         return Fault(f"{expected}, got {got}{did_you_mean(value, words)}", path)
 
     @classmethod
-    def _exclusive_faults(cls, given: Mapping[str, Any]) -> Iterator[Fault]:
-        """Check which keys were given, whatever their values."""
+    def _instead(cls, word: str) -> Instead:
+        """Return which keys an unknown word may stand for; no advice where nothing is known of it."""
+        close = closest(word, cls.words())
+        misspelt = Instead(f"did you mean {close}?", (close,)) if close else Instead("")
+        return cls.foreign.get(word.lower(), misspelt)
+
+    @classmethod
+    def _exclusive_faults(cls, given: Mapping[str, Any], meant: Collection[str]) -> Iterator[Fault]:
+        """Check which keys were given, whatever their values; what an unknown word was `meant` to be does not lack."""
         for group in (*cls.one_of, *cls.at_most_one):
             present = [word for word in group if word in given]
-            if len(present) > 1 or (not present and group in cls.one_of):
+            lacks = group in cls.one_of and not any(word in meant for word in group)
+            if len(present) > 1 or (not present and lacks):
                 number = "needs exactly one of" if group in cls.one_of else "takes at most one of"
                 yield Fault(f"{number} {choices(group)}, got {' and '.join(present) or 'none'}")
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, ValidationInfo, create_model
 
 from ..text.fault import Fault, quote, refuse
-from .part import Origin, Part, Rule
+from .part import Instead, Origin, Part, Rule
 from .quantities import Flag, NonNegative, Positive, Real, Vector, listed, log_range
 from .temperature import Celsius
 
@@ -102,6 +102,9 @@ def _lasting_ramp(duration: float | None, distance: float | None, *loads: Ramp |
             yield Fault("changes from one value to another, which needs a duration [s] or a distance [m]", (name,))
 
 
+WHICH_LOAD = "give a pressure [Pa], a force [N] or an approach [m]"
+
+
 class Stage(Part):
     """One stage of the history: a load, a velocity, and how long they last; an instantaneous stage is one solve."""
 
@@ -122,6 +125,7 @@ class Stage(Part):
         default=None, description="a positive number of cells (a fraction is allowed)"
     )
 
+    foreign = dict.fromkeys(("load", "normal_load"), Instead(WHICH_LOAD, CONTROLS))
     one_of = (CONTROLS,)
     at_most_one = (("duration", "distance"), ("time_step", "cells_per_step"))
     rules = (

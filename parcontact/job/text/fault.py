@@ -61,10 +61,16 @@ def choices(words: Iterable[str]) -> str:
     return " | ".join(words)
 
 
-def did_you_mean(word: Any, words: Iterable[str]) -> str:
-    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
+def closest(word: Any, words: Iterable[str]) -> str:
+    """Return the one of `words` that `word` may be misspelt for, '' if none is close."""
     if len(str(word)) > MAX_WORD:
         return ""
     known = {candidate.lower(): candidate for candidate in words}
     close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.65)
-    return f"; did you mean {known[close[0]]}?" if close else ""
+    return known[close[0]] if close else ""
+
+
+def did_you_mean(word: Any, words: Iterable[str]) -> str:
+    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
+    found = closest(word, words)
+    return f"; did you mean {found}?" if found else ""

@@ -114,16 +114,24 @@ def _apply(source: Source, override: Override) -> None:
         elif node is UNREADABLE:
             return
         else:
-            shown = ".".join(map(str, path[:index]))
-            what = f"a list of {len(node)}, numbered from 0; it" if isinstance(node, list) else f"{quote(node)}, which"
-            lacks = "has no" if isinstance(node, list) else "has no key"
-            source.note(override.place, f"{shown} is {what} {lacks} {name}")
+            source.note(override.place, _dead_end(node, ".".join(map(str, path[:index])), str(name)))
             return
         if index == len(path) - 1:
             put(node, key, override.value, override.place, override.value_place)
         elif isinstance(node, dict) and node.get(str(key)) is None:
             put(node, key, PlacedDict(), override.place, override.place)
         node = node[key]
+
+
+def _dead_end(node: Any, shown: str, name: str) -> str:
+    """Return why a path leads nowhere from a value of the job, and which one would."""
+    if not isinstance(node, list):
+        return f"{shown} is {quote(node)} and no mapping of keys, so it has no {name}; give {shown} as a whole"
+    if not node:
+        return f"{shown} is an empty list; give {shown} as a whole"
+    entries = f"entries {shown}.0 to {shown}.{len(node) - 1}" if len(node) > 1 else f"one entry, {shown}.0"
+    there = f"{shown} is a list with {entries}, and has no {name}"
+    return there if name.isdecimal() else f"{there}; did you mean {shown}.0.{name}?"
 
 
 # -- materials from other files ---------------------------------------------------------------------------------------
