@@ -89,7 +89,6 @@ BAD = {
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
     "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
     "commas": ("road.txt", "1,2,3,4\n" * 4, ("m", SIZE, None), "separated by commas; save them separated by blanks"),
-    "a table": ("road.csv", "1,2,3,4\n" * 4, (None, None, None), "separated by commas; save them"),
     "two columns": ("road.xyz", "1 2\n3 4\n", ("m", None, None), "has 2 columns; x, y and z"),
     "a word": ("road.xyz", "1 2 x\n", ("m", None, None), "cannot be read"),
     "no grid": (
