@@ -108,7 +108,7 @@ def _plot(add: Add) -> None:
     text = "which panels, in this order: friction,area,approach,gap,pressure,load,energy,steady,maps (default: all)"
     add("--panels", metavar="NAME,...", type=values.names, default=(), help=text)
     text = "what is along the x axis (default: as the job suggests)"
-    add("--over", choices=("time", "distance", "velocity", "load"), default="", help=text)
+    add("--over", choices=("time", "distance", "velocity", "load", "approach"), default="", help=text)
     add("--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y, x,y or none")
     add("--compare", action="store_true", help="several directories in one picture, comparison.png")
     text = "a movie of this map over its saved instants instead (GIF): pressure, displacement, gap or height"

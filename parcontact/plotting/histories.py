@@ -21,13 +21,15 @@ VISCOUS = "friction_viscous"  # friction without that of the interface; in the t
 
 @dataclass(frozen=True)
 class Abscissa:
-    """What histories are drawn over: values in SI of some rows or all, stages, and whether each row has a mark."""
+    """What histories are drawn over: values in SI of some rows or all, stages, and whether each row has a mark; `loop`:
+    whether values come back, as loads and approaches do."""
 
     axis: Axis
     values: Array
     rows: NDArray[np.intp] | None = None
     stages: Sequence[tuple[str, float, float]] = ()
     marked: bool = False
+    loop: bool = False
 
     def series(self, lines: dict[str, Array]) -> list[Series]:
         """Return lines by their names; the only one has none."""
@@ -46,7 +48,7 @@ def charts(run: Run, over: str = "") -> list[Chart]:
     log = along.axis.unit == "s" and _steps_grow(along.values)
     found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_charts(run, along)]
     found[0] = replace(found[0], named=True)
-    return found if along.marked else [_add_theory(chart, run) for chart in found]
+    return found if along.marked or along.loop else [_add_theory(chart, run) for chart in found]
 
 
 def _steps_grow(times: Array) -> bool:
@@ -84,11 +86,11 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
             "approach",
             Axis("approach", UNITS["approach"]),
             {"": np.where(load > 0.0, columns["approach"], np.nan)},
-            free,
+            free and along.axis.name != "approach",
         ),
         ("gap", Axis("mean gap", UNITS["mean_gap"]), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
         ("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": columns["max_pressure"]}, True),
-        ("load", load_axis, {"": load}, run.lasts and np.ptp(load) > 1e-9 * load.max()),
+        ("load", load_axis, {"": load}, run.lasts and np.ptp(load) > 1e-9 * np.abs(load).max()),
         (
             "energy",
             Axis("energy", UNITS["work"]),
@@ -100,7 +102,7 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
         if there:
             found = Chart(key, along.axis, axis, along.series(lines), bottom=key != "approach")
             peak = key == "friction"
-            yield found if along.marked else replace(found, peak=peak, spikes=not peak)
+            yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
 
 
 def describe_solve(run: Run) -> str:
@@ -128,6 +130,8 @@ def _choose_abscissa(run: Run, over: str) -> Abscissa:
     if not np.ptp(values):
         told = f"{over}, which stays {values[-1]:g} {axis.unit}"
         raise InputError(f"{run.directory}: there is nothing to draw over {told}")
+    if over == "approach":
+        return Abscissa(axis, values, loop=True)
     stages = []
     for number, rows in run.rows_of_stages.items():
         stages.append((run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]])))

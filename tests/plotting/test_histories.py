@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from drawing import ELASTIC, KINDS, LOADS, SLIDE, WAVE, ZENER, panels, ran
+from drawing import ELASTIC, KINDS, LOADS, SLIDE, SPHERE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
@@ -109,3 +109,19 @@ def test_directory_without_a_run(tmp_path: Path) -> None:
     (tmp_path / "measures.csv").write_text("step\n")
     with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):
         plots.plot([tmp_path])
+
+
+def test_load_over_approach_is_a_loop(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Every row in its order, there and back, and no panel of the approach over itself."""
+    ramps = [
+        f"{{approach: {{from: {a}, to: {b}}}, duration: 1.0e-3, time_step: 2.5e-4}}" for a, b in ((0, 2e-6), (2e-6, 0))
+    ]
+    out = ran(tmp_path, SPHERE + ZENER + f"history: [{', '.join(ramps)}]\n")
+    plots.plot([out], plots.Options(over="approach"))
+    assert "approach [µm]" not in panels(drawn[0])
+    (axes,) = (axes for axes in drawn[0].axes if axes.get_ylabel().startswith("force"))
+    x = np.array(axes.get_lines()[0].get_xdata())
+    assert axes.get_xlabel() == "approach [µm]"
+    assert x.size == 9
+    assert np.all(np.diff(x[:5]) > 0)
+    assert np.all(np.diff(x[4:]) < 0)
