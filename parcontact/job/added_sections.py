@@ -24,6 +24,7 @@ OURS: dict[str, str] = {
     # one line for each effect of this package that has a section of its own: its name, and where the effect is
     "interface": "parcontact.effects.interface:InterfaceColumns",
     "leakage": "parcontact.effects.leakage:LeakageColumns",
+    "thermal": "parcontact.effects.thermal:ThermalColumns",
 }
 
 

@@ -64,6 +64,7 @@ class Job(Part):
         Rule(("initial", "material"), limits.steady_at_rest),
         Rule(("grid", "material", "history", "initial", "steady"), limits.loads_are_borne),
         Rule(("grid", "history"), limits.steps_can_be_made),
+        Rule(("output",), limits.no_temperature),
     )
 
     @classmethod
@@ -178,7 +179,8 @@ def extended(sections: tuple[str, ...]) -> type[Job]:
         for name, effect in effects.items()
     }
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
-    made.rules = (*Job.rules, *(rule for effect in effects.values() for rule in getattr(effect, "rules", ())))
+    known = (rule for rule in Job.rules if not ("thermal" in sections and rule.check is limits.no_temperature))
+    made.rules = (*known, *(rule for effect in effects.values() for rule in getattr(effect, "rules", ())))
     return made
 
 

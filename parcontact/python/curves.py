@@ -36,7 +36,9 @@ class Curve:
     as counted and corrected by its edges], `force_x`, `force_y`
     [N, on the rigid surface], `approach`, `mean_gap` [m], `max_pressure` [Pa], `residual` [-, the certificate];
     `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene;
-    `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference].
+    `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference];
+    `flash_temperature`, `max_temperature` [K, rise in the mean over the contact and the highest one; NaN without
+    `thermal`].
 
     A point that could not be solved is NaN, and `failures` says why.
     """
@@ -58,6 +60,8 @@ class Curve:
     power: Array
     temperature: Array
     shift_factor: Array
+    flash_temperature: Array
+    max_temperature: Array
     failures: tuple[str, ...] = ()
 
 
@@ -129,6 +133,8 @@ def _curve(wanted: Sequence[Wanted], points: Sequence[Point | None], failures: t
         power=np.array([(math.nan,) * branches if point is None else point.dissipated for point in points]),
         temperature=np.array([at.temperature for at in wanted]),
         shift_factor=np.array([math.nan if point is None else point.shift_factor for point in points]),
+        flash_temperature=each(lambda point: point.flash.mean if point.flash else math.nan),
+        max_temperature=each(lambda point: point.flash.highest if point.flash else math.nan),
         failures=failures,
     )
 

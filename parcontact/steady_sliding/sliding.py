@@ -14,6 +14,7 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.budget import ErrorBudget, estimate_steady
 from ..physics.convolution import Convolution
+from ..physics.flash import Flash
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..physics.time_error import StepObservation
@@ -23,6 +24,7 @@ from ..solve.certificate import Certificate
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
+from .heating import warm
 from .losses import branch_powers
 
 COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
@@ -39,7 +41,8 @@ class Point:
     `friction` is the power that the body dissipates, over load and velocity, and what an interface adds; that of
     `measures` is by the slopes of the rigid surface. They differ by the mesh, and `errors` is the budget of the former.
     `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did.
-    `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box).
+    `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box). `flash`
+    has the temperatures of the contact, None where the job has no `thermal`.
     """
 
     velocity: Vector
@@ -54,6 +57,7 @@ class Point:
     sets: int
     seconds: float
     dissipated: tuple[float, ...]
+    flash: Flash | None = None
 
     @property
     def speed(self) -> float:
@@ -93,6 +97,7 @@ class SteadySliding:
         self.levels += [Level(level.slab, FFT(level.slab), level.heights) for level in coarser]
         self._known = properties_of(setup, 0.0, True, None)
         self.contact: SteadyContact | None = None
+        self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
         self.temperature = math.nan
 
@@ -127,12 +132,25 @@ class SteadySliding:
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
         friction, errors = self._judge(contact, by_energy, velocity, measures)
+        flash = self._warm(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
-        return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost)
+        return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
+
+    def _warm(self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures) -> Flash | None:
+        """Return the temperatures of the contact, if the job asks for them; collective."""
+        section = self.setup.job.section("thermal")
+        if section is None:
+            return None
+        flash, self._rise = warm(self.setup, section, contact.p, measures, friction, velocity)
+        return flash
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m] in the last state."""
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or the rise of
+        `temperature` [K] in the last state."""
         assert self.contact is not None
+        if name == "temperature":
+            assert self._rise is not None
+            return self._rise
         contact, setup, heights = self.contact, self.setup, self.levels[0].heights
         if name == "pressure":
             return contact.p * setup.units.pressure

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 from .. import progress
 from ..effects.interface import InterfaceColumns
+from ..effects.thermal import ThermalColumns
 from ..job.checks.advice import describe_sample
 from ..physics.budget import advice, describe
 from ..storage import curve_points, files, tables
@@ -22,6 +24,7 @@ COLUMNS = (
 LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
 ERRORS = ("error_friction", "error_area", "friction_slopes")
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
+QUARTILES = ("lower_temperature", "upper_temperature")  # of the rise over the contact, with `thermal`
 WAVES = ("velocity", "pressure", "wavelength", "share")
 HEAD = "velocity [m/s]    load [Pa]      area  error  friction  error  calls  residual"  # the area as corrected
 
@@ -34,7 +37,8 @@ class CurveTable:
         self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
         branches = sliding.setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
         self.interface = InterfaceColumns.columns if sliding.setup.choices.interface else ()
-        added = (*(HEATED if heated else ()), *self.interface)
+        self.thermal = (*ThermalColumns.columns, *QUARTILES) if self._job.section("thermal") else ()
+        added = (*(HEATED if heated else ()), *self.interface, *self.thermal)
         self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
@@ -86,6 +90,7 @@ class CurveTable:
         last = [point.friction * (point.velocity[0] / speed), m.contact_area_corrected]
         last += (point.temperature, point.shift_factor) if self.heated else ()
         last += (point.friction - m.friction_interface, m.friction_interface) if self.interface else ()
+        last += astuple(point.flash) if point.flash else ()
         last += point.error_friction, point.errors.area.total, m.friction
         if self._waves:
             for wavelength, share in zip(*waves, strict=True):

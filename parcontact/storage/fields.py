@@ -18,7 +18,7 @@ from ..parallel.slab import Array, Slab
 from . import files, hdf5
 from .provenance import Provenance
 
-UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m"}
+UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m", "temperature": "K"}
 KIND = "parcontact fields"
 XDMF_SECONDS = 10.0  # at least between two versions of fields.xdmf, which grows with every instant
 

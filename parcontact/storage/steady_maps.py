@@ -13,6 +13,7 @@ from .provenance import Provenance
 
 KIND = "parcontact steady maps"
 AXES = {"velocity": "m/s", "load": "Pa", "temperature": "deg C"}  # of the points; the load is their mean pressure
+DATASETS = {name: f"{name}_map" if name in AXES else name for name in UNITS}  # where each kind of maps is
 
 
 class SteadyMaps:
@@ -39,15 +40,15 @@ class SteadyMaps:
     def save(self, index: int, maps: Mapping[str, Array]) -> None:
         """Put the maps of a point into their place; raises RunError."""
         marks = dict(zip(self.axes, self.points[index], strict=True))
-        hdf5.save_maps(self.path, self.slab, index, {name: maps[name] for name in self.names}, marks)
+        hdf5.save_maps(self.path, self.slab, index, {DATASETS[name]: maps[name] for name in self.names}, marks)
 
     def _fits(self) -> bool:
         """Return whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""
         shape = (len(self.points), self.slab.ny, self.slab.nx)
         try:
             with h5py.File(self.path, "r") as file:
-                wanted = {name for name in UNITS if name in file} == set(self.names)
-                if wanted and all(file[name].shape == shape for name in self.names):
+                wanted = {name for name, dataset in DATASETS.items() if dataset in file} == set(self.names)
+                if wanted and all(file[DATASETS[name]].shape == shape for name in self.names):
                     saved = np.array([file[name][...] for name in self.axes]).T
                     return bool(np.all(np.isnan(saved) | np.isclose(saved, self.points, rtol=1e-6)))
         except hdf5.FAILURES:
@@ -66,4 +67,5 @@ class SteadyMaps:
         provenance.write(file)
         for name, unit in self.axes.items():
             hdf5.add_coordinate(file, name, np.full(len(self.points), np.nan), unit)
-        hdf5.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, list(self.axes))
+        units = {DATASETS[name]: UNITS[name] for name in self.names}
+        hdf5.add_maps(file, self.slab, self.size, units, list(self.axes))

@@ -21,6 +21,7 @@ from parcontact import __main__, job
 from parcontact.command.arguments import parse_arguments
 from parcontact.effects.interface import InterfaceColumns
 from parcontact.effects.leakage import LeakageColumns
+from parcontact.effects.thermal import ThermalColumns
 from parcontact.job import keys
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
@@ -141,7 +142,8 @@ COLUMNS = {
     "leak.csv": leak.Instant._fields,
     "steady.csv": [
         *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
-        *(*steady_table.HEATED, *InterfaceColumns.columns, *steady_table.ERRORS),
+        *(*steady_table.HEATED, *InterfaceColumns.columns, *ThermalColumns.columns),
+        *(*steady_table.QUARTILES, *steady_table.ERRORS),
     ],
     "steady_waves.csv": steady_table.WAVES,
     "theory.csv": prediction.Instant._fields,

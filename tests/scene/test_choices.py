@@ -266,5 +266,5 @@ TESTED = {
         "run on half the mesh",
         "yielding counterbody",
     ),
-    *("fields", "checkpoints", "interface", "leakage"),  # the last ones where they are made
+    *("fields", "checkpoints", "interface", "leakage", "thermal"),  # the last ones where they are made
 }

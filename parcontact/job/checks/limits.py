@@ -70,6 +70,12 @@ def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
         yield Fault("needs at least one shape; shape: flat is one", ("surface",))
 
 
+def no_temperature(output: Output) -> Iterator[Fault]:
+    """Refuse the map of a temperature in a job without `thermal`; with it this rule does not hold."""
+    if "temperature" in output.fields:
+        yield Fault("has temperature, which needs a thermal section", ("output", "fields"))
+
+
 def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
     if not history and steady is None:
         yield Fault("needs at least one stage, unless there is a steady section", ("history",))

@@ -15,7 +15,7 @@ from .quantities import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, W
 Integrator = Literal["exponential", "backward-euler"]
 Kernel = Literal["spectral", "love"]
 Precision = Literal["double", "mixed"]
-FieldName = Literal["pressure", "displacement", "gap", "height"]
+FieldName = Literal["pressure", "displacement", "gap", "height", "temperature"]
 
 
 def _different(name: str) -> Rule:

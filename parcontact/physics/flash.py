@@ -1,0 +1,48 @@
+"""Temperatures of a contact: where its heat is made, and what the map of the temperature rise is like over the contact.
+
+The heat of the interface is its shear stress times the sliding speed, on all that is in contact. The heat of the body
+is what its branches dissipate. It is deposited where the contact works: in proportion to the pressure.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.slab import Array, Slab
+
+BINS = 512  # accuracy: of the histogram from which the quartiles are taken, within a 512th of the range
+
+
+@dataclass(frozen=True)
+class Flash:
+    """Temperature rises [K] of a contact, weighted by the heat that goes into the rubber: their mean (the flash
+    temperature), the highest one of the whole surface, and the lower and upper quartile."""
+
+    mean: float = 0.0
+    highest: float = 0.0
+    lower: float = 0.0
+    upper: float = 0.0
+
+
+def spread_over(slab: Slab, weights: Array, total: float) -> Array:
+    """Return `total` [W/m^2, mean over the box] in proportion to a map of weights, 0 where all are; collective."""
+    whole = slab.sum(float(weights.sum(dtype=np.float64)))[0]
+    return weights * (total * slab.points / whole if whole > 0.0 else 0.0)
+
+
+def flash_of(slab: Slab, rise: Array, heat: Array) -> Flash:
+    """Return the temperatures of a map of rises [K] under a map of heat; collective."""
+    warmed, whole = slab.sum(float((rise * heat).sum()), float(heat.sum()))
+    if not whole > 0.0:
+        return Flash()
+    inside = heat > 0.0
+    values, weights = rise[inside], heat[inside]
+    largest = -np.inf
+    highest, top, bottom = slab.reduce(
+        (), [float(rise.max(initial=largest)), float(values.max(initial=largest)), -float(values.min(initial=np.inf))]
+    )
+    low, span = -bottom, max(top + bottom, np.finfo(float).tiny)
+    counts = np.histogram((values - low) / span, BINS, (0.0, 1.0), weights=weights)[0]
+    shares = np.concatenate([[0.0], np.cumsum(slab.sum(*counts))]) / whole
+    lower, upper = low + span * np.interp([0.25, 0.75], shares, np.linspace(0.0, 1.0, BINS + 1))
+    return Flash(warmed / whole, highest, float(lower), float(upper))

@@ -1,0 +1,123 @@
+"""Temperature rises below heat that slides: closed forms, and what the depth of the heat does."""
+
+import math
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.integrate import quad
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.flash import flash_of
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.heat import Conductor, Depths, depths_of, sliding_heat
+from parcontact.physics.heat_unbounded import _reaching, sliding_heat_unbounded
+from parcontact.physics.prony import Prony
+
+RUBBER = Conductor(0.2, 1e-7)
+SIZE = 1e-3, 0.7e-3
+RADIUS = 1e-4
+
+
+def transform(n: int, m: int) -> FFT:
+    return FFT(Slab(MPI.COMM_WORLD, n, m), measured=False)
+
+
+def positions(fft: FFT, size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Where this rank's points are [m], shapes (1, nx) and (ny_loc, 1)."""
+    slab = fft.slab
+    return np.arange(slab.nx)[None] * size[0] / slab.nx, np.arange(slab.ny)[slab.rows, None] * size[1] / slab.ny
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.3, 0.0), (-2.0, 0.4)])
+def test_a_wave_of_heat(velocity: tuple[float, float]) -> None:
+    """cos(k x) becomes Re(exp(i k x)/(kappa beta)), at depth times the mean of (1 + beta/(2 q))^-3; to rounding."""
+    fft = transform(16, 12)
+    x, y = positions(fft, SIZE)
+    kx, ky = 2 * math.pi * 3 / SIZE[0], 2 * math.pi * 2 / SIZE[1]
+    wave = np.exp(1j * (kx * x + ky * y))
+    beta = np.sqrt(kx**2 + ky**2 - 1j * (kx * velocity[0] + ky * velocity[1]) / RUBBER.diffusivity)
+    depths = Depths(np.array([2e4, 1e5]), np.array([0.3, 0.7]))
+    arriving = 0.3 * (1 + beta / 4e4) ** -3 + 0.7 * (1 + beta / 2e5) ** -3
+    for given, factor in ((None, 1.0), (depths, arriving)):
+        found = sliding_heat(fft, SIZE, RUBBER, velocity, given).apply(wave.real.copy(), fft.slab.empty())
+        exact = (wave * factor / (RUBBER.conductivity * beta)).real
+        assert np.abs(found - exact).max(initial=0.0) < 1e-12 / (RUBBER.conductivity * abs(beta))
+
+
+def test_heat_from_the_depths_of_a_wave() -> None:
+    """The factor (2) of `heat` and W of `heat_unbounded`, against integrals over depth; to 1e-6."""
+    q, tau = 3e4, (1e-5, 1e-4, 1e-2)
+    density = lambda z: 4 * q**3 * z**2 * math.exp(-2 * q * z)  # noqa: E731
+    assert quad(density, 0, 1e-3)[0] == pytest.approx(1.0, rel=1e-9)
+    depths = Depths(np.array([q]), np.ones(1))
+    for beta in (1e3, 1e5):
+        exact = quad(lambda z, b=beta: density(z) * math.exp(-b * z), 0, 1e-3)[0]
+        assert depths.arriving(np.array([beta + 0j]))[0] == pytest.approx(exact, rel=1e-8)
+    found = _reaching(np.array(tau), RUBBER, depths)
+    for time, reaching in zip(tau, found, strict=True):
+        exact = quad(lambda z, t=time: density(z) * math.exp(-(z**2) / (4e-7 * t)), 0, 1e-3)[0]
+        assert reaching == pytest.approx(exact, rel=1e-6)
+    late = (np.array([99.999, 100.001]) / (2 * q)) ** 2 / RUBBER.diffusivity  # on both sides of where the series begins
+    assert np.ptp(_reaching(late, RUBBER, depths)) < 1e-6
+
+
+def disc(fft: FFT, side: float) -> np.ndarray:
+    """Shares of cells within a disc in the middle of a square, by 16 x 16 samples in each."""
+    n, inside = fft.slab.nx, np.linspace(-0.5, 0.5, 33)[1::2]
+    along = (np.arange(n)[:, None] + 0.5 + inside) * side / n - side / 2
+    whole = np.hypot(along[:, None, :, None], along[None, :, None, :]) < RADIUS
+    return whole.mean(axis=(2, 3))[fft.slab.rows]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("peclet", "highest", "mean"), [(0, 1.0, 0.84883), (1, 0.73244, 0.55542), (5, 0.4527, 0.29427)]
+)
+def test_a_disc_of_heat(peclet: float, highest: float, mean: float) -> None:
+    """Carslaw and Jaeger's disc, V a/(2 D) = 0, 1, 5, in an unbounded half space, to 5e-4 with 51 cells on its radius;
+    the error is that of the cells and falls with the order 1.9 (2e-3, 7e-4, 2e-4 with 13, 26, 51)."""
+    side, fft = 2.5 * RADIUS, transform(128, 128)
+    velocity = (2 * RUBBER.diffusivity * peclet / RADIUS, 0.0)
+    heat = disc(fft, side)
+    rise = sliding_heat_unbounded(fft, (side, side), RUBBER, velocity).apply(heat, fft.slab.empty())
+    found, unit = flash_of(fft.slab, rise, heat), RADIUS / RUBBER.conductivity
+    assert found.highest / unit == pytest.approx(highest, rel=5e-4)
+    assert found.mean / unit == pytest.approx(mean, rel=5e-4)
+    assert 0.0 < found.lower < found.mean < found.upper + 0.1 * unit < found.highest + 0.1 * unit
+
+
+@pytest.mark.parametrize("velocity", [(0.05, 0.0), (3.0, -4.0)])
+@pytest.mark.parametrize("depths", [None, Depths(np.array([5e4]), np.ones(1))])
+def test_a_bell_of_heat(velocity: tuple[float, float], depths: Depths | None) -> None:
+    """A Gaussian on an unbounded half space, along and across, slow and fast, at the surface and at depth: by
+    quadrature over its past, to the 1 % of the highest rise that four cells on its width leave."""
+    fft, side, width = transform(40, 40), 4e-4, 4e-5
+    x, y = (np.arange(40) - 20.0) * 1e-5, (np.arange(40)[:, None] - 20.0) * 1e-5
+    heat = np.exp(-(x**2 + y**2) / (2 * width**2))
+    rise = sliding_heat_unbounded(fft, (side, side), RUBBER, velocity, depths).apply(heat, fft.slab.empty())
+
+    def warmed(root: float, i: int, j: int) -> float:
+        time = root**2
+        spread = width**2 + 2 * RUBBER.diffusivity * time
+        r2 = (x[i] + velocity[0] * time) ** 2 + (y[j, 0] + velocity[1] * time) ** 2
+        late = 1.0 if depths is None else float(_reaching(np.array([time]), RUBBER, depths)[0])
+        return float(2 / math.sqrt(math.pi) * width**2 / spread * math.exp(-r2 / (2 * spread)) * late)
+
+    end = math.sqrt(20 * side / math.hypot(*velocity))
+    for i, j in ((20, 20), (16, 20), (16, 23), (23, 21)):
+        exact = quad(warmed, 0.0, end, args=(i, j), limit=400)[0] / RUBBER.effusivity
+        assert rise[j, i] == pytest.approx(exact, abs=0.01 * rise.max())
+
+
+def test_the_depth_of_a_wave() -> None:
+    """One wave dissipates at its own wavenumber, whatever the unit of length."""
+    fft = transform(16, 16)
+    x, _ = positions(fft, (1.0, 1.0))
+    prony = Prony(1e6, np.array([1e6]), np.array([1e-3]))
+    spectrum = fft.forward(np.cos(2 * math.pi * 3 * x) * np.ones((16, 1)))
+    found = depths_of(spectrum, fft, HalfSpace((1.0, 1.0)), 1e-3, (0.1, 0.0), prony)
+    assert found.wavenumbers[np.argmax(found.shares)] == pytest.approx(2 * math.pi * 3 / 1e-3, rel=1e-12)
+    assert found.shares.max() == pytest.approx(1.0, abs=1e-12)
