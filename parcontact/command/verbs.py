@@ -65,7 +65,7 @@ def check(options: argparse.Namespace) -> int:
     if job.included:
         print(f"\n{job.included}")
     if steps := describe_steps(job):
-        print(f"\ntime steps that are chosen: {steps}")
+        print(f"\nstages that choose their time steps: {steps}")
     doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
     for warning in dict.fromkeys(doubts):
         print(f"warning: {warning}")

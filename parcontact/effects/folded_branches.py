@@ -17,16 +17,16 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
     """Return what a user should know about the branches of a material [Pa, s]: nothing if they are as the job says."""
     count = prony.moduli.size
     if not found.folded:
-        return [f"branches: all {count} have a map: {found.reason}"] if found.reason and count > 1 else []
-    times = {
-        kind: ", ".join(f"{prony.relaxation_times[k]:g}" for k in numbers) + " s"
-        for kind, numbers in (("memoryless", found.memoryless), ("frozen", found.frozen))
+        return [f"branches: all {count} are followed in time: {found.reason}"] if found.reason and count > 1 else []
+    folded = "; ".join(
+        f"those of {', '.join(f'{prony.relaxation_times[k]:g}' for k in numbers)} s are {kind}"
+        for kind, numbers in (("too fast to remember", found.memoryless), ("too slow to relax", found.frozen))
         if numbers
-    }
-    folded = "; ".join(f"{kind} {text}" for kind, text in times.items())
+    )
     return [
-        f"branches: {len(found.kept)} of {count} have a map, {folded}; friction (at rest: the modulus) is wrong by at "
-        f"most {found.bound:.2g} of itself (numerics.branch_error {found.allowed:g})"
+        f"branches: {len(found.kept)} of {count} are followed in time; {folded}. "
+        f"Relative error of friction by this (at rest: of the modulus): at most {found.bound:.2g} "
+        f"(numerics.branch_error is {found.allowed:g})"
     ]
 
 

@@ -208,8 +208,8 @@ def describe_steps(job: Planned) -> str:
     if not names:
         return ""
     if not job.remembers:
-        return f"{names}: an elastic body has no error of time, one cell of sliding per step, one step at rest"
+        return f"{names}: one cell of sliding per step and one step at rest, as an elastic body has no error of time"
     cells = most_cells(job.grid, job.surface)
     slides = any(stage.chooses and stage.speed for stage in job.history)
-    limits = f", at most {cells} cell{'s' * (cells > 1)} of sliding" * slides
-    return f"{names}: steps follow the error that numerics.accuracy {job.numerics.accuracy:g} allows{limits}"
+    limits = f", and are at most {cells} cell{'s' * (cells > 1)} long" * slides
+    return f"{names}: steps follow their error, for numerics.accuracy {job.numerics.accuracy:g}{limits}"

@@ -84,6 +84,8 @@ REMEDIES = {
     "mesh": "a finer grid",
 }
 SMALLER = "a smaller numerics.accuracy"  # where it has chosen the setting
+SHOWN = {"time": "time steps", "folded": "folded branches"}  # names of parts in sentences
+ROUNDED = 1.01  # accuracy: errors are said with three digits, and no closer to a limit than that are they beyond it
 
 
 @dataclass(frozen=True)
@@ -258,17 +260,22 @@ class ErrorSums:
             if parts is not None
         ]
         if self.friction is not None and self.friction.total >= 1.0:
-            lines.append(f"friction is 0 +- {self.friction_within:.2g}: it cannot be told from no friction")
+            lines.append(f"friction is 0 +- {self.friction_within:.2g}: it is smaller than its own error")
         return lines
 
 
 def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
     """Return what to change where more is wrong than `accuracy` allows; '' where it is not."""
-    if parts.total <= accuracy:
+    if not exceeds(parts.total, accuracy):
         return ""
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
     remedy = SMALLER if worst in chosen else REMEDIES[worst]
-    return f"; more than numerics.accuracy = {accuracy:g} asks for: try {remedy}"
+    return f". numerics.accuracy asks for {100 * accuracy:g} %: try {remedy}"
+
+
+def exceeds(error: float, accuracy: float) -> bool:
+    """Return whether an estimated error is beyond the accuracy asked for, also as it is printed."""
+    return error > ROUNDED * accuracy
 
 
 def per_cent(share: float) -> str:
@@ -278,5 +285,5 @@ def per_cent(share: float) -> str:
 
 def describe(parts: Parts) -> str:
     """Return the total in per cent, and what it is made of."""
-    shares = ", ".join(f"{name} {per_cent(getattr(parts, name))}" for name in NAMES)
+    shares = ", ".join(f"{SHOWN.get(name, name)} {per_cent(getattr(parts, name))}" for name in NAMES)
     return f"{100 * parts.total:.3g} % ({shares})"

@@ -12,7 +12,7 @@ LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
 MACHINE = re.compile(r"parcontact |in |machine: |batch job: |\d+ ranks?, ")  # how lines about it begin
 ESTIMATE = re.compile(r"estimated error of ([^:]*): (?:up to )?(\S+) % \(([^)]*)\)")
-PART = re.compile(r"(\w+) (\S+) %")
+PART = re.compile(r"([a-z ]+) (\S+) %")
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _find_estimates(lines: list[str]) -> list[Estimate]:
     for line in lines:
         if match := ESTIMATE.match(line.removeprefix(WARNING)):
             name, of_curve = "friction" if "friction" in match[1] else "contact area", "points" in match[1]
-            parts = {part: float(share) for part, share in PART.findall(match[3])}
+            parts = {part.strip(): float(share) for part, share in PART.findall(match[3])}
             before = found.get((name, of_curve))
             if before is None or not of_curve or float(match[2]) > before.total:
                 found[name, of_curve] = Estimate(name, of_curve, match.string, float(match[2]), parts)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 
+from ..physics.budget import exceeds
 from ..storage import hdf5, provenance
 from ..storage.tables import read as read_table
 from ..summary.slide import ERRORS
@@ -66,7 +67,7 @@ def describe_errors(
 def _judge(name: str, errors: Sequence[float], worst: log.Estimate | None, accuracy: float, of_curve: bool) -> str:
     """Say whether relative errors are as small as asked for, and what makes most of the worst."""
     asked = f"The accuracy of {100 * accuracy:g} % that was asked for {name} (numerics.accuracy)"
-    missed = sum(error > accuracy for error in errors)
+    missed = sum(exceeds(error, accuracy) for error in errors)
     if not missed:
         return f"{asked} is met{' at all points' * of_curve}."
     most = f"most of the error is made by the {worst.largest}" if worst else ""

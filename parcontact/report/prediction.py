@@ -27,6 +27,10 @@ from ..theory import full_contact, persson, persson_rings
 from ..theory.persson_history import Leg, Memory, follow
 from ..theory.persson_rings import Rings
 
+ONE_ROUGH = (
+    "surface: the theory takes the power spectrum of one rough surface, and this job has none, or other shapes beside "
+    "it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
+)
 STEADY_FILE = "steady_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
@@ -139,9 +143,11 @@ def _write(
 
 def _refuse_unknown(job: Job) -> None:
     if not job.history:
-        raise InputError("history: the theory needs a history; `parcontact steady` is for steady sliding")
+        raise InputError(
+            "history: theory.csv follows a history, and this job has none; `parcontact steady` predicts its curve"
+        )
     if job.grid.boundary == "free":
-        raise InputError("grid.boundary: the theory is that of a periodic surface, got free")
+        raise InputError("grid.boundary: Persson's theory is for periodic surfaces, and this box is free")
     for index, stage in enumerate(job.history):
         if stage.control == "approach":
             raise InputError(f"history.{index}.approach: the theory needs a pressure [Pa] or a force [N]")
@@ -171,13 +177,13 @@ def _continuum(job: Job, slide: float) -> Rings:
     """Return the spectrum between the limits of the job; the box holds no waves longer than its longer side."""
     part = _only_rough(job)
     if part is None:
-        raise InputError("surface: the theory needs one rough surface and nothing else; --waves lattice takes any")
+        raise InputError(ONE_ROUGH)
     if isinstance(part, jobs.RoughSpectrum):
         return rings_of_measured(job, part, slide)
     longest = min(part.long_wavelength, max(job.grid.size))
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
     if k_long >= EDGE * k_short:
-        raise InputError("surface: the theory needs waves between long_wavelength and short_wavelength, got equal ones")
+        raise InputError("surface: the theory needs a short_wavelength below long_wavelength, got equal ones")
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
     limits = (k_long, k_short, slide, (k_rolloff,))
     unit = persson_rings.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)

@@ -70,10 +70,10 @@ class Compound:
         if both and series.best > max(CONTRADICTS * noise, LEAST_DOUBT):
             storage, loss = series.alone
             found.append(
-                f"no relaxation spectrum meets storage and loss moduli better than {series.best:.2%} together, while "
-                f"neighbours of one sweep scatter by {noise:.2%}: alone they are met to {storage:.2%} and {loss:.2%}; "
-                "they contradict each other (Kramers-Kronig), or the sweeps do not shift onto one another; check the "
-                "table, or weigh one of them: --weight storage, or loss"
+                "storage and loss moduli contradict each other (Kramers-Kronig), or the sweeps do not shift onto one "
+                f"curve: together no relaxation spectrum meets them better than {series.best:.2%}, alone they are met "
+                f"to {storage:.2%} and {loss:.2%}, and neighbours of one sweep scatter by {noise:.2%}. Check the "
+                "table, or fit one of them: --weight storage, or --weight loss"
             )
         return [*found, *self._gaps(), *odd_moduli(self.measured.sets)]
 
@@ -91,9 +91,9 @@ class Compound:
             gap = max(mine[0], its[0]) - min(mine[1], its[1])
             if gap > WIDE_GAP:
                 yield (
-                    f"the sweeps at {one:g} and {other:g} C do not overlap, they are {gap:.2g} decades apart as "
-                    "shifted: nothing measured says how far, and moduli between them are a guess; measure at a "
-                    "temperature between, or give the shift: --shift FILE"
+                    f"the sweeps at {one:g} and {other:g} C do not overlap: after the shift {gap:.2g} decades lie "
+                    "between them, in which moduli are a guess; measure at a temperature between, or give the shift: "
+                    "--shift FILE"
                 )
 
     def text(self) -> str:

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 Weigh = Literal["both", "storage", "loss"]
 DENSE = 3  # times per decade of the best series that is looked for
 MOST = 48  # branches
+NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out
 SPARE = 0.5  # decades of times beyond the data, to either side
 ENDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # decades beyond the data that are tried for a short series
 WIDEST = 8.0  # decades: the largest shift between neighbouring temperatures that is looked for
@@ -130,8 +132,15 @@ def _solve(at: Array, data: Array, kind: str, times: Array, weigh: Weigh = "both
         storage = data[: at.size]
         found[-1] = max(0.0, float(np.mean(1.0 - columns[: at.size] @ found / storage) / np.mean(1.0 / storage)))
     *moduli, spring = found
-    kept = np.asarray(moduli) > 0.0
+    kept = np.asarray(moduli) > _negligible(np.asarray(moduli), times, float(spring))
     return Series(float(spring), np.asarray(moduli)[kept], times[kept], error)
+
+
+def _negligible(moduli: Array, times: Array, spring: float) -> Array:
+    """Return the modulus of each time [Pa] below which nobody would see that it is left out: a share of the storage
+    modulus at its frequency."""
+    z = times / times[:, None]  # of the row's frequency
+    return NEGLIGIBLE * (spring + (z**2 / (1.0 + z**2)) @ moduli)
 
 
 # -- the shift of measured sets ----------------------------------------------------------------------------------------
@@ -147,7 +156,7 @@ def find_shift(measured: Measurement, reference: float, law: str, weigh: Weigh =
     temperatures = [each.temperature for each in measured.sets]
     known = [value for value in temperatures if value is not None]
     if len(known) < 2:
-        raise InputError(f"{measured.path}: a shift needs sets at two temperatures at least")
+        raise InputError(f"{measured.path}: a shift needs sweeps at two temperatures at least")
     if not known[0] <= reference <= known[-1]:
         raise InputError(
             f"{measured.path}: the reference temperature must lie within {known[0]:g} and {known[-1]:g} C, "
@@ -161,13 +170,13 @@ def find_shift(measured: Measurement, reference: float, law: str, weigh: Weigh =
 def _overlaps(measured: Measurement) -> list[float]:
     """log10 of the shift of each set against the first, one neighbour after the other."""
     logs = [0.0]
-    for number, (colder, warmer) in enumerate(zip(measured.sets, measured.sets[1:], strict=False)):
+    for colder, warmer in pairwise(measured.sets):
         steps = np.linspace(-WIDEST, WIDEST, 16 * int(WIDEST) + 1)
         apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
         if not min(apart) < APART**2:
             raise InputError(
-                f"{measured.path}: sets {number + 1} and {number + 2} do not overlap at any shift; measure at "
-                "temperatures nearer to each other, or fit a law"
+                f"{measured.path}: the sweeps at {colder.temperature:g} and {warmer.temperature:g} C do not overlap at "
+                "any shift; measure at temperatures nearer to each other, or fit a law: --shift wlf"
             )
         near = float(steps[int(np.argmin(apart))])
         fine = np.linspace(near - 0.15, near + 0.15, 61)
@@ -219,7 +228,7 @@ def _fitted(
     errors = [error(point) for point in progress.with_bar(grid, "shift with temperature", "law")]
     start = grid[int(np.argmin(errors))]
     if not math.isfinite(error(start)):
-        raise InputError(f"{measured.path}: no law of the shift joins the sets at {reference:g} C")
+        raise InputError(f"{measured.path}: no constants of this law join the sweeps to one curve at {reference:g} C")
     simplex = np.vstack([start, start + 0.05 * np.eye(start.size)])
     options = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-8, "maxfev": 200}
     return law(minimize(error, start, method="Nelder-Mead", options=options).x)

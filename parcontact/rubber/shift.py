@@ -43,7 +43,7 @@ class WLF:
         above = temperature - self.reference
         if self.C2 + above <= 0.0:
             lowest = self.reference - self.C2
-            raise InputError(f"temperature {temperature:g} C: the WLF law of this compound ends at {lowest:g} C")
+            raise InputError(f"{temperature:g} C is below {lowest:g} C, where the WLF law of this compound ends")
         return -self.C1 * above / (self.C2 + above)
 
 
@@ -57,7 +57,7 @@ class Arrhenius:
     def log_factor(self, temperature: float) -> float:
         """log10 of a_T; raises InputError at or below absolute zero."""
         if temperature <= -ZERO:
-            raise InputError(f"temperature {temperature:g} C is below absolute zero")
+            raise InputError(f"{temperature:g} C is below absolute zero")
         inverse = 1.0 / (temperature + ZERO) - 1.0 / (self.reference + ZERO)
         return self.energy / (GAS * math.log(10.0)) * inverse
 
@@ -74,7 +74,7 @@ class Factors:
         """log10 of a_T; raises InputError beyond the temperatures given."""
         low, high = self.temperatures[0], self.temperatures[-1]
         if not low <= temperature <= high:
-            raise InputError(f"temperature {temperature:g} C is outside the shift factors, {low:g} to {high:g} C")
+            raise InputError(f"{temperature:g} C is outside the shift factors, which reach from {low:g} to {high:g} C")
         return self._between(temperature) - self._between(self.reference)
 
     def _between(self, temperature: float) -> float:

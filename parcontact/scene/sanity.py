@@ -85,13 +85,13 @@ def _seams(setup: Setup, heights: Array) -> Iterator[str]:
     ):
         if jump <= SEAM * inside:
             continue
-        times, tilt = f"{jump / inside:.3g} times" if inside else "where there is nothing at", rise / length
+        times, tilt = f"{jump / inside:.3g} times" if inside else "far above", rise / length
         remedy = "cut it where it fits, or let it fade to its mean towards the edge"
         if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside:
             remedy = f"it is tilted by {abs(tilt) * unit:.3g}: subtract its mean plane"
         yield (
-            f"surface: along {name} the heights jump by {jump * unit:.3g} m (rms) across the edge of the periodic box, "
-            f"{times} the most between neighbours inside, and such a wall makes friction of its own; "
+            f"surface: the heights at the two ends along {name} of the periodic box differ by {jump * unit:.3g} m "
+            f"(rms), {times} the largest step between neighbours inside. Such a step makes friction of its own; "
             f"{remedy}"
         )
 
@@ -152,8 +152,8 @@ def at_edge(measures: Measures) -> str:
     if not measures.at_edge:
         return ""
     return (
-        "the contact reaches the edge of the box, and a free body goes on beyond it where nothing presses; use a "
-        "larger grid.size, less load or a shorter way"
+        "the contact reaches the edge of the box and is cut off there, so its results are wrong; use a larger "
+        "grid.size, less load or a shorter way"
     )
 
 
@@ -164,6 +164,6 @@ def few_cells(measures: Measures) -> str:
     if excess <= FEW_CELLS:
         return ""
     return (
-        f"contacts are a few cells wide: counted in cells their area is {excess:.0%} too large, and {FEW_CELLS:.0%} is "
-        "the limit; use more grid.points, a smaller grid.size or a larger load"
+        f"spots of contact are only a few cells wide: contact_area is about {excess:.1%} too large (more than "
+        f"{FEW_CELLS:.0%} is warned of); use more grid.points, a smaller grid.size or a larger load"
     )

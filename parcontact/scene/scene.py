@@ -185,7 +185,7 @@ def describe_scene(scene: Scene) -> Iterator[str]:
     yield from scene.setup.preparation_notes
     yield from describe_folded_branches(scene.folded, scene.choices.prony)
     if steps := describe_steps(scene.job):
-        yield f"time steps that are chosen: {steps}"
+        yield f"stages that choose their time steps: {steps}"
     if found := scene.setup.roughness:
         yield (
             f"surface: rms height {found.rms_height:.4g} m, rms slope {found.rms_slope:.4g}, Nayak's parameter "

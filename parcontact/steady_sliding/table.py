@@ -10,7 +10,7 @@ from .. import progress
 from ..effects.interface import InterfaceColumns
 from ..effects.thermal import ThermalColumns
 from ..job.checks.advice import describe_sample
-from ..physics.budget import advice, describe
+from ..physics.budget import advice, describe, exceeds
 from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
@@ -26,7 +26,7 @@ ERRORS = ("error_friction", "error_area", "friction_slopes")
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 QUARTILES = ("lower_temperature", "upper_temperature")  # of the rise over the contact, with `thermal`
 WAVES = ("velocity", "pressure", "wavelength", "share")
-HEAD = "velocity [m/s]    load [Pa]      area  error  friction  error  calls  residual"  # the area as corrected
+HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # the area as corrected
 
 
 class CurveTable:
@@ -45,7 +45,7 @@ class CurveTable:
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
         self._points: list[Point] = []
         self._bar = progress.Bar(0, "")
-        self.say(HEAD)
+        self.say(f"{HEAD}   T [C]" if heated else HEAD)
 
     def _read(self) -> list[Wanted]:
         """Return the points that are there; a line that was not finished is removed."""
@@ -102,7 +102,7 @@ class CurveTable:
             f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.errors.area.total)} "
             f"{point.friction:9.6f} "
             f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
-            f"{c.worst:9.2e}{f'  {point.temperature:g} C' if self.heated else ''}"
+            f"{c.worst:9.2e}{f' {point.temperature:7g}' if self.heated else ''}"
         )
 
     def conclude(self, failures: int) -> None:
@@ -117,7 +117,8 @@ class CurveTable:
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
         picture = plots.draw_steady(self.path)
-        self.say(f"done: {self.path} and {picture}" if not failures else f"parcontact: {failures} points have failed")
+        failed = f"parcontact: {failures} of the points could not be solved; {self.path} has the others"
+        self.say(failed if failures else f"done: {self.path} and {picture}")
 
     def _sort(self) -> None:
         """Sort the lines by temperature, then by pressure, then by speed."""
@@ -142,12 +143,12 @@ def describe_missed(points: Sequence[Point], accuracy: float) -> Iterator[str]:
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
     for name, each in (("friction", friction), ("corrected contact area", area)):
-        missed = [(parts.total, point, parts) for point, parts in each if parts.total > accuracy]
+        missed = [(parts.total, point, parts) for point, parts in each if exceeds(parts.total, accuracy)]
         if missed:
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
             yield (
-                f"estimated error of the {name} of {len(missed)} of {len(points)} points: up to {describe(parts)}, "
+                f"estimated error of the {name} at {len(missed)} of {len(points)} points: up to {describe(parts)}, "
                 f"at {place}{advice(parts, accuracy)}"
             )
 

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from ..streams import printable
 from .row import Row
 
-HEAD = "    step        time [s]    load [Pa]      area  friction   iter  residual"
+HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
 WARNING = "warning: "
 EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
@@ -24,7 +24,7 @@ def line(row: Row) -> str:
     """Return the line of a step, under `HEAD`."""
     m = row.measures
     return (
-        f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area:9.5f} {m.friction:9.6f} "
+        f"{row.step:8d} {row.time:15.8g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {m.friction:9.6f} "
         f"{row.iterations:6d} {row.certificate.worst:9.2e}"
     )
 

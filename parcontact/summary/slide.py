@@ -107,23 +107,23 @@ def describe(
         return
     if not_begun:
         ends_with = _slide(so_far).stop - 1
-        yield f"the last slide has not begun; what follows is of the one before it, which ends with history.{ends_with}"
+        yield f"the last slide has not begun; these numbers are of the one before, which ends with history.{ends_with}"
     rows = _during(so_far, np.asarray(columns["time"], float))
     distance, within = np.asarray(columns["distance"], float)[rows], _within(columns, rows, cell)
-    after = f"after {found.mu_max_distance:.4g} m of it"
+    after = f"{found.mu_max_distance:.4g} m after its start"
     yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}{within}, {after}"
     length = f"{distance[-1] - distance[0]:.4g} m"
-    yield f"mu_dyn, the mean friction over the last three quarters of its {length}, is {found.mu_dyn:.6g}"
+    yield f"mu_dyn, the mean friction over the last three quarters of the slide of {length}, is {found.mu_dyn:.6g}"
     edges = measure(so_far, {**columns, "contact_area": columns[CORRECTED]}) if CORRECTED in columns else None
-    corrected = f", corrected by its edges {edges.contact_area:.6g}" if edges else ""
-    yield f"the mean contact area over the same is {found.contact_area:.6g}{corrected}"
+    corrected = f", and {edges.contact_area:.6g} as corrected for its edges" if edges else ""
+    yield f"the mean contact area over the same distance is {found.contact_area:.6g} as counted in points{corrected}"
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
         parts = ", ".join(f"{what[name]} {per_cent(value)}" for name, value in known.items())
-        yield f"largest errors of the steps of the slide: {parts}"
+        yield f"largest estimated errors of a single step of the slide: {parts}"
     if known.get(ERRORS[0], 0.0) >= 1.0:
-        yield "friction of some of its steps cannot be told from no friction"
+        yield "in some steps of the slide friction is smaller than its own error"
     if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
 
@@ -143,8 +143,9 @@ def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error:
     allowed = known * abs(start) + error * abs(mu_dyn)
     if abs(mu_dyn - start) > allowed:
         yield (
-            f"friction left the {start:.6g} of the steady start by {abs(mu_dyn - start):.2g}, more than the errors of "
-            f"both, {allowed:.2g}: where nothing changes it is to stay; try smaller steps and a smaller tolerance"
+            f"mu_dyn differs from friction of the steady start, {start:.6g}, by {abs(mu_dyn - start):.2g}, more than "
+            f"their estimated errors together, {allowed:.2g}. As velocity and load are the same, they should agree: "
+            "try shorter time steps and a smaller numerics.tolerance"
         )
 
 

@@ -138,7 +138,7 @@ def test_energies_keep_every_branch() -> None:
     assert found.folded.folded == 0
     assert (
         next(scene.describe_scene(found))
-        == "branches: all 4 have a map: output.energy counts the energy of every branch"
+        == "branches: all 4 are followed in time: output.energy counts the energy of every branch"
     )
 
 
@@ -253,5 +253,5 @@ def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
     Place(MPI.COMM_SELF, tmp_path).run(data(numerics={"branch_error": 1e-2}), until=2e-4)
     log = (tmp_path / "out" / "run.log").read_text()
     bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
-    assert "branches: 1 of 4 have a map, memoryless 1e-06 s; frozen 3, 10000 s; " in log
-    assert f"wrong by at most {bound:.2g} of itself (numerics.branch_error 0.01)" in log
+    assert "branches: 1 of 4 are followed in time; those of 1e-06 s are too fast to remember; those of 3, 10" in log
+    assert f"of the modulus): at most {bound:.2g} (numerics.branch_error is 0.01)" in log

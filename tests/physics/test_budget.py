@@ -195,9 +195,9 @@ def test_summary() -> None:
     assert "solver 0.078 %" in friction
     assert "try" not in friction
     assert area.startswith("estimated error of contact area, corrected: ")
-    assert area.endswith("; more than numerics.accuracy = 0.012 asks for: try a finer grid")
+    assert area.endswith(". numerics.accuracy asks for 1.2 %: try a finer grid")
     assert ErrorSums().lines(0.012) == []
-    assert ", mean over time; more than" in area
+    assert ", mean over time. numerics.accuracy asks" in area
     assert summary.lines(0.012, ["mesh"])[1].endswith(": try a smaller numerics.accuracy")
 
 

@@ -98,7 +98,7 @@ def test_shift_laws() -> None:
     """By their definitions, 0 at the reference, and refused where they end."""
     assert LAW.log_factor(20.0) == 0.0
     assert LAW.log_factor(-20.0) == pytest.approx(8.86 * 40.0 / 61.6, rel=1e-14)
-    with pytest.raises(InputError, match=r"ends at -81\.6 C"):
+    with pytest.raises(InputError, match=r"below -81\.6 C"):
         LAW.log_factor(-82.0)
     warm = Arrhenius(1e5, 20.0).log_factor(30.0)
     assert warm == pytest.approx(1e5 / 8.314462618 / np.log(10) * (1 / 303.15 - 1 / 293.15), rel=1e-12)
@@ -110,7 +110,7 @@ def test_shift_laws() -> None:
 
 @pytest.mark.parametrize(
     ("temperatures", "reference", "sentence"),
-    [((20.0,), 20.0, "sets at two temperatures"), ((0.0, 20.0), 30.0, "must lie within 0 and 20 C, got 30")],
+    [((20.0,), 20.0, "sweeps at two temperatures"), ((0.0, 20.0), 30.0, "must lie within 0 and 20 C, got 30")],
 )
 def test_sets_that_have_no_shift(
     tmp_path: Path, temperatures: tuple[float, ...], reference: float, sentence: str
@@ -170,13 +170,13 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
         ("{model: dma, path: ~nosuchuser/rubber.csv}", "material.path must be the name of a file, got"),
         ("{model: dma, path: /dev/null}", "material.path must be an existing file, got '/dev/null'"),
         ("{model: dma, path: bad.csv}", "cannot be fitted"),
-        ("{model: dma, path: rubber.csv, temperature: -100}", "material.temperature is beyond what the shift allows"),
+        ("{model: dma, path: rubber.csv, temperature: -100}", "material.temperature is beyond the shift"),
         ("{model: dma, path: rubber.csv, reference: 200}", "must lie within -20 and 60 C, got 200"),
         ("{model: dma, path: rubber.csv, error: 0}", "material.error must be a positive"),
-        ("{model: zener, modulus_inf: 1.0e6, temperature: 40}", "has no effect without a shift"),
+        ("{model: zener, modulus_inf: 1.0e6, temperature: 40}", "has no effect without material.shift"),
         (
             "{model: zener, modulus_inf: 1.0e6, shift: {law: wlf, C1: 8, C2: 100, reference: 20}, temperature: -90}",
-            "ends at -80 C",
+            "below -80 C",
         ),
         ("{model: zener, modulus_inf: 1.0e6, shift: {law: wlf, C1: 8, reference: 20}}", "material.shift.C2 is missing"),
         ("{model: zener, modulus_inf: 1.0e6, shift: {law: vft}}", "must be wlf | arrhenius | factors, got 'vft'"),

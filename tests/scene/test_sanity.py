@@ -127,7 +127,7 @@ def test_a_seam_across_the_periodic_edge(tmp_path: Path) -> None:
     half = rough_heights(128, 32.0)
     for name, part in (("x", half[:, :48]), ("y", half[:48])):
         found = of_file(tmp_path / "road.npy", part)
-        assert [text for text in found if f"along {name} the heights jump by" in text], found
+        assert [text for text in found if f"the heights at the two ends along {name}" in text], found
         assert all("cut it where it fits" in text for text in found)
 
 
@@ -136,7 +136,7 @@ def test_a_tilt(tmp_path: Path) -> None:
     ramp = 1e-4 * np.arange(64) / 64
     for name, tilt in (("x", ramp), ("y", -ramp[:, None])):
         *_, text = of_file(tmp_path / "road.npy", rough_heights(64, 16.0) + tilt)  # beside the slope of that wall
-        assert f"along {name} the heights jump by" in text
+        assert f"the heights at the two ends along {name}" in text
         found = re.search(r"tilted by ([-+.e0-9]+): subtract its mean plane", text)
         assert found
         assert float(found.group(1)) == pytest.approx(0.1, rel=1 / 64 + 0.02)
@@ -175,8 +175,8 @@ def test_contacts_of_a_few_cells() -> None:
     """A sphere whose contact has 3 cells across, at the end of a stage; with strict the run ends."""
     job = job_of(SPHERE, [{"approach": 1e-7}], grid=FREE)
     (text,) = run(job)
-    assert text.startswith("step 1: contacts are a few cells wide")
-    assert "15% is the limit; use more grid.points" in text
+    assert text.startswith("step 1: spots of contact are only a few cells wide")
+    assert "(more than 15% is warned of); use more grid.points" in text
     with pytest.raises(RunError, match=r"numerics\.strict"):
         run(job_of(SPHERE, [{"approach": 1e-7}], grid=FREE, numerics={"strict": True}))
 
@@ -184,7 +184,7 @@ def test_contacts_of_a_few_cells() -> None:
 @pytest.mark.mpi
 def test_every_rank_says_the_same(comm: MPI.Intracomm, communicators: list[MPI.Intracomm], shared_path: Path) -> None:
     noise = 1e-8 * np.random.default_rng(1).standard_normal((48, 30))
-    for heights, words in ((rough_heights(48, 16.0)[:, :30], "jump"), (noise, "per shortest wave")):
+    for heights, words in ((rough_heights(48, 16.0)[:, :30], "the two ends along x"), (noise, "per shortest wave")):
         if comm.rank == 0:
             np.save(shared_path / "road.npy", heights)
         comm.Barrier()

@@ -83,10 +83,10 @@ def test_sentences_about_a_slide() -> None:
     table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
     table["error_friction"] = [float("nan"), 0.5, 0.02, 0.03, float("nan"), 0.01]
     assert said([REST, CLIMB, SETTLE], table) == [
-        "mu_max, the highest friction of the slide, is 4 +- 0.12, after 1 m of it",
-        "mu_dyn, the mean friction over the last three quarters of its 4 m, is 2.33333",
-        "the mean contact area over the same is 0.233333",
-        "largest errors of the steps of the slide: friction 3 %",
+        "mu_max, the highest friction of the slide, is 4 +- 0.12, 1 m after its start",
+        "mu_dyn, the mean friction over the last three quarters of the slide of 4 m, is 2.33333",
+        "the mean contact area over the same distance is 0.233333 as counted in points",
+        "largest estimated errors of a single step of the slide: friction 3 %",
     ]
     assert not said([REST], table)
 
@@ -96,12 +96,12 @@ def test_sentences_about_a_slide_that_others_follow() -> None:
     table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2))
     history = [REST, CLIMB, REST, {**CLIMB, "velocity": 3.0}]
     told = said(history, table)
-    assert told[0] == "the last slide has not begun; what follows is of the one before it, which ends with history.1"
+    assert told[0] == "the last slide has not begun; these numbers are of the one before, which ends with history.1"
     assert told[1:] == said(history[:2], table)
     assert measure(stages(*history), table) is None
     assert len(said([REST, CLIMB, SETTLE], rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)))) == 3
     begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
-    assert said(history, begun)[0] == "mu_max, the highest friction of the slide, is 7, after 1.5 m of it"
+    assert said(history, begun)[0] == "mu_max, the highest friction of the slide, is 7, 1.5 m after its start"
 
 
 def test_mu_max_on_a_ripple() -> None:
@@ -113,7 +113,7 @@ def test_mu_max_on_a_ripple() -> None:
     assert ripple(x[::8], friction[::8], 2, 1.0) == 0.0
     table = rows(*zip(x / 2.0, x, friction, strict=True))
     told = said([{**CLIMB, "duration": 2.0}], table, 1.0)[0]
-    assert "is 6 +- 1 (1 of it a ripple with the period of a cell), after" in told
+    assert "is 6 +- 1 (1 of it a ripple with the period of a cell), " in told
 
 
 def test_a_steady_start_that_does_not_last() -> None:
@@ -122,7 +122,7 @@ def test_a_steady_start_that_does_not_last() -> None:
     start: Any = {"initial": {"state": "steady", "velocity": 2.0, "pressure": 1.0}}
     table = rows((0, 0, 3), (0.25, 0.5, 4), (0.5, 1, 4))
     table["error_friction"] = [0.1, 0.1, 0.1]  # of 3, and of the slide's 3.92
-    text = "friction left the 3 of the steady start by 0.92, more than the errors of both, 0.69: "
+    text = "mu_dyn differs from friction of the steady start, 3, by 0.92, more than their estimated errors together, "
     assert said([CLIMB], table, **start)[-1].startswith(text)
     assert "left" not in said([{**CLIMB, "pressure": 2.0}], table, **start)[-1]
     table["error_friction"] = [0.2, 0.2, 0.2]
@@ -135,6 +135,7 @@ def test_the_area_whose_error_is_told_and_friction_that_is_all_error() -> None:
     table["contact_area_corrected"] = [0.8 * area for area in table["contact_area"]]
     table["error_friction"] = [float("nan"), 0.1, 1.1]
     told = said([CLIMB], table)
-    assert "the mean contact area over the same is 0.391667, corrected by its edges 0.313333" in told
-    assert "largest errors of the steps of the slide: friction 110 %" in told
-    assert told[-1] == "friction of some of its steps cannot be told from no friction"
+    area = "the mean contact area over the same distance is 0.391667 as counted in points"
+    assert f"{area}, and 0.313333 as corrected for its edges" in told
+    assert "largest estimated errors of a single step of the slide: friction 110 %" in told
+    assert told[-1] == "in some steps of the slide friction is smaller than its own error"

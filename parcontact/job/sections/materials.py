@@ -222,7 +222,7 @@ def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")
     if faults := list(shifted(body.shift, temperature)):
-        raise InputError(f"temperature {temperature:g} C: {faults[0].predicate}")
+        raise InputError(f"temperature {faults[0].predicate}")
     return body.model_copy(update={"temperature": temperature})
 
 

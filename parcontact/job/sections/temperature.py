@@ -85,14 +85,16 @@ def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault
     if temperature is None:
         return
     if shift is None:
-        sentence = "has no effect without a shift: the relaxation times are known at one temperature only; give one"
+        sentence = "has no effect without material.shift, which says how relaxation times depend on it; give a shift"
         yield Fault(sentence, ("temperature",))
         return
     try:
         log = shift.made.log_factor(temperature)
     except InputError as error:
-        yield Fault(f"is beyond what the shift allows: {error}", ("temperature",))
+        yield Fault(f"is beyond the shift: {error}", ("temperature",))
         return
     if not abs(log) <= LARGEST_SHIFT:
-        sentence = f"is beyond what can be computed with: relaxation times would be 10^{log:.3g} of those at the "
-        yield Fault(f"{sentence}reference, and at most 10^{LARGEST_SHIFT:g} either way is allowed", ("temperature",))
+        sentence = (
+            f"would change the relaxation times by a factor of 10^{log:.3g} from those at the reference; at most "
+        )
+        yield Fault(f"{sentence}10^{LARGEST_SHIFT:g} either way can be computed", ("temperature",))
