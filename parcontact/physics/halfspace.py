@@ -18,6 +18,7 @@ Around an isolated contact the wake is not periodic: its influence coefficients 
 (`physics.wake`).
 """
 
+import math
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -58,6 +59,11 @@ class HalfSpace:
         """Whether a uniform pressure moves the surface: not that of a periodic half space, nor an incompressible
         layer."""
         return self.free or (self.layer is not None and self.layer.mean_compliance > 0.0)
+
+    @property
+    def reach(self) -> float:
+        """Distance beyond which points hardly act on each other: the thickness of a layer."""
+        return math.inf if self.layer is None else self.layer.thickness
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 

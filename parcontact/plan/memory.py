@@ -3,6 +3,7 @@
 Each class says what it holds; here this is added up.
 """
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -57,7 +58,8 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
         found["single transforms and preconditioner"] = blocks + Convolution.footprint(single, grid.ny)
     else:
         found["preconditioner"] = symbol
-    tolerance, grids = job.numerics.tolerance, grids_for(grid.dx, grid.dy)
+    reach = math.inf if job.body is None else job.body.thickness
+    tolerance, grids = job.numerics.tolerance, grids_for(grid.dx, grid.dy, reach)
     found["solver"] = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept)
     if chosen.spectrum.on:
         found["surface spectrum"] = part.surface_waves

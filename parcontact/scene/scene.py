@@ -207,7 +207,8 @@ def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) ->
     """Make the contact solver with its workspace, and the operators of the body."""
     height, limit = setup.height / setup.units.height, setup.choices.numerics.max_iterations
     operators = _operators(setup, operator_type)
-    grids = grids_for(setup.grid.dx, setup.grid.dy)
+    body, slab = setup.half_space, setup.slab
+    grids = grids_for(body.size[0] / slab.nx, body.size[1] / slab.ny, body.reach)
     workspace = Workspace(setup.slab, tolerance, operator_type)
     return ContactSolver(workspace, height, tolerance, limit, grids), operators
 

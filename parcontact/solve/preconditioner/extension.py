@@ -14,6 +14,7 @@ the larger one about the rest. The number of iterations then hardly grows with t
 ever, which does no harm where it does not. Maps of cells are in single precision: enough for a preconditioner.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,15 @@ LONG = 16.0  # tuning: times its width: with points further apart along one dire
 Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 
 
-def grids_for(dx: float, dy: float) -> int | None:
-    """The most grids of larger cells to use with distances dx and dy of points; None for all that there are."""
-    return 0 if max(dx, dy) > LONG * min(dx, dy) else None
+def grids_for(dx: float, dy: float, reach: float = math.inf) -> int | None:
+    """Return the most grids of larger cells to use with distances dx and dy of points; None for all that there are.
+
+    Points further apart than the `reach` do not act on each other: no cell is longer than about that. On a layer it is
+    the thickness.
+    """
+    if max(dx, dy) > LONG * min(dx, dy):
+        return 0
+    return None if reach == math.inf else max(round(math.log2(reach / max(dx, dy))), 0)
 
 
 class ExtendedPreconditioner:
