@@ -12,7 +12,6 @@ from .each_case import OF_A_CURVE, cases_of, each_case, overrides
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
-    from pathlib import Path
 
     from ..job import Job
     from ..parallel.slab import Slab
@@ -126,18 +125,11 @@ def theory(options: argparse.Namespace) -> int:
 
 
 def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
-    from ..parallel.mpi import MPI
-    from ..parallel.slab import Slab
     from ..report import prediction
-    from ..summary.theory_settings import TheorySettings
 
-    def write() -> Path:
-        rows = prediction.predict(job, Slab(MPI.COMM_SELF, *job.grid.points), options.gamma, options.waves)
-        return prediction.write(job, rows, TheorySettings(options.gamma, options.waves))
-
-    path = on_root(slab.comm, write)
+    told = on_root(slab.comm, lambda: prediction.foretell(job, options.gamma, options.waves))
     if slab.root and not options.quiet:
-        print(f"Persson's theory, gamma {options.gamma:g}, {options.waves} of waves: {path}", flush=True)
+        print(*told, sep="\n", flush=True)
     return DONE
 
 

@@ -16,7 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullForma
 from ..parallel.slab import Array
 from . import charts, style
 
-NAMES = {"mu_max": "largest friction", "mu_dyn": "friction in the end", "area_corrected": "contact area, corrected"}
+NAMES = {"mu_max": "largest friction", "mu_end": "friction in the end", "area_corrected": "contact area, corrected"}
 MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
 INTEGRATORS = {"exponential": style.BLUE, "backward-euler": style.RED}
 COSTS = {"work": "transforms × N log₂ N", "seconds": "CPU time"}

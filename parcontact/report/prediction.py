@@ -15,13 +15,14 @@ from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..history.timeline import Span, Timeline
 from ..job import Job
+from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..physics.layer import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
 from ..steady_sliding.curve import Request
 from ..storage import files, hdf5, tables
-from ..summary import theory_settings
+from ..summary import theory_beside, theory_settings
 from ..summary.theory_settings import TheorySettings
 from ..theory import full_contact, persson, persson_rings
 from ..theory.persson_history import Leg, Memory, follow
@@ -117,6 +118,13 @@ def write_steady(job: Job, wanted: Request) -> Path:
 
     _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, predict_steady(job, wanted))
     return plots.draw_steady(job.output.directory / "steady.csv")
+
+
+def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
+    """Write theory.csv for a job on one rank, and return sentences about it, beside the job's run if there is one."""
+    settings = TheorySettings(gamma, waves)
+    path = write(job, predict(job, Slab(MPI.COMM_SELF, *job.grid.points), gamma, waves), settings)
+    return [f"Persson's theory, {settings.sentence}: {path}", *theory_beside.describe(path.parent, job.history)]
 
 
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:

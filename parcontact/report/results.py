@@ -17,7 +17,7 @@ from ..plotting.plots import choose_evenly
 from ..plotting.run import Run, find_free_area, label_frames, to_load
 from ..storage import hdf5, tables
 from ..storage.row import UNITS
-from ..summary import slide, sweep_table, theory_settings
+from ..summary import slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, Section, Table, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
@@ -50,7 +50,19 @@ def describe_run(directory: Path) -> Section:
         theory_settings.describe(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)
-    return Section("Results of the run", list(filter(None, told)), [numbers], pictures, browse_run(run))
+    shown = [numbers, *_theory(directory, run)]
+    return Section("Results of the run", list(filter(None, told)), shown, pictures, browse_run(run))
+
+
+def _theory(directory: Path, run: Run) -> list[Table]:
+    """Return the results of Persson's theory beside those of the run, where there is a theory."""
+    rows = [
+        (one.name, *map(format_cell, (one.run or math.nan, one.theory)), f"{one.theory / one.run - 1:+.0%}")
+        for one in theory_beside.compare(directory, run.job.history)
+        if one.run
+    ]
+    head = ("result", "run", "Persson's theory", "theory over run, less 1")
+    return [Table(head, rows, "beside Persson's theory; the area of the run as corrected for its edges")] * bool(rows)
 
 
 def _leakage(directory: Path) -> list[tuple[str, str]]:

@@ -37,7 +37,7 @@ class Outcome:
     """
 
     mu_max: float
-    mu_dyn: float
+    mu_end: float
     area: float
     area_corrected: float
     steps: int
@@ -46,7 +46,7 @@ class Outcome:
     cpu_seconds: float
 
 
-QUANTITIES = ("mu_max", "mu_dyn", "area", "area_corrected")
+QUANTITIES = ("mu_max", "mu_end", "area", "area_corrected")
 SETTINGS, RESULTS = (tuple(field.name for field in fields(kind)) for kind in (Settings, Outcome))
 COLUMNS = ("fingerprint", *SETTINGS, *RESULTS, *(f"error_{name}" for name in QUANTITIES))  # of study.csv
 WORDS, COUNTS = ("integrator", "precision", "kernel"), ("mesh", "steps", "operator_calls")
@@ -75,7 +75,7 @@ def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
 
 
 def settled(job: Job, rows: Sequence[Row]) -> tuple[float, float, float, float]:
-    """mu_max, mu_dyn, area and corrected area of a run, from its rows."""
+    """mu_max, mu_end, area and corrected area of a run, from its rows."""
     end = rows[-1].time
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
     sliding = [stage for stage in lasting if stage.speed > 0.0]

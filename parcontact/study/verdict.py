@@ -9,7 +9,7 @@ from .ladders import Ladders, Settings
 from .outcome import QUANTITIES, Outcome
 
 TARGETS = (0.05, 0.03, 0.01, 0.003)
-NEEDED = ("mu_max", "mu_dyn", "area_corrected")  # what the sentences hold the settings to
+NEEDED = ("mu_max", "mu_end", "area_corrected")  # what the sentences hold the settings to
 TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
 Outcomes = Mapping[Settings, Outcome]
 

@@ -20,7 +20,7 @@ from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
 from ..storage.console import warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import slide, sweep_table, theory_settings
+from . import slide, sweep_table, theory_beside, theory_settings
 
 SHOWN = 20  # numbers of one name at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
@@ -171,7 +171,10 @@ def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
         except InputError:
             yield count + "of unknown settings"
             raise
-        yield count + (f"gamma {settings.gamma:g}, {settings.waves} of waves" if settings else "of unknown settings")
+        yield count + (settings.sentence if settings else "of unknown settings")
+        if (directory / RESOLVED).exists():
+            job = shown_job(directory / RESOLVED)
+            yield from (f"  {text}" for text in theory_beside.describe(directory, job.history))
 
 
 def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

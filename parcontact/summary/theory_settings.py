@@ -21,6 +21,9 @@ program: parcontact {version}
 )
 
 
+OF_WAVES = {"continuum": "the spectrum of the surface", "lattice": "the waves of the surface in its box"}
+
+
 class TheorySettings(NamedTuple):
     """The factor that corrects friction in partial contact, and which waves: continuum or lattice."""
 
@@ -29,6 +32,11 @@ class TheorySettings(NamedTuple):
 
     def __str__(self) -> str:
         return f"γ = {self.gamma:g}, {self.waves}"
+
+    @property
+    def sentence(self) -> str:
+        """The settings in words."""
+        return f"gamma {self.gamma:g}, for {OF_WAVES.get(self.waves, self.waves)}"
 
 
 def write(directory: Path, settings: TheorySettings) -> None:

@@ -1,6 +1,7 @@
 """`parcontact theory`: the job's waves, history and material in Persson's theory."""
 
 import csv
+import re
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +149,9 @@ def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     small = ["--set", "grid.points=64", "--set", "surface.0.short_wavelength=1e-4"]
     done = run_parcontact(["theory", JOBS / "velocity_step.yaml", *small, "--gamma", "1", "--out", "here"], ranks=2)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == ["Persson's theory, gamma 1, continuum of waves: here/theory.csv"]
+    first, second = done.stdout.splitlines()
+    assert first == "Persson's theory, gamma 1, for the spectrum of the surface: here/theory.csv"
+    assert re.fullmatch(r"Persson's theory predicts mu_max \S+, mu_dyn \S+, contact area \S+", second)
     with (tmp_path / "here" / "theory.csv").open(newline="") as file:
         table = list(csv.DictReader(file))
     assert tuple(table[0]) == prediction.Instant._fields

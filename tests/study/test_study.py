@@ -55,15 +55,15 @@ def test_orders_and_limits_of_full_contact(tmp_path: Path) -> None:
         limit = limits["mu_max", integrator, "mesh and time together"].limit
         print(f"{integrator}: mu_max {limit}")
         assert limit.value == pytest.approx(FULL * EXACT, rel=1e-3)
-        limit = limits["mu_dyn", integrator, "mesh and time together"].limit
-        print(f"{integrator}: mu_dyn {limit}")
+        limit = limits["mu_end", integrator, "mesh and time together"].limit
+        print(f"{integrator}: mu_end {limit}")
         assert limit.order == pytest.approx(order, abs=0.1)
         assert abs(limit.value - EXACT) < limit.uncertainty + 1e-6 * EXACT
         assert limit.value == pytest.approx(EXACT, rel=2e-3)
     reference = verdict.references(ladders(load(path)), found)
-    assert reference["mu_dyn"].value == pytest.approx(EXACT, rel=1e-5)
+    assert reference["mu_end"].value == pytest.approx(EXACT, rel=1e-5)
     alone = [one for one in found if one.integrator == "exponential" and math.isclose(one.time_step, 1 / 128)]
-    errors = [verdict.errors(found[case], reference)["mu_dyn"] for case in sorted(alone, key=lambda case: case.mesh)]
+    errors = [verdict.errors(found[case], reference)["mu_end"] for case in sorted(alone, key=lambda case: case.mesh)]
     assert np.ptp(errors) < 0.1 * max(errors)  # full contact is exact on every mesh: refining it alone is wasted
 
 
@@ -92,7 +92,7 @@ def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str
         case = Settings(mesh, cells, integrator, own.tolerance, "double", "spectral")
         found = outcome.run(load(path, overrides(job, own, case)), Slab(MPI.COMM_SELF, mesh, mesh), lambda: False)
         assert found is not None
-        return found.mu_dyn - limit[0], found.area_corrected - limit[1]
+        return found.mu_end - limit[0], found.area_corrected - limit[1]
 
     limit = (0.0, 0.0)
     limit = errors(128, 0.25, "exponential")
@@ -115,7 +115,7 @@ def test_front_and_sentences() -> None:
     first, second, _, last = cases
     reference = {
         "mu_max": Limit(1.0, 1.0, 0.004),
-        "mu_dyn": Limit(2.0, 1.0, 0.0),
+        "mu_end": Limit(2.0, 1.0, 0.0),
         "area": Limit(0.5, 1.0, 0.0),
         "area_corrected": Limit(0.5, 1.0, 0.0),
     }
@@ -162,7 +162,7 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_pat
     assert "for 5 %: mesh" in out
     table = rows(tmp_path / "whole" / "study.csv")
     assert len(table) == 4
-    assert all(float(row["error_mu_dyn"]) < 0.1 for row in table)
+    assert all(float(row["error_mu_end"]) < 0.1 for row in table)
     for name in ("convergence.png", "work_precision.png", "study.txt"):
         assert (tmp_path / "whole" / name).stat().st_size > 100
     stop = tmp_path / "out" / "stop"
@@ -179,7 +179,7 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_pat
     assert again.returncode == 0, again.stderr
     assert "4 cases, 2 of them are there already" in again.stdout
     for ours, theirs in zip(rows(tmp_path / "out" / "study.csv"), table, strict=True):
-        for name in ("mu_max", "mu_dyn", "area_corrected"):  # of one solve to 1e-7 each
+        for name in ("mu_max", "mu_end", "area_corrected"):  # of one solve to 1e-7 each
             assert float(ours[name]) == pytest.approx(float(theirs[name]), rel=1e-5)
     changed = main("study", job, "--set", "material.modulus_inf=3e5")[1]
     assert "4 cases, 0 of them are there already" in changed
