@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 from numpy.typing import DTypeLike
 from pydantic import Field
 
+from ..job.checks import limits
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
@@ -42,6 +43,7 @@ class ThermalColumns:
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
     rules: ClassVar[tuple[Rule, ...]] = (Rule(("thermal", "history"), _no_march),)
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 
     @staticmethod
     def decide(job: Any) -> Decision:

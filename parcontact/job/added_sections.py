@@ -22,6 +22,7 @@ from .text.fault import Fault, refuse
 GROUP = "parcontact.effects"
 OURS: dict[str, str] = {
     # one line for each effect of this package that has a section of its own: its name, and where the effect is
+    "adhesion": "parcontact.effects.adhesion:AdhesionColumns",
     "interface": "parcontact.effects.interface:InterfaceColumns",
     "leakage": "parcontact.effects.leakage:LeakageColumns",
     "thermal": "parcontact.effects.thermal:ThermalColumns",

@@ -61,6 +61,7 @@ class Job(Part):
         Rule(("grid", "surface", "output"), limits.half_mesh_fits),
         Rule(("history", "steady"), limits.some_history),
         Rule(("history", "initial"), limits.some_load),
+        Rule(("history",), limits.loads_press),
         Rule(("initial", "material"), limits.steady_at_rest),
         Rule(("grid", "material", "history", "initial", "steady"), limits.loads_are_borne),
         Rule(("grid", "history"), limits.steps_can_be_made),
@@ -179,8 +180,9 @@ def extended(sections: tuple[str, ...]) -> type[Job]:
         for name, effect in effects.items()
     }
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
-    known = (rule for rule in Job.rules if not ("thermal" in sections and rule.check is limits.no_temperature))
-    made.rules = (*known, *(rule for effect in effects.values() for rule in getattr(effect, "rules", ())))
+    lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
+    kept = (rule for rule in Job.rules if rule.check not in lifted)
+    made.rules = (*kept, *(rule for effect in effects.values() for rule in getattr(effect, "rules", ())))
     return made
 
 

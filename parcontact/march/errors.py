@@ -23,6 +23,7 @@ from ..physics.slopes import friction_by_energy
 from ..physics.time_error import RunProperties, StepObservation, time_error
 from ..scene import Scene, Setup
 from ..solve.contact import Contact
+from .sticking import StuckContact
 
 PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
@@ -98,7 +99,7 @@ class Solved:
     """A step that has been solved: its contact, what it measures and the memory of the body after it.
 
     `remark` says what was unusual about it; `moved_start` whether its start was a pressure of whole cells ago, None
-    where there was no choice.
+    where there was no choice; `stuck` is what a contact with adhesion has besides.
     """
 
     step: Step
@@ -108,6 +109,7 @@ class Solved:
     body: BodyMemory
     remark: str = ""
     moved_start: bool | None = None
+    stuck: StuckContact | None = None
 
 
 def estimate_errors(scene: Scene, observations: Observations, solved: Solved) -> Estimate:
@@ -154,7 +156,11 @@ def _look(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObse
     now = last.once_more(step, ALIKE_STEPS)
     if now is None:
         load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
-        look = pair.compare(step.dt, trial, solved.body, contact.p, contact.u, load, measures.contact_area)
+        pressure = contact.p
+        if solved.stuck is not None:  # tension counts as pressure does
+            pressure = np.abs(contact.p)
+            load = scene.slab.sum(float(pressure.sum()))[0]
+        look = pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
         now = LastObservation.of(step, *astuple(look))
     return now, IntegratorDifference(*now.observed)
 

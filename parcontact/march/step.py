@@ -21,7 +21,7 @@ from ..solve.contact import Contact
 from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
 from ..storage.row import Row
-from . import failure
+from . import failure, sticking
 from .errors import Solved, estimate_errors
 from .failure import StepError
 from .starts import Past, cells_moved, make_start
@@ -75,6 +75,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         errors.observations,
         state.errors,
         state.chosen,
+        None if solved.stuck is None else solved.stuck.memory,
     )
 
 
@@ -90,8 +91,9 @@ def _tell_effects(scene: Scene, solved: Solved, slid: float) -> None:
     """Tell the effects that follow the steps of one that was made; collective."""
     u = solved.body.displacement
     assert u is not None
+    columns = None if solved.stuck is None else solved.stuck.columns
     for follower in scene.followers.values():
-        follower.follow(Instant(solved.step, solved.contact.p, solved.trial.alpha, u, slid, solved.measures))
+        follower.follow(Instant(solved.step, solved.contact.p, solved.trial.alpha, u, slid, solved.measures, columns))
 
 
 # -- the contact of a step ---------------------------------------------------------------------------------------------
@@ -101,7 +103,10 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     """Solve a step, measure it and let the body go on; collective. Raises StepError."""
     body = scene.material
     trial = body.begin(state.body, step.dt, scene.motion.at(step.position))
-    problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha), _control(scene, step, trial))
+    control = _control(scene, step, trial)
+    if state.sticking is not None:
+        return _solve_stuck(scene, state, step, trial, control)
+    problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha), control)
     moved_start = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare)
     if state.alpha == 0.0:  # nothing has been solved before
         on = partial(solver_on, scene.setup)
@@ -118,6 +123,22 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
         raise failure.not_finite(scene, step, measures)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
     return Solved(step, trial, contact, measures, memory, remark, moved_start)
+
+
+def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: MeanPressure | Approach) -> Solved:
+    """Solve a step with adhesion, measure it and let the body go on; collective. Raises StepError."""
+    assert state.sticking is not None
+    stuck = sticking.solve(scene, state.sticking, step, trial, control, state.spare)
+    contact = stuck.contact
+    if contact.failure and not _accepts(scene, contact):
+        moved = math.hypot(*cells_moved(scene, step, state.position))
+        raise failure.of_solve(scene, step, contact, contact, [], trial.effective, moved)
+    instant = step.position, step.velocity, stuck.touching
+    measures = scene.probe.measure(contact.p, trial.alpha, contact.u, trial.effective, contact.d, *instant)
+    if not measures.finite:
+        raise failure.not_finite(scene, step, measures)
+    memory = scene.material.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
+    return Solved(step, trial, contact, measures, memory, stuck=stuck)
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:

@@ -36,6 +36,7 @@ from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 from .wake import wake
 
 Vector = tuple[float, float]
+LEAST_SYMBOL = 1e-6  # accuracy: of that of a half space, where a table has less
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,34 @@ class HalfSpace:
         """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
         (a layer included) a preconditioner."""
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
+
+    # -- of contacts that stick -------------------------------------------------------------------------------------
+
+    def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
+        """Pressure -> displacement, its inverse but for mean values, the displacement over a uniform pressure, and
+        what the first makes of it, which is positive; collective where the half space is free.
+
+        A free body is taken as one that repeats itself, whose points influence each other by the shortest way: this is
+        exact within half a box.
+        """
+        if self.free:
+            table = tabulate(fft, self.size, self._coefficient).real
+            mean = self._mean_of(table, fft)
+            least = mean
+        else:
+            table, mean = self.symbol(fft), 0.0 if self.layer is None else self.layer.mean_compliance
+            least = mean or self.largest_compliance
+        zero = np.hypot(*wavenumbers(fft, self.size)) == 0.0
+        smallest = LEAST_SYMBOL * (1.0 - self.poisson) / np.where(zero, np.inf, np.hypot(*wavenumbers(fft, self.size)))
+        table = np.where(zero, least, np.maximum(table, smallest))
+        operator = Convolution(fft, lambda rows: table[rows], fft.dtype)
+        inverse = Convolution(fft, lambda rows: np.where(zero[rows], 0.0, 1.0 / table[rows]), fft.dtype)
+        return operator, inverse, mean, least
+
+    def _mean_of(self, table: Array, fft: FFT) -> float:
+        """The first number of a spectrum; collective."""
+        first = float(table[0, 0]) if fft.columns.start == 0 < fft.columns.stop else 0.0
+        return fft.slab.sum(first)[0]
 
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 

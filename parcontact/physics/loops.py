@@ -73,28 +73,28 @@ def commit(displacement, buffer, u, heights, offset, out):
 
 
 @loop
-def measure(p, u, h, above, cyclic):
-    """Over this rank's points: sum of p, points in contact, which carry a pressure, sum of `u - h`; how many cell sides
-    separate a point with pressure from one without, along x and y, each counted once; largest p.
+def measure(p, u, h, mask, above, cyclic):
+    """Over this rank's points: sum of p, points in contact, where `mask` is not 0, sum of `u - h`; how many cell sides
+    separate a point in contact from one that is not, along x and y, each counted once; largest p.
 
-    `above` is the row before the first; the first point of a row has the last one before it if `cyclic`. The largest
-    pressure is kept for each column: that is as fast as a sum, which a single running maximum is not.
+    `above` is the row of the mask before the first; the first point of a row has the last one before it if `cyclic`.
+    The largest pressure is kept for each column: that is as fast as a sum, which a single running maximum is not.
     """
     load, count, gaps, sides = 0.0, 0.0, 0.0, 0.0
     largest = np.zeros(p.shape[1], p.dtype)
     for j in range(p.shape[0]):
-        before = p[j - 1] if j > 0 else above
+        before = mask[j - 1] if j > 0 else above
         row_load, row_count, row_gaps, across, along = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
             row_load += p[j, i]
-            row_count += 1.0 if p[j, i] != 0.0 else 0.0
+            row_count += 1.0 if mask[j, i] != 0.0 else 0.0
             row_gaps += u[j, i] - h[j, i]
-            across += 1.0 if (p[j, i] != 0.0) != (before[i] != 0.0) else 0.0
+            across += 1.0 if (mask[j, i] != 0.0) != (before[i] != 0.0) else 0.0
             largest[i] = max(largest[i], p[j, i])
         for i in range(1, p.shape[1]):
-            along += 1.0 if (p[j, i] != 0.0) != (p[j, i - 1] != 0.0) else 0.0
+            along += 1.0 if (mask[j, i] != 0.0) != (mask[j, i - 1] != 0.0) else 0.0
         if cyclic:
-            along += 1.0 if (p[j, 0] != 0.0) != (p[j, -1] != 0.0) else 0.0
+            along += 1.0 if (mask[j, 0] != 0.0) != (mask[j, -1] != 0.0) else 0.0
         load += row_load
         count += row_count
         gaps += row_gaps

@@ -29,19 +29,31 @@ class Probe:
     interface: InterfaceFriction | None = None
 
     def measure(
-        self, p: Array, alpha: float, u: Array, h: Array, d: float, displacement: Vector, velocity: Vector = (0.0, 0.0)
+        self,
+        p: Array,
+        alpha: float,
+        u: Array,
+        h: Array,
+        d: float,
+        displacement: Vector,
+        velocity: Vector = (0.0, 0.0),
+        touching: Array | None = None,
     ) -> Measures:
         """Measure the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving
-        with `velocity` [m/s]; collective."""
+        with `velocity` [m/s]; collective.
+
+        `touching` is a map that is not 0 where the surfaces touch; without one that is where there is a pressure.
+        """
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
-        *sums, largest = loops.measure(p, u, h, rows.before_first(self.slab, p, cyclic), cyclic)
-        edge = 0.0 if cyclic else _largest_at_edge(self.slab, p)
+        mask = p if touching is None else touching
+        *sums, largest = loops.measure(p, u, h, mask, rows.before_first(self.slab, mask, cyclic), cyclic)
+        edge = 0.0 if cyclic else _largest_at_edge(self.slab, mask)
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
-        if load > 0.0:
+        if load > 0.0 or touching is not None:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area

@@ -14,6 +14,7 @@ from numpy.typing import DTypeLike
 
 from ..job import Job
 from ..job.checks.size import machines
+from ..march import sticking
 from ..march.state import State
 from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
@@ -26,6 +27,7 @@ from ..physics.halfspace import HalfSpace
 from ..physics.lowest import shape_of
 from ..scene import choices
 from ..scene.rigid_surface import highest_waves
+from ..solve.adhesive.solver import GapSolver
 from ..solve.contact import ContactSolver
 from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.preconditioner.extension import grids_for
@@ -61,6 +63,8 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
     reach = math.inf if job.body is None else job.body.thickness
     tolerance, grids = job.numerics.tolerance, grids_for(grid.dx, grid.dy, reach)
     found["solver"] = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept)
+    if chosen.adhesion is not None:
+        found["adhesion"] = 2 * symbol + GapSolver.footprint(part.cells(grid.points))
     if chosen.spectrum.on:
         found["surface spectrum"] = part.surface_waves
     for what, count, dtype in _maps(job):
@@ -178,6 +182,8 @@ def _maps(job: Job) -> Iterator[tuple[str, MapCount, DTypeLike]]:
         yield "moved heights", ElasticBody.count_maps(chosen.slides_along_x), np.float64
     if chosen.energy_memory.on:
         yield "energy memory", ElasticPressure.count_maps(chosen.prony.moduli.size), np.float64
+    if chosen.adhesion is not None:
+        yield "gaps", sticking.count_maps(chosen.isolated.on), np.float64
     for name, effect in chosen.followers.items():
         for dtype in effect.maps(job):
             yield name, MapCount(held=1, saved=1), dtype

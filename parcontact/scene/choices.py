@@ -4,13 +4,13 @@
 off allocates nothing, calls nothing and writes nothing.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..effects.adhesion import law_of
 from ..effects.effect import Decision, Effect
 from ..effects.folded_branches import bands, phases
 from ..effects.interface import interface_of
@@ -18,27 +18,17 @@ from ..effects.relaxation import relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
+from ..physics.adhesion import AdhesionLaw
 from ..physics.folding import FoldedBranches, fold_branches, keep_all
 from ..physics.interface import InterfaceFriction
 from ..physics.prony import Prony
 from ..solve.precision import LOOSE, VERY_LOOSE
+from .decided import Decided, Verdict, decided
 
 
 def choices(job: Job, until: float = 0.0) -> "Choices":
     """Return what a job calls for, if its last stage goes on to `until` [s]."""
     return Choices(job, job.grid, job.numerics, job.output, until)
-
-
-Verdict = tuple[bool, str]  # whether an effect is on, and why
-
-
-class Decided(cached_property[Decision]):
-    """A decision, made when it is first asked for; `parcontact plan` prints all of them in the order of their code."""
-
-
-def decided(name: str) -> Callable[[Callable[[Any], Verdict]], Decided]:
-    """Make a decision with a name out of a method that gives a verdict."""
-    return lambda method: Decided(lambda choices: Decision(name, *method(choices)))
 
 
 @dataclass(frozen=True)
@@ -84,6 +74,11 @@ class Choices:
         return self.job.material.hardness
 
     @cached_property
+    def adhesion(self) -> AdhesionLaw | None:
+        """The law of adhesion; None if the surfaces do not stick."""
+        return law_of(self.job.section("adhesion"), self.grid, self.job.material)
+
+    @cached_property
     def interface(self) -> InterfaceFriction | None:
         """The friction of the contact area itself; None if the job has no `interface`."""
         return interface_of(self.job.section("interface"), self.time_factor)
@@ -93,8 +88,8 @@ class Choices:
         """The branches of the material that need a map, and those that do not (`physics.folding`)."""
         if self.prony.moduli.size == 0:
             return keep_all(self.prony, "the body has no branch")
-        reason = "output.energy counts the energy of every branch" if self.energies.on else ""
-        reason = reason or ("" if self.numerics.branch_error else "numerics.branch_error is 0")
+        reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
+        reason = "output.energy counts the energy of every branch" if self.energies.on else reason
         allowed = 0.0 if reason else self.numerics.branch_error
         passing = list(phases(Timeline.of(self.job, self.until))), list(bands(self.grid, self.job.surface))
         start = self.job.initial.velocity if self.steady_start.on else None
@@ -145,8 +140,8 @@ class Choices:
     @cached_property
     def slides_along_x(self) -> bool:
         """True if the surface slides along x on a periodic box, where whole cells are an index offset."""
-        spans = [span for span in self.timeline.spans if span.moves]
-        return bool(spans) and not self.isolated.on and not any(span.stage.velocity[1] for span in spans)
+        across = [span.stage.velocity[1] for span in self.timeline.spans if span.moves]
+        return bool(across) and not self.isolated.on and not any(across)
 
     @decided("sliding")
     def sliding(self) -> Verdict:
@@ -163,21 +158,22 @@ class Choices:
             return True, "a free box is not cyclic: the heights are made anew"
         if self.slides_along_x and self.further_starts.on:
             return True, "stages that choose their own steps begin with parts of a cell where they must"
-        step = self.timeline.first_between_cells()
-        if step is None:
+        if (step := self.timeline.first_between_cells()) is None:
             return False, "every step is of whole cells along x"
         return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
 
     @decided("extrapolated starts")
     def extrapolated_starts(self) -> Verdict:
         """The last pressure but one, from which the next one is extrapolated."""
-        lasts = self.timeline.lasts
-        return lasts, "stages last" if lasts else "every stage is a single solve"
+        if self.adhesion is not None:
+            return False, "contacts with adhesion start from the last gaps"
+        return self.timeline.lasts, "stages last" if self.timeline.lasts else "every stage is a single solve"
 
     @decided("starts from whole cells ago")
     def further_starts(self) -> Verdict:
         """The two pressures before that: with thirds and quarters of a cell a step starts from a whole cell ago."""
-        on = self.timeline.chooses and any(span.moves and span.stage.chooses for span in self.timeline.spans)
+        moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)
+        on = self.extrapolated_starts.on and self.timeline.chooses and moves
         return on, f"the surface slides in {'' if on else 'no '}steps that are chosen"
 
     @decided("chosen time steps")
@@ -209,6 +205,8 @@ class Choices:
     @decided("mixed precision")
     def mixed_precision(self) -> Verdict:
         """A preconditioner in single precision, with transforms of its own, which costs no iteration."""
+        if self.adhesion is not None:
+            return False, "contacts with adhesion are solved in double precision"
         if self.numerics.precision != "double":
             return True, f"numerics.precision is {self.numerics.precision}"
         if self.numerics.tolerance < LOOSE:
@@ -220,6 +218,8 @@ class Choices:
     @decided("operator in single precision")
     def single_operator(self) -> Verdict:
         """The operator in single precision, too, on the transforms of the preconditioner."""
+        if self.adhesion is not None:
+            return False, "contacts with adhesion are solved in double precision"
         if self.numerics.precision != "mixed":
             return False, f"numerics.precision is {self.numerics.precision}"
         if self.numerics.tolerance < VERY_LOOSE:

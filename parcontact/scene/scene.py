@@ -27,6 +27,9 @@ from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
 from ..physics.units import Units
+from ..solve.adhesive import kernels as laws
+from ..solve.adhesive.solver import GapOperators, GapSolver, Law
+from ..solve.adhesive.sticking import StickingSolver
 from ..solve.bounded import Bounded
 from ..solve.constraint import Constraint, NonNegative
 from ..solve.contact import ContactSolver
@@ -107,6 +110,7 @@ class Scene:
     operators: Operators
     probe: Probe
     energy: ElasticEnergy | ZenerEnergy | None
+    sticking: StickingSolver | None = None
     followers: dict[str, Effect] = field(default_factory=dict)
 
     @property
@@ -129,6 +133,14 @@ class Scene:
         """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
         hardness = self.choices.hardness
         return NonNegative() if hardness is None else Bounded(hardness / (alpha * self.units.pressure))
+
+    def law(self, alpha: float) -> Law | None:
+        """Return the law of adhesion in a step with the modulus alpha, None without adhesion."""
+        law = self.choices.adhesion
+        if law is None:
+            return None
+        kind = laws.DUGDALE if law.kind == "dugdale" else laws.EXPONENTIAL
+        return Law(kind, law.strength / (alpha * self.units.pressure), law.range / self.units.height)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
@@ -156,6 +168,8 @@ def build_on(setup: Setup) -> Scene:
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
     material, energy = _body_and_energy(setup, folded, inverse)
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
+    if chosen.adhesion is not None:
+        scene.sticking = _sticking(setup, solver.workspace, operators)
     scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}
     values_of(scene.followers)  # refuses those that do not fit, before anything is written
     return scene
@@ -220,6 +234,14 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
         return Operators(body.operator(setup.fft), body.inverse(setup.fft))
     single = FFT(setup.slab, dtype=np.float32, measured=setup.fft.measured, sharing=setup.fft)
     return Operators(body.operator(single if operator_type == np.float32 else setup.fft), body.inverse(single))
+
+
+def _sticking(setup: Setup, workspace: Workspace, operators: Operators) -> StickingSolver:
+    """Make the solver of contacts that stick."""
+    numerics, height = setup.choices.numerics, setup.height / setup.units.height
+    by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
+    gaps = GapSolver(setup.slab, by_gap, height, numerics.tolerance, numerics.max_iterations)
+    return StickingSolver(gaps, workspace, operators.operator if setup.choices.isolated.on else None)
 
 
 def _body_and_energy(

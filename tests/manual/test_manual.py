@@ -19,6 +19,7 @@ from pydantic import TypeAdapter
 
 from parcontact import __main__, job
 from parcontact.command.arguments import parse_arguments
+from parcontact.effects.adhesion import AdhesionColumns
 from parcontact.effects.interface import InterfaceColumns
 from parcontact.effects.leakage import LeakageColumns
 from parcontact.effects.thermal import ThermalColumns
@@ -138,7 +139,10 @@ def test_the_page_has_range_unit_and_default() -> None:
 # -- columns ---------------------------------------------------------------------------------------------------------
 
 COLUMNS = {
-    "measures.csv": [*row.columns(0, (*InterfaceColumns.columns, *LeakageColumns.columns)), "dissipated_K"],
+    "measures.csv": [
+        *row.columns(0, (*AdhesionColumns.columns, *InterfaceColumns.columns, *LeakageColumns.columns)),
+        "dissipated_K",
+    ],
     "leak.csv": leak.Instant._fields,
     "steady.csv": [
         *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),

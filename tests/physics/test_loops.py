@@ -71,7 +71,7 @@ def test_measure(shape: tuple[int, int], cyclic: bool) -> None:
     pressed = np.concatenate([above, p]) > 0.0
     sides = np.count_nonzero(np.diff(pressed, axis=0)) + np.count_nonzero(np.diff(pressed[1:], axis=1))
     sides += np.count_nonzero(pressed[1:, 0] != pressed[1:, -1]) if cyclic else 0
-    *sums, found, largest = loops.measure(p, u, h, above[0], cyclic)
+    *sums, found, largest = loops.measure(p, u, h, p, above[0], cyclic)
     assert_allclose([*sums, largest], [p.sum(), np.count_nonzero(p), (u - h).sum(), p.max(initial=0.0)], 1e-13, 1e-13)
     assert found == sides
 

@@ -228,6 +228,15 @@ def test_steady_start() -> None:
     assert [row(planned, "steady start").on for planned in (off, on)] == [False, True]
 
 
+def test_adhesion() -> None:
+    """Off: no operator of gaps, no map; on: all of the gaps and their solver."""
+    off, on = job(history=[PRESS]), job(history=[PRESS], adhesion={"work": 1e-9, "range": 1e-6})
+    assert [row(planned, "adhesion").on for planned in (off, on)] == [False, True]
+    march = begun(off)
+    assert march.scene.sticking is None
+    assert march.state.sticking is None
+
+
 def test_yielding_counterbody() -> None:
     """A bound that nothing reaches costs sums over ranks alone: see `solve/test_bounded` for one that is reached."""
     off, on = job(history=[PRESS]), job(history=[PRESS], material={**ELASTIC, "hardness": 1e9})
@@ -265,6 +274,7 @@ TESTED = {
         "dissipation per branch",
         "run on half the mesh",
         "yielding counterbody",
+        "adhesion",
     ),
     *("fields", "checkpoints", "interface", "leakage", "thermal"),  # the last ones where they are made
 }

@@ -10,10 +10,11 @@ from ..sections.calculation import Body, Grid, Numerics, Output
 from ..sections.geometry import OnOneMesh, Rough
 from ..sections.height_arrays import HeightArray
 from ..sections.materials import AnyMaterial
-from ..sections.stages import AUTO, GeometricStep, Initial, Stage, Steady
+from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
 from .advice import SAME_LENGTH
 
+LOADS = {"pressure": PRESSURE, "force": FORCE}
 MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
 
 
@@ -90,6 +91,18 @@ def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
         return
     if not any(stage.load.start or stage.load.end for stage in history):
         yield Fault("must not be zero in every stage: nothing would ever touch", ("history", 0, history[0].control))
+
+
+def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+    """Check that nothing is pulled: only surfaces that stick can be."""
+    for index, stage in enumerate(history):
+        if stage is None or stage.control == "approach":
+            continue
+        least = min(stage.load.start, stage.load.end)
+        if least < 0.0:
+            ends = () if stage.load.constant else ("from" if stage.load.start == least else "to",)
+            sentence = f"must be {LOADS[stage.control]}, got {least:g}"
+            yield Fault(sentence, ("history", index, stage.control, *ends))
 
 
 def steady_at_rest(initial: Initial, material: AnyMaterial) -> Iterator[Fault]:

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, Valida
 
 from ..text.fault import Fault, quote, refuse
 from .part import Instead, Origin, Part, Rule
-from .quantities import Flag, NonNegative, Positive, Real, Vector, listed, log_range
+from .quantities import Flag, Positive, Real, Vector, listed, log_range
 from .temperature import Celsius
 
 Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
@@ -109,8 +109,8 @@ class Stage(Part):
     """One stage of the history: a load, a velocity, and how long they last; an instantaneous stage is one solve."""
 
     name: str = Field(default="stage", description="text (put numbers in quotes)")
-    pressure: Annotated[Ramp | None, _ramp(NonNegative, PRESSURE)] = Field(default=None, description=PRESSURE)
-    force: Annotated[Ramp | None, _ramp(NonNegative, FORCE)] = Field(default=None, description=FORCE)
+    pressure: Annotated[Ramp | None, _ramp(Real, PRESSURE)] = Field(default=None, description=PRESSURE)
+    force: Annotated[Ramp | None, _ramp(Real, FORCE)] = Field(default=None, description=FORCE)
     approach: Annotated[Ramp | None, _ramp(Real, APPROACH)] = Field(default=None, description=APPROACH)
     velocity: Velocity = (0.0, 0.0)
     duration: Positive | None = Field(default=None, description="a positive time [s]")

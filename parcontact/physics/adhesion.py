@@ -1,0 +1,52 @@
+"""Laws of adhesion: the attraction of two surfaces over the gap between them, and the lengths that go with it.
+
+With the work of adhesion w [J/m^2], the range rho [m] and the gap g,
+
+    exponential  sigma(g) = (w/rho) exp(-g/rho),          gamma(g) = w exp(-g/rho),
+    dugdale      sigma(g) = w/rho for g < rho, else 0,    gamma(g) = w max(1 - g/rho, 0).
+
+The traction at the edge of a contact rises over the process zone `l = E* rho^2/w`, with E* = 2 G/(1 - nu). The numbers
+of Tabor and Johnson say of which kind an adhesive contact is,
+
+    mu = (R w^2/(E*^2 rho^3))^(1/3),        alpha^2 = 2 w lambda/(pi^2 E* h^2),
+
+of a sphere of radius R (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2), and of a wave of length lambda whose crests
+are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+KINDS = ("exponential", "dugdale")
+
+
+@dataclass(frozen=True)
+class AdhesionLaw:
+    """A law of adhesion: work [J/m^2], range [m], kind."""
+
+    work: float
+    range: float
+    kind: Literal["exponential", "dugdale"] = "exponential"
+
+    @property
+    def strength(self) -> float:
+        """The largest attraction [Pa]."""
+        return self.work / self.range
+
+    def process_zone(self, modulus: float) -> float:
+        """Return the length l of the process zone [m] for E* [Pa]."""
+        return modulus * self.range**2 / self.work
+
+    def tabor(self, modulus: float, radius: float) -> float:
+        """Return Tabor's parameter for E* [Pa] and the radius of a sphere [m]."""
+        return (radius * self.work**2 / (modulus**2 * self.range**3)) ** (1.0 / 3.0)
+
+    def johnson(self, modulus: float, length: float, amplitude: float) -> float:
+        """Return Johnson's parameter for E* [Pa], the length of a wave [m] and its amplitude [m]."""
+        return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / amplitude
+
+
+def smallest_range(work: float, modulus: float, cell: float, cells: float) -> float:
+    """Return the range [m] whose process zone is so many cells long, for E* [Pa] and the side of a cell [m]."""
+    return math.sqrt(cells * cell * work / modulus)

@@ -1,0 +1,1 @@
+"""Contact with adhesion: the gap is the unknown, under a law of traction over gap."""

@@ -1,0 +1,90 @@
+"""Contacts that stick, for the body of a run: on a body that repeats itself, or on one with nothing around its box.
+
+The solver of gaps needs the inverse of its operator. That of a free body has none on its box: there the operator B of a
+body that repeats itself takes its place, by the shortest way between two points (`HalfSpace.gap_operators`), and what
+it lacks is lagged: `h - (A - B) p` of the last pass are the heights of the next. Within half a box both are the same,
+so that one pass or two do as a rule.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...parallel.slab import Array
+from ..contact import Contact
+from ..problem import Approach, MeanPressure, Operator
+from ..workspace import Workspace
+from . import kernels
+from .solver import SHARPER, GapSolution, GapSolver, Law
+
+MAX_PASSES = 100  # accuracy: of a free body; one to three do as a rule, and many where it is about to snap
+LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
+
+
+@dataclass
+class StickingSolver:
+    """Solver of contacts that stick; `free` is the operator of a body with nothing around its box, else None."""
+
+    gaps: GapSolver
+    workspace: Workspace
+    free: Operator | None = None
+
+    def solve(
+        self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array, lag: Array | None, out: Array
+    ) -> tuple[Contact, bool]:
+        """Solve from a gap, in whose place the solution will be, and put the pressure into `out`; collective.
+
+        `lag` is `(A - B) p` of a free body, in whose place the new one will be. Returns the contact, and whether the
+        surface has come off.
+        """
+        if self.free is None or lag is None:
+            found = self.gaps.solve(law, heights, control, gap)
+            out[...] = found.p
+            return self._contact(found, heights, out, found.iterations), found.detached
+        iterations, passes, share, last = 0, 0, 1.0, lag
+        while True:
+            found = self.gaps.solve(law, heights - lag, control, gap)
+            iterations, passes = iterations + found.iterations, passes + 1
+            out[...] = found.p
+            change = self.free.apply(out, self.workspace.other_displacement)
+            change -= heights + gap
+            change -= lag + found.d
+            found, worst = self._judge(control, found, out, change)
+            share = self._share(share, out, change, last) if passes > 1 else 1.0
+            last = change.copy()
+            lag += share * change
+            if found.failure or found.detached or worst <= self.gaps.tolerance:
+                break
+            if passes == MAX_PASSES:
+                asked = f"{worst:.3g} where {self.gaps.tolerance:.3g} was asked for"
+                found = replace(found, failure=f"did not settle in {passes} passes of a free body: changes are {asked}")
+                break
+        return self._contact(found, heights, out, iterations), found.detached
+
+    def _judge(
+        self, control: Approach | MeanPressure, found: GapSolution, p: Array, change: Array
+    ) -> tuple[GapSolution, float]:
+        """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
+        approach; returns this number too; collective."""
+        certificate, slab = found.certificate, self.workspace.slab
+        load, sum_change = slab.sum(*kernels.weigh(p, change))
+        shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
+        (wrong,) = slab.sum(kernels.weigh_off(p, change, shift))
+        worst = SHARPER * wrong / load / certificate.length if load > 0.0 else 0.0
+        certificate = replace(certificate, complementarity=max(certificate.complementarity, worst))
+        return replace(found, certificate=certificate, d=found.d + shift), worst
+
+    def _share(self, share: float, p: Array, change: Array, last: Array) -> float:
+        """The share of a change to make, by Aitken's extrapolation of the last two, weighted by the pressure;
+        collective."""
+        weight, apart = np.abs(p), change - last
+        along, size = self.workspace.slab.sum(float((weight * last * apart).sum()), float((weight * apart**2).sum()))
+        wanted = -share * along / size if size > 0.0 else 1.0
+        return min(max(wanted, LEAST_SHARE), MOST_SHARE)
+
+    def _contact(self, found: GapSolution, heights: Array, p: Array, iterations: int) -> Contact:
+        """The solution as a contact, with the displacement `g + h + d` in the workspace."""
+        u = self.workspace.displacement
+        np.add(found.gap, heights, out=u)
+        u += found.d
+        return Contact(p, u, found.d, found.certificate, iterations, found.failure)
