@@ -13,14 +13,15 @@ from ..errors import InputError
 from . import ranks, values, verbs
 
 FIRST = """\
-a job is needed: a YAML file that says what is pressed on what. jobs/hertz.yaml is one to begin with.
+a job is needed: a YAML file that says what is pressed on what. From a clone, jobs/slide.yaml is one to begin with:
 
-  parcontact check job.yaml             list its mistakes, or all that it says with every default
-  parcontact plan job.yaml              say what it will do and cost
-  parcontact job.yaml                   run it, or go on with it (on two cores: mpirun -n 2 parcontact job.yaml)
-  parcontact plot out/job               draw what came out
+  parcontact check jobs/slide.yaml          list its mistakes, or all that it says with every default
+  mpirun -n 2 parcontact jobs/slide.yaml    run it on two cores, or go on with it
+  parcontact plot out/slide                 draw what came out, into out/slide/picture.png
+  parcontact report out/slide               write one HTML page of it, to send
+  parcontact manual start                   read how to write a job of your own in five minutes
 
-parcontact --help lists all verbs, parcontact VERB --help the options of one, parcontact manual the manual"""
+parcontact --help lists all verbs, parcontact VERB --help the options of one, parcontact manual all pages"""
 CODES = """\
 exit codes: 0 as asked; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
 checkpoint, run again"""

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import job as jobs
 from ..errors import InputError, RunError
-from ..job import Job, Topography
+from ..job import Job
 from ..job.sections.listing import plain
 from ..job.text import yamltext
 from ..storage import files
@@ -43,10 +43,11 @@ def start(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     """Write a job to start from to a file, or say it; maps of very many points are thinned out. Raises RunError."""
     directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
     found = _job_of(os.path.relpath(path, directory))
-    found["surface"] |= {key: value for key, value in plain(job.surface[0]).items() if _is_given(job.surface[0], key)}
+    found["surface"] |= {key: value for key, value in plain(job.surface[0]).items() if key != "path"}
+    found["surface"].setdefault("periodic", "smooth")
     coarser = math.ceil(math.sqrt(grid.nx * grid.ny / MANY_POINTS))
-    if coarser > 1:
-        found["grid"]["points"] = [grid.nx // coarser, grid.ny // coarser]
+    found["grid"] = {"points": [grid.nx // coarser, grid.ny // coarser], "size": list(grid.size)}
+    found["numerics"] = {"accuracy": job.numerics.accuracy}
     found["history"].append({"name": "slide", **LOAD, "velocity": 0.1, "distance": float(f"{grid.lx / 4:.3g}")})
     text = yamltext.dump(found)
     if target is None:
@@ -69,7 +70,3 @@ def _job_of(path: str) -> dict[str, Any]:
         "history": [{"name": "press", **LOAD, "duration": 1.0e-3}],
         "output": {"fields": ["pressure", "gap"], "every": 64},
     }
-
-
-def _is_given(part: Any, key: str) -> bool:
-    return key != "path" and getattr(part, key) != Topography.model_fields[key].default

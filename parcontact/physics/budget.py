@@ -265,9 +265,9 @@ class ErrorSums:
 
 
 def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
-    """Return what to change where more is wrong than `accuracy` allows; '' where it is not."""
+    """Return what to change where more is wrong than `accuracy` allows, or that it is not."""
     if not exceeds(parts.total, accuracy):
-        return ""
+        return f"; within the {100 * accuracy:g} % of numerics.accuracy"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
     remedy = SMALLER if worst in chosen else REMEDIES[worst]
     return f". numerics.accuracy asks for {100 * accuracy:g} %: try {remedy}"
