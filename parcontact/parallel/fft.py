@@ -12,7 +12,7 @@ its blocks of rows a transform holds one map, and on several ranks what it sends
 single precision rows of x-wavenumbers begin at cache lines, without which FFTW takes up to half as long again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -28,19 +28,6 @@ BLOCK_BYTES = 1 << 19  # tuning: of one block of transformed rows, or columns, a
 LINE = 8  # tuning: wavenumbers in single precision in a cache line
 NARROWEST = 16  # tuning: columns in a block, which takes more than that where columns are very long
 LEAST_BYTES = 4 << 20  # tuning: of a spectrum worth blocks of columns; a usual last-level cache keeps a smaller one
-SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
-
-
-def export_wisdom() -> bytes:
-    """Which transforms FFTW found the fastest in this process; another may choose others, whose last bits differ."""
-    return SEPARATOR.join(pyfftw.export_wisdom())
-
-
-def import_wisdom(wisdom: bytes) -> bool:
-    """From now on make the transforms of the process that exported this; False if that cannot be (another FFTW)."""
-    pyfftw.forget_wisdom()
-    precisions = tuple(wisdom.split(SEPARATOR))
-    return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))
 
 
 def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
@@ -133,7 +120,7 @@ class FFT:
 
     def forward(self, field: Array) -> Spectrum:
         """Spectrum `sum h exp(-i q x)` of a map; collective. It is this object's buffer: valid until the next call."""
-        self._along_x(field)
+        self.along_x(field)
         for columns in self.column_blocks:
             self._along_y(self._y_forward, columns)
         return self.spectrum
@@ -144,7 +131,7 @@ class FFT:
             self.spectrum[...] = spectrum
         for columns in self.column_blocks:
             self._along_y(self._y_backward, columns)
-        return self._back_along_x(out, 1.0 / (self.mx * self.my))
+        return self.back_along_x(out, 1.0 / (self.mx * self.my))
 
     def convolve(self, field: Array, symbols: Sequence[NDArray[np.inexact]], out: Array) -> Array:
         """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective.
@@ -152,11 +139,11 @@ class FFT:
         There is a part of it for each of the `column_blocks`, in one piece each, or else its rows would be fetched from
         all over memory. One that is even in q_y may have only the rows of q_y >= 0, the first `my // 2 + 1`.
         """
-        self._along_x(field)
+        self.along_x(field)
         for columns, symbol in zip(self.column_blocks, symbols, strict=True):
             _multiply(self._along_y(self._y_forward, columns), symbol)
             self._along_y(self._y_backward, columns)
-        return self._back_along_x(out, 1.0)
+        return self.back_along_x(out, 1.0)
 
     def _along_y(self, transforms: dict[int, pyfftw.FFTW], columns: slice) -> Spectrum:
         """Transform a block of columns in its place."""
@@ -168,32 +155,42 @@ class FFT:
 
     # -- the pass along x ---------------------------------------------------------------------------------------------
 
-    def _along_x(self, field: Array) -> None:
+    def along_x(self, field: Array, transform: Callable[[Array, Spectrum], None] | None = None) -> None:
+        """From rows to columns of the spectrum; another `transform` of blocks of rows may take them; collective."""
         self._count()
+        transform = transform or self._transform_rows
         for leg, blocks in self._legs:
             for rows in blocks:
                 waves = self._waves(rows)
-                self._transform_rows(field[rows], waves)
+                transform(field[rows], waves)
                 if leg:
                     leg.post(rows, waves)
             if leg:
                 leg.to_columns()
-        for height, transform in self._x_forward.items():
-            transform.update_arrays(self._row_block[:height], self._waves(slice(0, height)))  # lets go of the map
+        for height, plan in self._x_forward.items():
+            plan.update_arrays(self.row_block[:height], self._waves(slice(0, height)))  # lets go of the map
         self.spectrum[self.slab.ny :] = 0.0
 
     def _transform_rows(self, source: Array, waves: Spectrum) -> None:
-        transform = self._x_forward[len(waves)]
-        if not self._direct(source, transform.input_alignment):
-            block = self._row_block[: len(waves)]
+        if not self._direct(source, self._x_forward[len(waves)].input_alignment):
+            block = self.row_block[: len(waves)]
             block[:, : self.slab.nx] = source
             block[:, self.slab.nx :] = 0.0
             source = block
-        transform.update_arrays(source, waves)
-        transform.execute()
+        self.execute_rows(source, waves)
 
-    def _back_along_x(self, out: Array, scale: float) -> Array:
+    def execute_rows(self, rows: Array, waves: Spectrum) -> None:
+        """Transform rows that it can take as they are, such as those of the `row_block`."""
+        plan = self._x_forward[len(waves)]
+        plan.update_arrays(rows, waves)
+        plan.execute()
+
+    def back_along_x(
+        self, out: Array, scale: float, transform: Callable[[Spectrum, Array], None] | None = None
+    ) -> Array:
+        """The reverse of `along_x`, with a factor; collective."""
         self._count()
+        transform = transform or self._transform_waves
         for leg, blocks in self._legs:
             if leg:
                 leg.to_rows()
@@ -203,19 +200,23 @@ class FFT:
                     leg.collect(rows, waves)
                 if scale != 1.0:
                     np.multiply(waves, scale, out=waves)
-                self._transform_waves(waves, out[rows])
-        for height, transform in self._x_backward.items():
-            transform.update_arrays(self._waves(slice(0, height)), self._row_block[:height])
+                transform(waves, out[rows])
+        for height, plan in self._x_backward.items():
+            plan.update_arrays(self._waves(slice(0, height)), self.row_block[:height])
         return out
 
     def _transform_waves(self, waves: Spectrum, target: Array) -> None:
-        transform = self._x_backward[len(waves)]
-        direct = self._direct(target, transform.output_alignment)
-        result = target if direct else self._row_block[: len(waves)]
-        transform.update_arrays(waves, result)
-        transform.execute()
+        direct = self._direct(target, self._x_backward[len(waves)].output_alignment)
+        result = target if direct else self.row_block[: len(waves)]
+        self.execute_waves(waves, result)
         if not direct:
             target[...] = result[:, : self.slab.nx]
+
+    def execute_waves(self, waves: Spectrum, rows: Array) -> None:
+        """The reverse of `execute_rows`; the waves are lost."""
+        plan = self._x_backward[len(waves)]
+        plan.update_arrays(waves, rows)
+        plan.execute()
 
     def _waves(self, rows: slice) -> Spectrum:
         """Where the transform along x of these rows is: on one rank at once in its place."""
@@ -250,7 +251,7 @@ class FFT:
             legs_of(part.stop - part.start, height, count) for part, height in zip(slab.dealt, heights, strict=True)
         ]
         own, height, waves = legs[slab.comm.rank], heights[slab.comm.rank], self.mx // 2 + 1
-        self._row_block = allocate((height, self.mx), self.dtype, slab.tally)
+        self.row_block = allocate((height, self.mx), self.dtype, slab.tally)
         block = (height if ranks > 1 else 0, _pitch(waves, self.complex.itemsize))
         self._wave_block = allocate(block, self.complex, slab.tally)[:, :waves]
         wire = allocate((wire_points(own, waves - self.shape[1]),), self.complex, slab.tally)
@@ -267,17 +268,13 @@ class FFT:
     def _make_transforms(self) -> None:
         heights = {rows.stop - rows.start for _, blocks in self._legs for rows in blocks}
         waves = {height: self._waves(slice(0, height)) for height in heights}
-        self._x_forward = {
-            height: self._transform(self._row_block[:height], waves[height], axis=1) for height in heights
-        }
-        self._x_backward = {
-            height: self._transform(waves[height], self._row_block[:height], axis=1) for height in heights
-        }
+        self._x_forward = {height: self.plan(self.row_block[:height], waves[height], axis=1) for height in heights}
+        self._x_backward = {height: self.plan(waves[height], self.row_block[:height], axis=1) for height in heights}
         blocks = {part.shape[1]: part for part in (self.spectrum[:, columns] for columns in self.column_blocks[::-1])}
-        self._y_forward = {width: self._transform(part, part, axis=0) for width, part in blocks.items()}
-        self._y_backward = {width: self._transform(part, part, axis=0, backward=True) for width, part in blocks.items()}
+        self._y_forward = {width: self.plan(part, part, axis=0) for width, part in blocks.items()}
+        self._y_backward = {width: self.plan(part, part, axis=0, backward=True) for width, part in blocks.items()}
 
-    def _transform(
+    def plan(
         self, source: NDArray[np.inexact], target: NDArray[np.inexact], axis: int, backward: bool = False
     ) -> pyfftw.FFTW:
         backward = backward or np.isrealobj(target)

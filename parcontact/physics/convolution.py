@@ -1,10 +1,12 @@
 """Convolutions on a grid: a symbol on the wavenumbers of a transform, given as such or by coefficients in space."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..parallel.cosines import Cosines
 from ..parallel.fft import FFT
 from ..parallel.fftw import pyfftw
 from ..parallel.slab import Array, deal
@@ -25,15 +27,7 @@ class Convolution:
         self, fft: FFT, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, even: bool = True
     ) -> None:
         self.fft, self.even = fft, even
-        count, scale = fft.my // 2 + 1 if even else fft.my, 1.0 / (fft.mx * fft.my)
-        widths = [columns.stop - columns.start for columns in fft.column_blocks]
-        self.symbols: list[NDArray[np.inexact]] = [np.empty((count, width), dtype) for width in widths]
-        for symbol in self.symbols:
-            fft.slab.tally.hold(symbol)
-        for rows in deal(count, PARTS):
-            values = part(rows)
-            for columns, symbol in zip(fft.column_blocks, self.symbols, strict=True):
-                np.multiply(values[:, columns], scale, out=symbol[rows], casting="same_kind")
+        self.symbols = _in_blocks(fft, part, dtype, fft.my // 2 + 1 if even else fft.my)
 
     @staticmethod
     def footprint(spectrum: int, my: int, even: bool = True, is_complex: bool = False) -> int:
@@ -73,6 +67,42 @@ class Convolution:
                 power = (waves.real**2 + waves.imag**2) * symbol[places].imag
                 total += float((power * along[:, columns]).sum(dtype=np.float64))
         return self.fft.slab.sum(total)[0]
+
+
+class MirroredConvolution:
+    """A linear operator on maps as they go on mirrored at their edges, by its real symbol on `cosines`.
+
+    `part(rows)` is that of the real parts of the spectrum, as its real part, and of the imaginary ones.
+    """
+
+    def __init__(self, cosines: Cosines, part: Callable[[slice], NDArray[np.complexfloating]]) -> None:
+        self.fft = cosines
+        self.symbols = _in_blocks(cosines, part, cosines.fft.complex, cosines.my)
+
+    @staticmethod
+    def footprint(spectrum: int, my: int, itemsize: int) -> int:
+        """Bytes that it holds beside a transform whose spectrum has so many in `my` rows, for maps of that item."""
+        return spectrum + Cosines.footprint(my, itemsize)
+
+    def apply(self, field: Array, out: Array) -> Array:
+        """Collective."""
+        self.fft.slab.tally["operator"] += 1
+        return self.fft.convolve(field, self.symbols, out)
+
+
+def _in_blocks(
+    fft: FFT | Cosines, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, count: int
+) -> list[NDArray[Any]]:
+    """The first `count` rows of a symbol, times the scale of the transforms, for each block of columns."""
+    widths = [columns.stop - columns.start for columns in fft.column_blocks]
+    symbols: list[NDArray[Any]] = [np.empty((count, width), dtype) for width in widths]
+    for symbol in symbols:
+        fft.slab.tally.hold(symbol)
+    for rows in deal(count, PARTS):
+        values = part(rows)
+        for columns, symbol in zip(fft.column_blocks, symbols, strict=True):
+            np.multiply(values[:, columns], 1.0 / (fft.mx * fft.my), out=symbol[rows], casting="same_kind")
+    return symbols
 
 
 def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:

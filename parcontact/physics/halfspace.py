@@ -27,9 +27,18 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..errors import InputError
+from ..parallel.cosines import Cosines
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
-from .convolution import ALL, Convolution, padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
+from .convolution import (
+    ALL,
+    Convolution,
+    MirroredConvolution,
+    padded_lengths,
+    tabulate,
+    travelling_wavenumbers,
+    wavenumbers,
+)
 from .layer import Layer
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
@@ -37,6 +46,7 @@ from .wake import wake
 
 Vector = tuple[float, float]
 LEAST_SYMBOL = 1e-6  # accuracy: of that of a half space, where a table has less
+UNIFORM = 2.113  # tuning: wavenumber, times the side of a square, whose waves are as stiff as the square is on average
 
 
 @dataclass(frozen=True)
@@ -88,6 +98,19 @@ class HalfSpace:
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
+        return self._stiffness(q)
+
+    def _mirrored_inverse_symbol(self, cosines: Cosines, rows: slice) -> Spectrum:
+        """Pressure over displacement of each half wave of a box with nothing around, `(|q| + UNIFORM/L)/(1 - nu)`:
+        right for a uniform pressure on a square, which moves it by `(1 - nu) L/UNIFORM` in the mean."""
+        symbol = np.empty((len(range(cosines.my)[rows]), cosines.fft.shape[1]), np.complex128)
+        for (along_x, along_y), place in zip(cosines.modes, (symbol.real, symbol.imag), strict=True):
+            q = np.pi * np.hypot(along_x / self.size[0], along_y[rows] / self.size[1])
+            place[...] = self._stiffness(q + UNIFORM / max(self.size))
+        return symbol
+
+    def _stiffness(self, q: Array) -> Array:
+        """Pressure over displacement of waves."""
         symbol = np.asarray(q / (1.0 - self.poisson))
         if self.layer is not None:
             softest, stiffness = self.layer.softest_wave
@@ -120,9 +143,13 @@ class HalfSpace:
         of_half_space = love(x, y, dx, dy, self.poisson)
         return of_half_space if self.layer is None else self.layer.coefficients(x, y, dx, dy, of_half_space)
 
-    def inverse(self, fft: FFT) -> Convolution:
+    def inverse(self, fft: FFT) -> Convolution | MirroredConvolution:
         """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
-        (a layer included) a preconditioner."""
+        (a layer included) a preconditioner. That of a box with nothing around takes displacements to go on mirrored at
+        its edges: so they have no jump there, as they would have if the box were repeated."""
+        if self.free:
+            cosines = Cosines(fft)
+            return MirroredConvolution(cosines, partial(self._mirrored_inverse_symbol, cosines))
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     # -- of contacts that stick -------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
 from ..parallel.slab import deal, dealt_to
 from ..physics.body import ElasticBody, ZenerBody
-from ..physics.convolution import Convolution
+from ..physics.convolution import Convolution, MirroredConvolution
 from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
@@ -46,25 +46,25 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
     """Bytes of all maps and transform buffers of a rank in a run of a job, by their purpose; by default no rank has
     more: the last has the most of all but the surface's waves."""
     part, chosen, grid = _Part(job, ranks, rank), choices(job), job.grid
-    spectrum, _ = part.transform(grid.points)
-    symbol, kept = Convolution.footprint(spectrum, grid.ny), chosen.operator_type
+    whole, _ = part.transform(grid.points)
+    kept = chosen.operator_type
     found = {"transforms": sum(part.transform(grid.points))}
     if lengths := part.own_lengths:
         spectrum, blocks = part.transform(lengths, kept)
         found["padded transforms and operator"] = spectrum + blocks + Convolution.footprint(spectrum, lengths[1])
     else:
-        found["operator"] = symbol * np.dtype(kept).itemsize // 8
+        found["operator"] = Convolution.footprint(whole, grid.ny) * np.dtype(kept).itemsize // 8
     if chosen.mixed_precision.on:
         single, _ = part.transform(grid.points, np.float32)
         blocks = part.transform(grid.points, np.float32, shared=True)[1]
-        found["single transforms and preconditioner"] = blocks + Convolution.footprint(single, grid.ny)
+        found["single transforms and preconditioner"] = blocks + part.preconditioner(single, 4)
     else:
-        found["preconditioner"] = symbol
+        found["preconditioner"] = part.preconditioner(whole, 8)
     reach = math.inf if job.body is None else job.body.thickness
     tolerance, grids = job.numerics.tolerance, grids_for(grid.dx, grid.dy, reach)
     found["solver"] = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept)
     if chosen.adhesion is not None:
-        found["adhesion"] = 2 * symbol + GapSolver.footprint(part.cells(grid.points))
+        found["adhesion"] = 2 * Convolution.footprint(whole, grid.ny) + GapSolver.footprint(part.cells(grid.points))
     if chosen.spectrum.on:
         found["surface spectrum"] = part.surface_waves
     for what, count, dtype in _maps(job):
@@ -157,6 +157,12 @@ class _Part:
     def own_lengths(self) -> Points | None:
         """Lengths of the operator's own transforms; None if it takes those of the grid."""
         return HalfSpace(self.job.grid.size, free=choices(self.job).isolated.on).own_lengths(self.job.grid.points)
+
+    def preconditioner(self, spectrum: int, itemsize: int) -> int:
+        """Bytes of the inverse of the half space beside a transform of maps of such items."""
+        if choices(self.job).isolated.on:
+            return MirroredConvolution.footprint(spectrum, self.job.grid.ny, itemsize)
+        return Convolution.footprint(spectrum, self.job.grid.ny)
 
     @property
     def surface_waves(self) -> int:

@@ -224,7 +224,8 @@ def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) ->
     body, slab = setup.half_space, setup.slab
     grids = grids_for(body.size[0] / slab.nx, body.size[1] / slab.ny, body.reach)
     workspace = Workspace(setup.slab, tolerance, operator_type)
-    return ContactSolver(workspace, height, tolerance, limit, grids), operators
+    free = setup.choices.isolated.on
+    return ContactSolver(workspace, height, tolerance, limit, grids, free), operators
 
 
 def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:

@@ -22,8 +22,9 @@ on the working set and put 0 elsewhere, `C` = subtract the mean over it:
 
 The exact step would be `<r, t>/<t, A t>`, for one more application of the operator in each iteration. It is 0.95 within
 0.03 at 0.4 to 60 % of contact, where K E is nearly the inverse, and 1 in full contact. Afterwards `A p` is known anyway
-and `<t, A t>` with it: if the step differs from the exact one by more than a quarter, or steps do not help, the rest of
-the solve makes exact ones. On lines of points, and with cells much longer than wide, all are exact.
+and `<t, A t>` with it: if the step differs from the exact one by more than a quarter (in a box with nothing around, by
+a factor of two), or steps do not help, the rest of the solve makes exact ones. On lines of points, and with cells much
+longer than wide, all are exact.
 
 With d given there is neither centring nor scaling. With P0 given, d is the mean of `A p - h` over free points, weighted
 by p, so that `<p, g> = 0`: scaling p then does not change f to first order, and cutting t off at a bound, which a small
@@ -51,6 +52,7 @@ MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after whi
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
 STEP = 0.95  # beside edges of contact, and 1 far from them
 MAX_STEP_RATIO = 1.25  # of the exact step over the one made, or its inverse: beyond it, steps are exact from then on
+MAX_STEP_RATIO_FREE = 2.0  # the same in a box with nothing around, where K is less near to the inverse at its edges
 ITERATIONS_UNTIL_EXACT_STEPS = 5  # without a better certificate
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at the bounds, the next one takes no notice of its direction
@@ -85,16 +87,23 @@ class ContactSolver:
 
     Parameters: the `workspace` that it works in; `height` of the surface from its lowest to its highest point, in the
     unit of h; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells by which a residual is extended
-    (`extension.grids_for`).
+    (`extension.grids_for`); whether the box is `free`, with nothing around.
     """
 
     def __init__(
-        self, workspace: Workspace, height: float, tolerance: float, max_iterations: int, grids: int | None = None
+        self,
+        workspace: Workspace,
+        height: float,
+        tolerance: float,
+        max_iterations: int,
+        grids: int | None = None,
+        free: bool = False,
     ) -> None:
         self.workspace, self.slab = workspace, workspace.slab
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
         self._extended = ExtendedPreconditioner(self.slab, most=grids)
         self._rough_inverse = grids == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is only roughly the inverse
+        self._most_ratio = MAX_STEP_RATIO_FREE if free else MAX_STEP_RATIO
         self._local_load = LocalLoad(self.slab)
 
     @staticmethod
@@ -135,7 +144,7 @@ class ContactSolver:
                 return Contact(start, self.workspace.displacement, iterate.d, certificate, iteration, failure)
             level = iterate.d + (excess / members if mean is not None else 0.0)
             slope, ratio = self._turn(problem, level, slope, members, other)
-            unlike = not 1.0 / MAX_STEP_RATIO < ratio < MAX_STEP_RATIO
+            unlike = not 1.0 / self._most_ratio < ratio < self._most_ratio
             exact |= unlike or iteration - best[1] > ITERATIONS_UNTIL_EXACT_STEPS
             usual = None if exact else STEP + (1.0 - STEP) * (members / self.slab.points) ** 3
             iterate, cut = self._descend(problem, p, iterate, usual, length * slope, other)

@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import private
-from ..parallel import fft
-from ..parallel.fft import export_wisdom, import_wisdom
-from ..parallel.fftw import pyfftw
+from ..parallel import cosines, fft
+from ..parallel.fftw import export_wisdom, import_wisdom, pyfftw
 from ..parallel.slab import Slab
 from . import files
 from .header import processor
@@ -69,7 +68,8 @@ def _adopt(data: bytes, slab: Slab) -> bool:
 def _place(transforms: Sequence[Any], slab: Slab) -> Path | None:
     """Return the file for all runs on this kind of machine whose transforms are the same, if there is a safe place."""
     directory = private.directory("plans")
-    facts = [platform.machine(), processor(), pyfftw.fftw_version, zlib.crc32(Path(fft.__file__).read_bytes())]
+    made_by = b"".join(Path(path).read_bytes() for path in (fft.__file__, cosines.__file__))
+    facts = [platform.machine(), processor(), pyfftw.fftw_version, zlib.crc32(made_by)]
     facts += [slab.comm.size, *transforms]
     name = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
     return directory / name if directory else None

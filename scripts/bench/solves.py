@@ -11,8 +11,8 @@ from functools import partial
 import numpy as np
 from mpi4py import MPI
 
-from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
-from parcontact.parallel.fftw import pyfftw
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.fftw import export_wisdom, import_wisdom, pyfftw
 from parcontact.parallel.slab import Slab
 
 from .peers import ASPHER_COLD, TAMAAS_COLD, Task, compare_peers

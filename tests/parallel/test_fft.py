@@ -18,7 +18,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from parcontact.parallel import fft as transforms
 from parcontact.parallel import transpose
-from parcontact.parallel.fft import FFT, export_wisdom, import_wisdom
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.fftw import export_wisdom, import_wisdom
 from parcontact.parallel.slab import Slab
 
 pytestmark = pytest.mark.mpi

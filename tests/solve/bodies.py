@@ -40,7 +40,8 @@ def solver(
     half_space = HalfSpace(size, poisson, "love" if kernel == "love" else "spectral", boundary == "free")
     height = float(np.ptp(heights)) or size[0] / nx
     operator, inverse = half_space.operator(fft), half_space.inverse(fft)
-    return Bench(ContactSolver(Workspace(slab, tolerance), height, tolerance, max_iterations), operator, inverse)
+    workspace, free = Workspace(slab, tolerance), boundary == "free"
+    return Bench(ContactSolver(workspace, height, tolerance, max_iterations, free=free), operator, inverse)
 
 
 @dataclass

@@ -1,0 +1,147 @@
+"""Products of a symbol with the cosine series of a map: a convolution of the map as it goes on mirrored at its edges.
+
+The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of the map's own
+size along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27): with the even points
+first and the odd ones backwards after them, and V the transform of these n points,
+
+    C(k) = exp(-i theta) V(k) + exp(i theta) V(n - k),        theta = pi k/(2 n),
+    V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
+
+Of a row, whose points are real, that is `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has each wave k
+as its real part, and n - k as its imaginary one. So messages, blocks and memory are those of the transform.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import loop
+from .fft import FFT, NARROWEST, Spectrum
+from .slab import Array, allocate
+
+Waves = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+class Cosines:
+    """The series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum; beside
+    that it holds a narrow block of columns. Making and calling one are collective."""
+
+    def __init__(self, fft: FFT) -> None:
+        self.fft, self.slab, self.mx, self.my = fft, fft.slab, fft.mx, fft.my
+        count = fft.shape[1]
+        self.column_blocks = [slice(k, min(k + NARROWEST, count)) for k in range(0, count, NARROWEST)]
+        self._block = allocate((self.my, NARROWEST), fft.complex, self.slab.tally)
+        self._block.fill(0.0)
+        self._forward, self._backward = (fft.plan(self._block, self._block, 0, backward) for backward in (False, True))
+        self._turn_x, self._turn_y = (
+            np.exp(-0.5j * np.pi * np.arange(n) / length).astype(fft.complex)
+            for n, length in ((self.mx // 2 + 1, self.mx), (self.my, self.my))
+        )
+
+    @staticmethod
+    def footprint(my: int, itemsize: int) -> int:
+        """Bytes that it holds beside the transform, for numbers of so many bytes."""
+        return 2 * itemsize * my * NARROWEST
+
+    @property
+    def modes(self) -> tuple[Waves, Waves]:
+        """Half waves along x and y of the real parts of a spectrum, and of the imaginary ones."""
+        columns, along_y = self.fft.columns, np.arange(self.my)[:, None]
+        along_x = np.arange(columns.start, columns.stop)[None, :]
+        return (along_x, along_y), (self.mx - along_x, along_y)
+
+    def convolve(self, field: Array, symbols: list[NDArray[np.complexfloating]], out: Array) -> Array:
+        """`out = (nx ny) series^-1(symbol * series(field))`; collective.
+
+        Each of the `column_blocks` has its part of the symbol: factors of real parts of the spectrum are its real part,
+        those of imaginary ones its imaginary part.
+        """
+        self.fft.along_x(field, self._transform_rows)
+        for columns, symbol in zip(self.column_blocks, symbols, strict=True):
+            part = self.fft.spectrum[:, columns]
+            _fold_columns(part, self._block)
+            self._forward.execute()
+            _weigh(self._block, self._turn_y, symbol)
+            self._backward.execute()
+            _unfold_columns(self._block, part)
+        return self.fft.back_along_x(out, 1.0, self._transform_waves)
+
+    def _transform_rows(self, source: Array, waves: Spectrum) -> None:
+        block = self.fft.row_block[: len(waves)]
+        _fold_rows(source, block)
+        self.fft.execute_rows(block, waves)
+        _turn(waves, 2.0 * self._turn_x)
+
+    def _transform_waves(self, waves: Spectrum, target: Array) -> None:
+        block = self.fft.row_block[: len(waves)]
+        _turn(waves, 0.5 * self._turn_x.conj())
+        self.fft.execute_waves(waves, block)
+        _unfold_rows(block, target)
+
+
+@loop
+def _fold_rows(rows: NDArray[np.floating], folded: NDArray[np.floating]) -> None:
+    """Even points first, then the odd ones backwards."""
+    count = rows.shape[1]
+    for j in range(rows.shape[0]):
+        for i in range((count + 1) // 2):
+            folded[j, i] = rows[j, 2 * i]
+        for i in range(count // 2):
+            folded[j, count - 1 - i] = rows[j, 2 * i + 1]
+
+
+@loop
+def _unfold_rows(folded: NDArray[np.floating], rows: NDArray[np.floating]) -> None:
+    count = rows.shape[1]
+    for j in range(rows.shape[0]):
+        for i in range((count + 1) // 2):
+            rows[j, 2 * i] = folded[j, i]
+        for i in range(count // 2):
+            rows[j, 2 * i + 1] = folded[j, count - 1 - i]
+
+
+@loop
+def _fold_columns(columns: NDArray[np.complexfloating], folded: NDArray[np.complexfloating]) -> None:
+    """The same along y, into the first columns of a block."""
+    count = columns.shape[0]
+    for j in range(count):
+        place = j // 2 if j % 2 == 0 else count - 1 - j // 2
+        for i in range(columns.shape[1]):
+            folded[place, i] = columns[j, i]
+
+
+@loop
+def _unfold_columns(folded: NDArray[np.complexfloating], columns: NDArray[np.complexfloating]) -> None:
+    count = columns.shape[0]
+    for j in range(count):
+        place = j // 2 if j % 2 == 0 else count - 1 - j // 2
+        for i in range(columns.shape[1]):
+            columns[j, i] = folded[place, i]
+
+
+@loop
+def _turn(waves: NDArray[np.complexfloating], factors: NDArray[np.complexfloating]) -> None:
+    for j in range(waves.shape[0]):
+        for k in range(waves.shape[1]):
+            waves[j, k] *= factors[k]
+
+
+@loop
+def _weigh(
+    block: NDArray[np.complexfloating], turn: NDArray[np.complexfloating], symbol: NDArray[np.complexfloating]
+) -> None:
+    """From transforms along y to series, times the symbol, and back: waves l and my - l make each other."""
+    count, half = block.shape[0], block.dtype.type(0.5)
+    for low in range(count // 2 + 1):
+        high = (count - low) % count
+        for k in range(symbol.shape[1]):
+            v, w = turn[low] * block[low, k], np.conj(turn[low]) * block[high, k]
+            c = v + w
+            a = symbol[low, k].real * c.real + 1j * (symbol[low, k].imag * c.imag)
+            if high == 0:
+                block[low, k] = half * a
+                continue
+            c = 1j * (v - w)  # of my - low
+            b = symbol[high, k].real * c.real + 1j * (symbol[high, k].imag * c.imag)
+            block[low, k] = half * np.conj(turn[low]) * (a - 1j * b)
+            if high != low:
+                block[high, k] = half * np.conj(turn[high]) * (b - 1j * a)
