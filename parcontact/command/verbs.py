@@ -63,6 +63,8 @@ def check(options: argparse.Namespace) -> int:
     print(jobs.describe(job))
     if job.included:
         print(f"\n{job.included}")
+    if job.origin.mesh:
+        print(f"\n{job.origin.mesh}")
     if steps := describe_steps(job):
         print(f"\nstages that choose their time steps: {steps}")
     doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]

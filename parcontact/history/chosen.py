@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, NamedTuple, Protocol
 
-from ..job.checks.limits import one_cell
+from ..job.checks.cells import one_cell
 from ..job.sections.calculation import Grid, Numerics
 from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
 from ..job.sections.stages import Initial, Stage
@@ -212,4 +212,4 @@ def describe_steps(job: Planned) -> str:
     cells = most_cells(job.grid, job.surface)
     slides = any(stage.chooses and stage.speed for stage in job.history)
     limits = f", and are at most {cells} cell{'s' * (cells > 1)} long" * slides
-    return f"{names}: steps follow their error, for numerics.accuracy {job.numerics.accuracy:g}{limits}"
+    return f"{names}: steps follow their error, for numerics.accuracy {job.numerics.asked.of_steps:g}{limits}"

@@ -30,7 +30,7 @@ def take_grid(source: Source, origin: Origin) -> None:
     if not isinstance(grid, dict) or not wanted:
         return
     try:
-        points, size = _extent(source.data.get("surface"), None if "size" in wanted else grid.get("size"), origin)
+        points, size = extent_of(source.data.get("surface"), None if "size" in wanted else grid.get("size"), origin)
         if size is None and "size" in wanted:
             raise InputError("a measured map is needed; an array has points, but no size")
         found = {"points": points, "size": size}
@@ -44,8 +44,8 @@ def take_grid(source: Source, origin: Origin) -> None:
         grid.update(dict.fromkeys(wanted, UNREADABLE))
 
 
-def _extent(surface: Any, box: Any, origin: Origin) -> Extent:
-    """Points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
+def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
+    """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
     InputError."""
     shapes = surface if isinstance(surface, list) else [surface]
     arrays = [shape for shape in (_heights(shape) for shape in shapes) if is_array(shape)]

@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
 from . import added_sections
-from .checks import advice, limits, meaning, size
+from .checks import advice, cells, limits, meaning, size
 from .sections import height_arrays, listing
 from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
@@ -71,10 +71,7 @@ class Job(Part):
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Number unnamed stages, choose the kernel by the boundary, and name the output after the job file."""
-        if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
-            data["surface"] = height_arrays.with_shapes(data["surface"])
-        if isinstance(data.get("history"), list):
-            data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
+        data = prepared(data)
         free = isinstance(data.get("grid"), dict) and data["grid"].get("boundary") == "free"
         _default(data, "numerics", "kernel", "love" if free else "spectral")
         _default(data, "output", "directory", str(Path("out", context.path.stem if context else "job")))
@@ -139,10 +136,15 @@ class Job(Part):
         scene = self.grid, self.surface, material, self.history
         return (
             *(self.material.doubts if isinstance(self.material, Dma) else ()),
-            *advice.resolution(*scene, self.numerics),
+            *advice.resolution(*scene, self.numerics, self.directions),
             *meaning.warnings(*scene, self.initial, self.steady),
             *size.warnings(self.grid, limits.count_steps(self.grid, self.history), self.output),
         )
+
+    @property
+    def directions(self) -> list[tuple[float, float]]:
+        """The directions (unit vectors) in which the surface slides, each once, but for their signs."""
+        return cells.directions_of(self.history, self.initial, self.steady)
 
     @property
     def measured(self) -> bool:
@@ -192,6 +194,16 @@ def __getattr__(name: str) -> Any:
     if head == "Job" and sections:
         return extended(tuple(sections))
     raise AttributeError(name)
+
+
+def prepared(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the sections of a job with a list of shapes, and with names of all stages."""
+    data = dict(data)
+    if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
+        data["surface"] = height_arrays.with_shapes(data["surface"])
+    if isinstance(data.get("history"), list):
+        data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
+    return data
 
 
 def _named(stage: Any, index: int) -> Any:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from ..errors import InputError, JobError
+from .chosen_mesh import choose_points
 from .measured import take_grid
 from .model import Job
 from .sections.part import Origin
@@ -109,6 +110,7 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
     texts = from_python or isinstance(overrides, Mapping)
     origin = Origin(path.absolute(), included, not from_python, texts, names_directory)
     take_grid(source, origin)
+    origin = choose_points(source, origin)
     try:
         job = Job.model_validate(source.data, context=origin)
     except ValidationError as error:

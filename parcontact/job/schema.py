@@ -14,7 +14,7 @@ from pydantic_core.core_schema import BeforeValidatorFunctionSchema, ComputedFie
 from . import added_sections
 from .model import extended
 from .sections.materials import Dma, Elastic, Zener
-from .sections.quantities import FROM_SURFACE, along_x, both, listed
+from .sections.quantities import AUTO_POINTS, FROM_SURFACE, along_x, both, listed
 from .sections.stages import numbers
 
 Schema = dict[str, Any]
@@ -37,7 +37,8 @@ class SchemaOfKeys(GenerateJsonSchema):
             return found
         array = next(one for one in found.get("anyOf", [found]) if one.get("type") == "array")
         one_value = array["items"] if "items" in array else array["prefixItems"][0]
-        ranges = [RANGE] if function is numbers else [{"const": FROM_SURFACE}] if function is both else []
+        words = [FROM_SURFACE, *([AUTO_POINTS] if one_value.get("type") == "integer" else [])]
+        ranges = [RANGE] if function is numbers else [{"enum": words}] if function is both else []
         return {"anyOf": [one_value, array, *ranges]}
 
 

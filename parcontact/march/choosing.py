@@ -24,7 +24,7 @@ from functools import partial
 
 from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step
-from ..job.checks.limits import one_cell
+from ..job.checks.cells import one_cell
 from ..physics.time_error import TIME_ORDER
 from ..scene import Scene
 
@@ -80,7 +80,7 @@ class StepChooser:
         """
         numerics = self.scene.choices.numerics
         order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
-        ratio = error / (TIME_SHARE * numerics.accuracy)
+        ratio = error / (TIME_SHARE * numerics.asked.of_steps)
         wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
         if ratio > REJECTED:
             share = max((REJECTED / ratio) ** (1.0 / order), MOST_SHRINK)

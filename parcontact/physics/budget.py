@@ -243,20 +243,20 @@ class ErrorSums:
         weight, *sums = self.sums[index].tolist()
         return Parts(*(value / weight for value in sums)) if weight > 0.0 else None
 
-    def facts(self, accuracy: float) -> dict[str, Any]:
+    def facts(self, accuracy: Any) -> dict[str, Any]:
         """Return as plain data the accuracy that was asked for, and the relative errors by part, and in all."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: asdict(each) | {"total": each.total} for name, each in found.items() if each is not None}
         return {"accuracy": accuracy, **parts}
 
-    def lines(self, accuracy: float, chosen: Collection[str] = ()) -> list[str]:
-        """Sentences for run.log, with what to change where more is wrong than `accuracy` allows; it has `chosen` the
-        settings behind these parts."""
-        found = (("friction", self.friction), ("contact area, corrected", self.area))
+    def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
+        """Sentences for run.log, with what to change where friction or the area is more wrong than `asked` for; the
+        accuracy has `chosen` the settings behind these parts."""
+        found = zip(("friction", "contact area, corrected"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
             f"estimated error of {name}: {describe(parts)}, mean over {way}{advice(parts, accuracy, chosen)}"
-            for name, parts in found
+            for name, parts, accuracy in found
             if parts is not None
         ]
         if self.friction is not None and self.friction.total >= 1.0:

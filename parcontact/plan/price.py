@@ -16,12 +16,12 @@ from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
-from scipy.fft import next_fast_len
 
 from ..history.chosen import ChosenEnds
 from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
-from ..job.checks.advice import STEPS_PER_WAVE, cells_per_wave
+from ..job.checks.advice import STEPS_PER_WAVE
+from ..job.checks.cells import cells_per_wave, fast_length
 from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.sections.listing import plain
 from ..physics.budget import SPOTS_ORDER, per_cent
@@ -37,7 +37,6 @@ EDGE_ORDER = 1.0  # of the cell, in which the error of the contact area falls
 CALLS_PER_DECADE = 1.5  # for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
 LONGER, COARSER, FINER = 4.0, 8.0, 16.0  # times the own steps, and the own cells, at most: no trial tells of more
-MULTIPLE = 16  # of which points along a side are, so that there are coarser grids to start from
 SAME = 1e-9  # relative: numbers this close are the same
 
 
@@ -86,11 +85,6 @@ def shortest_wave(job: Job) -> float | None:
     return min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None)
 
 
-def fast_length(least: float) -> int:
-    """Return the next multiple of MULTIPLE that transforms like."""
-    return int(MULTIPLE * next_fast_len(max(1, math.ceil(least / MULTIPLE * (1.0 - SAME))), real=True))
-
-
 def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
     """The job with the numerics of an accuracy; on its own mesh if its surface cannot be put on another."""
     data: dict[str, Any] = plain(job)
@@ -115,7 +109,7 @@ def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
     stages = []
     for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), Timeline.of(own).spans, strict=True):
         share = CHOSEN_SHARE if isinstance(span.ends, ChosenEnds) else TIME_SHARE
-        error = time_error(cost, sample) / (share * job.numerics.accuracy)
+        error = time_error(cost, sample) / (share * job.numerics.asked.of_steps)
         more = max(error ** (1.0 / order) * tried * waves, 1.0 / LONGER)
         count, between = steps_of(span.stage, cost.steps - span.jumps, more, own, job)
         stages.append(_with_calls(replace(cost, steps=count + span.jumps), times * between))

@@ -37,7 +37,7 @@ def describe_directory(directory: Path) -> Chapter:
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
         sections += [asked, material.section(job), road.section(job)]
         if there[0] in ("measures.csv", "steady.csv"):
-            sections += origin.costs(directory / there[0], found, job.numerics.accuracy)
+            sections += origin.costs(directory / there[0], found, job.numerics.asked.both)
         sections.append(Section("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
     said = "The tables, in SI units and with all digits, are inside this file:"

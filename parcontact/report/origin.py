@@ -17,10 +17,10 @@ from .parts import Section, Table
 NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
 
 
-def costs(table: Path, found: log.Log, accuracy: float) -> Iterator[Section]:
+def costs(table: Path, found: log.Log, asked: tuple[float, float]) -> Iterator[Section]:
     """Yield the errors of a run or a curve, given by its table, then wall time, operator calls and what was counted."""
     columns = read_table(table)
-    yield describe_errors(columns, found.estimates, accuracy, table.name == "steady.csv")
+    yield describe_errors(columns, found.estimates, asked, table.name == "steady.csv")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [
         ("steps or points", str(len(columns["seconds"]))),
@@ -34,7 +34,10 @@ def costs(table: Path, found: log.Log, accuracy: float) -> Iterator[Section]:
 
 
 def describe_errors(
-    columns: Mapping[str, Sequence[float]], estimates: Sequence[log.Estimate], accuracy: float, of_curve: bool
+    columns: Mapping[str, Sequence[float]],
+    estimates: Sequence[log.Estimate],
+    asked: tuple[float, float],
+    of_curve: bool,
 ) -> Section:
     """Return nothing for a table without errors, else those of the points of a friction curve, or of the means over a
     run and of its steps. The log has the parts: of a curve those of the worst point, if that misses the accuracy."""
@@ -43,11 +46,11 @@ def describe_errors(
     if not known:
         return Section("Error budget")
     found = {one.name: one for one in estimates if one.of_curve == of_curve}
-    said = []
+    said, accuracies = [], dict(zip(NAMES.values(), asked, strict=True))
     for name, values in known.items() if of_curve else ((name, [one.total / 100]) for name, one in found.items()):
         if not of_curve:
             said.append(f"{found[name].sentence}.")
-        said.append(_judge(name, values, found.get(name), accuracy, of_curve))
+        said.append(_judge(name, values, found.get(name), accuracies[name], of_curve))
     where, second = ("at the worst point", "smallest") if of_curve else ("means over the run", "in the end")
     rows = [
         (what, _percent(max(values)), _percent(min(values) if of_curve else values[-1]))

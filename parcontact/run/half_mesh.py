@@ -39,7 +39,8 @@ def job_on_half_mesh(job: Job) -> Job:
     data["output"] = {"directory": str(job.output.directory / DIRECTORY)}
     data["numerics"]["strict"] = False
     if Timeline.of(job).chooses:
-        data["numerics"]["accuracy"] = min(LOOSER * job.numerics.accuracy, max(LOOSEST, job.numerics.accuracy))
+        own = job.numerics.asked.of_steps
+        data["numerics"]["accuracy"] = min(LOOSER * own, max(LOOSEST, own))
     for stage in data["history"]:
         if "cells_per_step" in stage:
             stage["cells_per_step"] /= 2

@@ -12,6 +12,7 @@ from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
+from ..job.sections.listing import plain
 from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
@@ -167,7 +168,7 @@ class Run:
 
     def _sync(self) -> None:
         """Bring what was recorded to the disk, with the error budget so far."""
-        budget = self.march.state.errors.facts(self.job.numerics.accuracy)
+        budget = self.march.state.errors.facts(plain(self.job.numerics.accuracy))
         self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
         self.recorder.sync(self.facts.provenance)
 
@@ -183,6 +184,8 @@ class Run:
         self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
         if self.job.included:
             self.console.say(str(self.job.included))
+        if self.job.origin.mesh:
+            self.console.say(self.job.origin.mesh)
         for fact in scene.describe_scene(self.march.scene):
             self.console.say(fact)
         if saved:
@@ -199,7 +202,7 @@ class Run:
         row, console, errors = self.march.row, self.console, self.march.state.errors
         slides = any(stage.speed for stage in self.job.history)
         self._log_counts()
-        for line in errors.lines(self.job.numerics.accuracy, chosen_by_accuracy(self.job)):
+        for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
@@ -231,8 +234,8 @@ def chosen_by_accuracy(job: Job) -> set[str]:
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
     stages = [stage for stage in lasting if stage.speed > 0.0] or lasting
     chosen = {
-        "solver": numerics.tolerance == TOLERANCE_SHARE * numerics.accuracy,
+        "solver": numerics.tolerance == TOLERANCE_SHARE * numerics.asked.strictest,
         "time": bool(stages) and all(stage.chooses for stage in stages),
-        "folded": numerics.branch_error == BRANCH_SHARE * numerics.accuracy,
+        "folded": numerics.branch_error == BRANCH_SHARE * numerics.asked.strictest,
     }
     return {name for name, by_accuracy in chosen.items() if by_accuracy}

@@ -11,8 +11,9 @@ from .. import job as jobs
 from ..job import Grid, Job
 from ..job.checks import meaning
 from ..parallel.fft import FFT, Spectrum
+from ..parallel.mpi import MPI
 from ..parallel.root import on_root
-from ..parallel.slab import Array
+from ..parallel.slab import Array, Slab
 from ..physics import heightfile
 from ..physics.lowest import lowest
 from ..physics.roughness import Roughness, shortest_wave
@@ -70,6 +71,13 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
     found = shortest_wave(spectrum, surface.fft, job.grid.size)
     waves = max(job.grid.size) / found - (0.5 * windows if windowed else 0.0)
     return max(job.grid.size) / waves if waves >= 1.0 else None
+
+
+def shortest_of(job: Job) -> float | None:
+    """Return the shortest wave [m] of the measured surface of a job on its grid, as `shortest_measured`; on this rank
+    alone."""
+    slab = Slab(MPI.COMM_SELF, *job.grid.points)
+    return shortest_measured(job, make_surface(job, FFT(slab, measured=False))[0])
 
 
 def highest_waves(job: Job) -> tuple[int, int]:

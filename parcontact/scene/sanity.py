@@ -70,7 +70,7 @@ def _check_heights(setup: Setup) -> Iterator[str]:
             "strains are not small"
         )
     if setup.shortest is not None and not seams:  # a seam has waves of its own
-        yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.accuracy)
+        yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.asked, setup.job.directions)
 
 
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------

@@ -45,6 +45,8 @@ class CurveTable:
         self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
         self._points: list[Point] = []
         self._bar = progress.Bar(0, "")
+        if self._job.origin.mesh:
+            self.say(self._job.origin.mesh)
         self.say(f"{HEAD}   T [C]" if heated else HEAD)
 
     def _read(self) -> list[Wanted]:
@@ -111,7 +113,7 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
-        self.warn(list(describe_missed(self._points, self._job.numerics.accuracy)))
+        self.warn(list(describe_missed(self._points, self._job.numerics.asked.both)))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
@@ -138,11 +140,12 @@ class CurveTable:
             self._waves.close()
 
 
-def describe_missed(points: Sequence[Point], accuracy: float) -> Iterator[str]:
+def describe_missed(points: Sequence[Point], asked: tuple[float, float]) -> Iterator[str]:
     """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than asked for."""
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
-    for name, each in (("friction", friction), ("corrected contact area", area)):
+    names = ("friction", "corrected contact area")
+    for name, each, accuracy in zip(names, (friction, area), asked, strict=True):
         missed = [(parts.total, point, parts) for point, parts in each if exceeds(parts.total, accuracy)]
         if missed:
             _, point, parts = max(missed, key=lambda one: one[0])

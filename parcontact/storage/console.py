@@ -15,7 +15,7 @@ from .row import Row
 
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
-WARNING = "warning: "
+WARNING, MESH = "warning: ", "mesh: "
 EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
 LEFT_SECONDS = 30.0  # between two lines with the time left, where there is no terminal for a bar
 
@@ -31,8 +31,17 @@ def line(row: Row) -> str:
 
 def warnings_of(log: Path) -> list[str]:
     """Return the warnings in a log, each once and in their order; none where there is no log."""
-    lines = [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
-    return list(dict.fromkeys(line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)))
+    return list(dict.fromkeys(line.removeprefix(WARNING) for line in _lines(log) if line.startswith(WARNING)))
+
+
+def meshes_of(log: Path) -> list[str]:
+    """Return what a log says of meshes that were chosen (`job.chosen_mesh`), the last of it; nothing as a rule."""
+    return [line for line in _lines(log) if line.startswith(MESH)][-1:]
+
+
+def _lines(log: Path) -> list[str]:
+    """Return the lines of a log without their stamps; none where there is no log."""
+    return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 
 
 def always(text: str) -> bool:

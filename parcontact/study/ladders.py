@@ -14,7 +14,7 @@ from dataclasses import astuple, dataclass, replace
 
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage, Study
-from ..job.checks.limits import one_cell
+from ..job.checks.cells import one_cell
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def ladders(job: Job) -> Ladders:
     case = Settings(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
     cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
-    shared = numerics.accuracy if _sliding(job) and not study.cells_per_step else 0.0
+    shared = numerics.asked.of_steps if _sliding(job) and not study.cells_per_step else 0.0
     return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case, shared)
 
 
@@ -154,7 +154,7 @@ def describe_chosen_steps(job: Job) -> list[str]:
     if sliding:
         lines.append(
             f"{_names(sliding)}: time steps are chosen in every case, for numerics.accuracy = "
-            f"{job.numerics.accuracy:g}; a ladder study.cells_per_step would show what they add to the errors"
+            f"{job.numerics.asked.of_steps:g}; a ladder study.cells_per_step would show what they add to the errors"
         )
     if rest:
         lines.append(f"{_names(rest)}: time steps at rest are chosen in every case, they have no cells per step")

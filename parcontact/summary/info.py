@@ -17,7 +17,7 @@ from ..job.resolved import RESOLVED, shown_job
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
-from ..storage.console import warnings_of
+from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
 from . import slide, sweep_table, theory_beside, theory_settings
@@ -104,7 +104,7 @@ def _runs(chain: tuple[Link, ...]) -> list[str]:
 def _budget(budget: Mapping[str, Any]) -> Iterator[str]:
     """Yield the estimated errors of friction and area, by part."""
     for name, parts in budget.items():
-        if isinstance(parts, dict):
+        if name != "accuracy":
             yield f"  error of {name}: " + ", ".join(f"{part} {100 * value:.2g} %" for part, value in parts.items())
 
 
@@ -121,7 +121,7 @@ def describe_directory(directory: Path) -> tuple[str, bool]:
     if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
         raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
     lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
-    for part in (_run, _theory, _curve, _saved_states, _saved_maps, _sweep, _study):
+    for part in (_chosen_mesh, _run, _theory, _curve, _saved_states, _saved_maps, _sweep, _study):
         try:
             lines += part(directory, claims)
         except InputError as error:
@@ -140,6 +140,12 @@ def _title(directory: Path) -> str:
             found = re.search(r"^title: (.+)$", (directory / name).read_text(errors="replace"), re.MULTILINE)
             return found.group(1).strip("'\"") if found else "without a title"
     return "without a job"
+
+
+def _chosen_mesh(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    yield from dict.fromkeys(
+        f"  {text}" for log in ("run.log", curve_points.LOG) for text in meshes_of(directory / log)
+    )
 
 
 def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
@@ -189,9 +195,15 @@ def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
-            asked = f"; asked for: {100 * numerics['accuracy']:.3g} %" if "accuracy" in numerics else ""
+            asked = f"; asked for: {_asked(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
         yield from (f"  warning: {text}" for text in warnings_of(directory / curve_points.LOG))
+
+
+def _asked(accuracy: Any) -> str:
+    """Return the accuracy of a job, given as plain data."""
+    parts = accuracy if isinstance(accuracy, dict) else {"": accuracy}
+    return ", ".join(f"{name} {100 * value:.3g} %".lstrip() for name, value in parts.items())
 
 
 def _saved_states(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -17,7 +17,7 @@ from parcontact.job import (
     describe,
     log_range,
 )
-from parcontact.job.checks.advice import cells_per_wave
+from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.resolved import shown_job
 
 from .texts import SMALL, job_of, replaced

@@ -190,15 +190,15 @@ def test_summary() -> None:
     one = 1.1e-3 / spots(SEEN, 10_000) ** 0.25
     assert summary.friction.solver == pytest.approx((0.06 * one + 0.02 * 3 * one) / 0.08)
     assert summary.area.solver == pytest.approx(0.1 * (3 * 1e-3**0.7 + 2 * 3e-3**0.7 + 1 * 5e-3**0.7) / 6)
-    friction, area = summary.lines(0.012)
+    friction, area = summary.lines((0.012, 0.012))
     assert friction.startswith("estimated error of friction: ")
     assert "solver 0.078 %" in friction
     assert "try" not in friction
     assert area.startswith("estimated error of contact area, corrected: ")
     assert area.endswith(". numerics.accuracy asks for 1.2 %: try a finer grid")
-    assert ErrorSums().lines(0.012) == []
+    assert ErrorSums().lines((0.012, 0.012)) == []
     assert ", mean over time. numerics.accuracy asks" in area
-    assert summary.lines(0.012, ["mesh"])[1].endswith(": try a smaller numerics.accuracy")
+    assert summary.lines((0.012, 0.012), ["mesh"])[1].endswith(": try a smaller numerics.accuracy")
 
 
 def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
@@ -213,7 +213,7 @@ def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
     assert slide.friction is not None
     assert astuple(summary.friction) == pytest.approx(astuple(slide.friction), rel=1e-12)
     assert astuple(summary.area) == pytest.approx(astuple(slide.area), rel=1e-12)
-    assert all(", mean over the distance slid" in line for line in summary.lines(0.012))
+    assert all(", mean over the distance slid" in line for line in summary.lines((0.012, 0.012)))
 
 
 @pytest.mark.parametrize("friction", [1e-18, 1e-7, 1e-6])
@@ -227,7 +227,7 @@ def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
     summary = ErrorSums()
     summary = summary.plus(ErrorBudget(budget, budget), friction, 1.0, slid=1e-3)
     assert summary.friction_within == pytest.approx(budget.total * friction)
-    assert summary.lines(0.01)[-1].startswith(f"friction is 0 +- {budget.total * friction:.2g}: ")
+    assert summary.lines((0.01, 0.01))[-1].startswith(f"friction is 0 +- {budget.total * friction:.2g}: ")
 
 
 def test_the_two_views_bound_the_mesh() -> None:

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
-from parcontact.job.checks.advice import cells_per_wave
+from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.sections.listing import plain
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import SPOTS_ORDER, ErrorSums
@@ -76,14 +76,6 @@ def test_heights_from_a_file_stay(tmp_path: Any) -> None:
     given = job(surface={"shape": "file", "path": str(tmp_path / "road.npy")})
     seen = costs(given, mesh=0.1)
     assert all(price.offer(seen, accuracy).job.grid == given.grid for accuracy in price.ACCURACIES)
-
-
-@pytest.mark.parametrize("count", [1, 16, 17, 100, 416, 1000])
-def test_fast_lengths(count: int) -> None:
-    found = price.fast_length(count)
-    assert found >= count
-    assert found % price.MULTIPLE == 0
-    assert max(p for p in range(1, found + 1) if found % p == 0 and all(p % q for q in range(2, p))) <= 5
 
 
 @pytest.mark.parametrize(("integrator", "order"), [("exponential", TIME_ORDER), ("backward-euler", 1.0)])

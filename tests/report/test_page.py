@@ -151,7 +151,7 @@ def test_the_errors_of_a_run(tmp_path: Path, total: str, told: str) -> None:
     lines = [f"2026-01-01 00:00:00,000 {said.format(number)}\n" for number in ("77", total)]
     (tmp_path / "run.log").write_text("".join(lines))
     columns = {"error_friction": [0.02, 0.03, np.nan], "error_area": [np.nan, np.nan, np.nan]}
-    section = origin.describe_errors(columns, log.read(tmp_path).estimates, 0.01, of_curve=False)
+    section = origin.describe_errors(columns, log.read(tmp_path).estimates, (0.01, 0.01), of_curve=False)
     assert section.sentences == [
         f"{said.format(total)}.",
         f"The accuracy of 1 % that was asked for friction (numerics.accuracy) {told}",

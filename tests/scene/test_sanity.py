@@ -17,7 +17,7 @@ from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, JobError, load
 from parcontact.job.checks import size as size_advice
-from parcontact.job.checks.advice import cells_per_wave
+from parcontact.job.checks.cells import cells_per_wave
 from parcontact.parallel.slab import Slab
 from parcontact.scene import sanity
 

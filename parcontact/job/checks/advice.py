@@ -6,17 +6,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..sections.calculation import Grid, Numerics
+from ..sections.calculation import Accuracy, Grid, Numerics
 from ..sections.geometry import Rough
 from ..sections.materials import Elastic, Zener
 from ..sections.stages import AUTO, GeometricStep, Stage
+from .cells import ASIDE, Vector, needed, one_cell
 
 LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)
-CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %; fewer under-resolve the contact of the shortest waves
-MESH_ORDER = 2.5  # accuracy: in which the error of friction falls with them
 STEPS_PER_WAVE = 4  # accuracy: fewer skip over the shortest waves while sliding
 ROUNDING = 4.0 * 2.0**-52  # accuracy: of a number in a certificate
 SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
@@ -28,12 +27,17 @@ SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
 def resolution(
-    grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...], numerics: Numerics
+    grid: Grid,
+    surface: tuple[Any, ...],
+    material: Elastic | Zener,
+    history: tuple[Stage, ...],
+    numerics: Numerics,
+    directions: Sequence[Vector] = (),
 ) -> Iterator[str]:
-    """Yield sentences, in the order of the sections."""
+    """Yield sentences, in the order of the sections; the surface slides along these directions (unit vectors)."""
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
-            yield from _waves(index, shape, grid, numerics.accuracy)
+            yield from _waves(index, shape, grid, numerics.asked, directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
     times = [branch.relaxation_time for branch in getattr(material, "branches", ())]
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
@@ -53,12 +57,7 @@ def _directions(grid: Grid) -> list[tuple[str, float, float]]:
     return [(name, length, cell) for name, length, cell, points in found if points > 1]
 
 
-def cells_per_wave(accuracy: float) -> int:
-    """Return how many cells the shortest wave of a rough surface needs."""
-    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / MESH_ORDER) * (1 - SAME_LENGTH)))
-
-
-def _waves(index: int, shape: Rough, grid: Grid, accuracy: float) -> Iterator[str]:
+def _waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
     name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
     if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
         yield (
@@ -67,28 +66,37 @@ def _waves(index: int, shape: Rough, grid: Grid, accuracy: float) -> Iterator[st
             f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
         )
     otherwise = " or a short_wavelength of {:.4g} m"
-    yield from _few_cells(f"surface.{index}", shape.short_wavelength, "", otherwise, grid, accuracy)
+    yield from _few_cells(f"surface.{index}", shape.short_wavelength, "", otherwise, grid, asked, directions)
 
 
-def measured(grid: Grid, wave: float, accuracy: float) -> Iterator[str]:
-    """Yield what to say of the shortest wave [m] of a measured surface."""
+def measured(grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
+    """Yield what to say of the shortest wave [m] of a measured surface that slides along these directions."""
     known = f", of {wave:.3g} m by the spectrum of the heights"
     otherwise = ", to which a map is interpolated, or heights without waves below {:.4g} m"
-    yield from _few_cells("surface", wave, known, otherwise, grid, accuracy)
+    yield from _few_cells("surface", wave, known, otherwise, grid, asked, directions)
 
 
-def _few_cells(key: str, wave: float, known: str, otherwise: str, grid: Grid, accuracy: float) -> Iterator[str]:
-    """Yield a sentence if a shortest wave has too few cells: how many points it needs, at which price, or what else."""
-    name, length, cell = max(_directions(grid), key=lambda direction: direction[2], default=("", 0.0, 0.0))
-    needed = cells_per_wave(accuracy)
-    if wave < needed * cell * (1 - SAME_LENGTH):
-        finer = needed * cell / wave
-        more = finer ** sum(n > 1 for n in grid.points)
-        yield (
-            f"{key}: only {wave / cell:.3g} cells per shortest wave along {name}{known}; for a resolved contact use at "
-            f"least {needed}: {math.ceil((1 - SAME_LENGTH) * needed * length / wave)} points ({more:.2g} times the "
-            f"memory, some {more * finer:.2g} times the time in sliding){otherwise.format(needed * cell)}"
-        )
+def _few_cells(
+    key: str, wave: float, known: str, otherwise: str, grid: Grid, asked: Accuracy, directions: Sequence[Vector]
+) -> Iterator[str]:
+    """Yield a sentence if a shortest wave has too few cells: how many points it needs along the direction that lacks
+    most, at which price, or what else."""
+    wants = {name: needed("xy".index(name), directions, asked) for name, _, _ in _directions(grid)}
+    lacks = {name: max(wants[name]) * cell / wave for name, _, cell in _directions(grid)}
+    name, length, cell = max(_directions(grid), key=lambda direction: lacks[direction[0]], default=("", 0.0, 0.0))
+    if not name or lacks[name] <= 1 + SAME_LENGTH:
+        return
+    least, of_area = wants[name]
+    reason = "a resolved contact" if math.isclose(least, of_area) else "friction" if least > of_area else "its area"
+    more = math.prod(max(lack, 1.0) for lack in lacks.values())
+    slides = lambda axis: not directions or any(abs(way["xy".index(axis)]) > ASIDE for way in directions)  # noqa: E731
+    finer = max((max(lack, 1.0) for axis, lack in lacks.items() if slides(axis)), default=1.0)
+    yield (
+        f"{key}: only {wave / cell:.3g} cells per shortest wave along {name}{known}; for {reason} use at "
+        f"least {max(wants[name]):.3g}: {math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave)} points "
+        f"({more:.2g} times the memory, some {more * finer:.2g} times the time in sliding)"
+        f"{otherwise.format(max(wants[name]) * cell)}"
+    )
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:
@@ -97,7 +105,7 @@ def longest_step(stage: Stage, grid: Grid) -> float:
     if step == AUTO:
         return 0.0
     if stage.cells_per_step is not None:
-        return min(stage.seconds, stage.cells_per_step * grid.dx / stage.speed)
+        return min(stage.seconds, stage.cells_per_step * one_cell(stage, grid))
     if isinstance(step, GeometricStep):  # n steps last first (growth^n - 1) / (growth - 1)
         return min(stage.seconds, (stage.seconds * (step.growth - 1) + step.first) / step.growth)
     return min(stage.seconds, step or 0.0)
@@ -118,7 +126,7 @@ def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float |
         yield (
             f"history.{index}: the surface slides {slid:.3g} m in one step, {slid / short:.2g} of its shortest wave; "
             f"use time steps up to {short / STEPS_PER_WAVE / stage.speed:.3g} s "
-            f"(cells_per_step up to {short / STEPS_PER_WAVE / grid.dx:.3g})"
+            f"(cells_per_step up to {short / STEPS_PER_WAVE / (one_cell(stage, grid) * stage.speed):.3g})"
         )
 
 

@@ -13,6 +13,7 @@ from ..sections.materials import AnyMaterial
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
 from .advice import SAME_LENGTH
+from .cells import one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
 MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
@@ -167,12 +168,6 @@ def first_step(stage: Stage, grid: Grid) -> float:
     if stage.time_step == AUTO:
         return one_cell(stage, grid) if stage.speed else stage.seconds
     return stage.time_step or 0.0
-
-
-def one_cell(stage: Stage, grid: Grid) -> float:
-    """Return how long the surface takes to slide by one cell [s]."""
-    cell = math.hypot(stage.velocity[0] / stage.speed * grid.dx, stage.velocity[1] / stage.speed * grid.dy)
-    return cell / stage.speed
 
 
 def steps_of(stage: Stage, seconds: float, first: float) -> float:

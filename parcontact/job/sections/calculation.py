@@ -6,11 +6,31 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+)
 
 from ..text.fault import Fault
 from .part import Origin, Part, Rule
-from .quantities import FROM_SURFACE, Count, Flag, Fraction, Number, Positive, Whole, both, from_home, listed
+from .quantities import (
+    AUTO_POINTS,
+    FROM_SURFACE,
+    Count,
+    Flag,
+    Fraction,
+    Number,
+    Positive,
+    Whole,
+    both,
+    from_home,
+    listed,
+)
 
 Integrator = Literal["exponential", "backward-euler"]
 Kernel = Literal["spectral", "love"]
@@ -33,7 +53,7 @@ def _different(name: str) -> Rule:
 class Grid(Part):
     """The box and its cells; x comes first in `points` and `size`."""
 
-    points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE] = Field(
+    points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE, AUTO_POINTS] = Field(
         description="a positive whole number of points"
     )
     size: Annotated[tuple[Positive, Positive], BeforeValidator(both), FROM_SURFACE] = Field(
@@ -80,13 +100,45 @@ class Body(Part):
 
 
 TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: parts of numerics.accuracy
+AREA_BY_STEPS = 0.25  # accuracy: the error of the area by time steps, over that of friction, at most
+FRACTION: TypeAdapter[float] = TypeAdapter(Fraction)
+
+
+class Accuracy(Part):
+    """Relative errors of friction and of the corrected contact area that are acceptable."""
+
+    friction: Fraction = Field(default=1e-2, description="an error of friction [-] above 0 and below 1")
+    area: Fraction = Field(default=1e-2, description="an error of the contact area [-] above 0 and below 1")
+
+    @property
+    def both(self) -> tuple[float, float]:
+        """That of friction and that of the area."""
+        return self.friction, self.area
+
+    @property
+    def strictest(self) -> float:
+        """The smaller of both."""
+        return min(self.friction, self.area)
+
+    @property
+    def of_steps(self) -> float:
+        """The error of friction that time steps may make: the area has a quarter of it at most."""
+        return min(self.friction, self.area / AREA_BY_STEPS)
+
+
+def _accuracy(value: Any, info: ValidationInfo) -> float | Accuracy:
+    if isinstance(value, dict | Accuracy):
+        return Accuracy.model_validate(value, context=info.context)
+    return FRACTION.validate_python(value, context=info.context)
 
 
 class Numerics(Part):
     """How the equations are solved; `accuracy` chooses the tolerance and what branches may be folded, where these are
     not given, and says how fine the mesh should be."""
 
-    accuracy: Fraction = Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1")
+    accuracy: Annotated[float | Accuracy, PlainValidator(_accuracy, json_schema_input_type=Fraction | Accuracy)] = (
+        Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1, or {friction, area}")
+    )
     integrator: Integrator = "exponential"
     tolerance: Fraction = Field(default=5e-3, description="a tolerance [-] above 0 and below 1")
     max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
@@ -102,10 +154,23 @@ class Numerics(Part):
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Fill in the tolerance and the error of folded branches, which are shares of the accuracy."""
-        accuracy = data.get("accuracy")
-        if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
+        if (given := data.get("accuracy")) is None:
             return data
-        return {"tolerance": TOLERANCE_SHARE * accuracy, "branch_error": BRANCH_SHARE * accuracy, **data}
+        try:
+            value = TypeAdapter(cls.model_fields["accuracy"].rebuild_annotation()).validate_python(
+                given, context=context
+            )
+        except ValidationError:
+            return data
+        least = value.strictest if isinstance(value, Accuracy) else value
+        return {"tolerance": TOLERANCE_SHARE * least, "branch_error": BRANCH_SHARE * least, **data}
+
+    @property
+    def asked(self) -> Accuracy:
+        """The accuracy of friction and of the area; a number is that of both."""
+        if isinstance(self.accuracy, Accuracy):
+            return self.accuracy
+        return Accuracy(friction=self.accuracy, area=self.accuracy)
 
 
 def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:

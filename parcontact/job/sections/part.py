@@ -31,7 +31,8 @@ from .quantities import from_home
 
 
 class Origin(NamedTuple):
-    """Where a job comes from: its absolute path, and the file of its material if it includes one.
+    """Where a job comes from: its absolute path, and the file of its material if it includes one; `mesh` says which
+    points were chosen for it.
 
     `numbers_as_texts`: PyYAML's own `safe_load` leaves texts for some numbers, 1.0e6 and 1e-3. `names_directory`: the
     job says itself where its results go.
@@ -42,6 +43,7 @@ class Origin(NamedTuple):
     from_file: bool = True
     numbers_as_texts: bool = False
     names_directory: bool = False
+    mesh: str = ""
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:

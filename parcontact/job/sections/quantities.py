@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 from ..text.fault import Fault, quote, refuse, shorten
 
 FROM_SURFACE = "from surface"  # of a grid: what its measured map has
+AUTO_POINTS = "auto"  # of a grid: what the accuracy asks for
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
 SMALLEST, LARGEST = 1e-60, 1e60  # accuracy: of numbers, so that double precision holds what follows from them
 LONGEST_NUMBER = 400  # characters of a number that is given as a text

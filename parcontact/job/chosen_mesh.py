@@ -1,0 +1,100 @@
+"""`grid: {points: auto}`: the mesh of fewest points on which the errors are those of `numerics.accuracy`.
+
+It follows from the shortest wave of the surface and from the directions of sliding (`checks.cells`). The mesh may make
+MESH_SHARE of the error of a march, whose time steps make the rest, and STEADY_SHARE of that of a friction curve.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib.metadata import EntryPoint
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from ..errors import InputError
+from .checks import cells
+from .measured import extent_of
+from .model import Job, prepared
+from .sections.calculation import Accuracy, Grid, Numerics
+from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
+from .sections.part import Origin, Part
+from .sections.quantities import AUTO_POINTS
+from .sections.stages import Initial, Stage, Steady
+from .text.places import UNREADABLE, Source
+
+MESH_SHARE, STEADY_SHARE = 0.7, 0.9  # accuracy: of numerics.accuracy
+SPECTRUM = EntryPoint("spectrum", "parcontact.road.spectrum:of", "")  # reads tables; jobs that name none do without
+MAP = EntryPoint("map", "parcontact.scene.rigid_surface:shortest_of", "")  # the same of maps
+
+
+class Scenery(Part):
+    """The sections of a job on which its mesh depends."""
+
+    surface: tuple[Shape, ...] = Field(description="one shape, or a list of shapes")
+    initial: Initial = Initial()
+    history: tuple[Stage, ...] = Field(default=(), description="a list of stages")
+    steady: Steady | None = None
+    numerics: Numerics = Numerics()
+
+
+def choose_points(source: Source, origin: Origin) -> Origin:
+    """Put numbers for `points: auto` into the source of a job; return the origin with what is to be said of them. What
+    stands in the way is a mistake at the key; mistakes in other sections are found when the job is validated."""
+    grid = source.data.get("grid") if isinstance(source.data, dict) else None
+    if not isinstance(grid, dict) or grid.get("points") != AUTO_POINTS:
+        return origin
+    known = prepared({name: source.data[name] for name in Scenery.model_fields if source.data.get(name) is not None})
+    points: Any = UNREADABLE
+    try:
+        scenery = Scenery.model_validate(known, context=origin)
+        box = Grid.model_validate({**grid, "points": 1}, context=origin)
+        points, said = _choose(scenery, box, source.data, origin)
+        origin = origin._replace(mesh=said)
+    except InputError as error:
+        source.note(source.locate(("grid", "points")).place, f"grid.points: {AUTO_POINTS}: {error}")
+    except ValidationError:
+        pass
+    grid["points"] = points
+    return origin
+
+
+def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -> tuple[list[int], str]:
+    """Return points along x and y, and a sentence. Raises InputError where the surface has no shortest wave."""
+    wave = min((_shortest(shape, box, data, origin) for shape in scenery.surface), default=math.inf)
+    if not math.isfinite(wave):
+        raise InputError("the surface has no shortest wave, from which cells follow; give numbers of points")
+    directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
+    asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
+    own = Accuracy(friction=share * asked.friction, area=share * asked.area)
+    points = cells.choose(wave, box.size, directions, own)
+    dx, dy = (length / n for length, n in zip(box.size, points, strict=True))
+    slides = " and ".join(f"({x:.3g}, {y:.3g})" for x, y in directions)
+    return list(points), (
+        f"mesh: {points[0]} x {points[1]} points, chosen by numerics.accuracy (friction {100 * asked.friction:g} %, "
+        f"area {100 * asked.area:g} %): the shortest wave, {wave:.4g} m, has {wave / dx:.3g} cells along x and "
+        f"{wave / dy:.3g} along y; {f'it slides along {slides}' if slides else 'nothing slides'}"
+    )
+
+
+def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> float:
+    """Return the shortest wave [m] of a shape, infinite of one without waves. Raises InputError."""
+    if isinstance(shape, Rough):
+        return shape.short_wavelength
+    if isinstance(shape, Wave):
+        count = math.hypot(shape.waves[0] / box.lx, shape.waves[1] / box.ly)
+        return 1.0 / count if count else math.inf
+    if isinstance(shape, RoughSpectrum):
+        return float(SPECTRUM.load()(shape)[1][1])
+    if isinstance(shape, OnOneMesh):
+        raise InputError("heights from a file or an array are given on one mesh; give its numbers of points")
+    if isinstance(shape, Topography):
+        return float(MAP.load()(_on_its_own_mesh(data, origin)) or math.inf)
+    return math.inf
+
+
+def _on_its_own_mesh(data: dict[str, Any], origin: Origin) -> Job:
+    """Return the job on the points of its measured map. Raises InputError, and ValidationError for other mistakes."""
+    points, _ = extent_of(data["surface"], data["grid"].get("size"), origin)
+    grid = {**data["grid"], "points": list(points)}
+    return Job.model_validate({**data, "grid": grid}, context=origin)

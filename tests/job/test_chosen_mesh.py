@@ -1,0 +1,124 @@
+"""`points: auto`: from the accuracy, the shortest wave and the directions of sliding; what is said, and mistakes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from conftest import Main
+from mpi4py import MPI
+
+import parcontact as pc
+from parcontact.job import load, load_cases
+from parcontact.parallel.root import on_root
+from parcontact.parallel.slab import Slab
+from parcontact.run import runner
+from parcontact.steady_sliding import curve
+from parcontact.summary import info
+
+from .texts import job_of, mistakes_of, replaced
+
+ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 1.25e-4, rms_slope: 0.1, seed: 1}"
+AUTO = f"""\
+grid: {{points: auto, size: 1e-3}}
+surface: {ROUGH}
+material: {{model: zener, modulus_inf: 1e6, branches: [{{modulus: 1e6, relaxation_time: 1e-4}}]}}
+numerics: {{accuracy: {{friction: 0.05, area: 0.3}}}}
+history:
+  - {{pressure: 1e5, velocity: 1, distance: 2e-5, cells_per_step: 1}}
+"""
+
+
+def points_of(directory: Path, *changes: str, text: str = AUTO) -> tuple[int, int]:
+    found: tuple[int, int] = job_of(directory, text, *changes).grid.points
+    return found
+
+
+def test_more_accuracy_takes_more_points_where_it_pays(tmp_path: Path) -> None:
+    coarse = points_of(tmp_path)
+    finer = points_of(tmp_path, "numerics.accuracy.friction=0.01")
+    for_area = points_of(tmp_path, "numerics.accuracy.area=0.01")
+    assert finer[0] > coarse[0] > coarse[1]
+    assert finer[0] / finer[1] > 2.0
+    assert for_area[1] >= 2 * coarse[1]
+    assert points_of(tmp_path, "numerics.accuracy=0.01") >= for_area
+
+
+def test_the_direction_decides(tmp_path: Path) -> None:
+    along = points_of(tmp_path)
+    assert points_of(tmp_path, "history.0.velocity=[0, 1]") == along[::-1]
+    still = replaced(AUTO.split("history")[0], history="[{pressure: 1e5}]")
+    assert len(set(points_of(tmp_path, text=still))) == 1
+    curve = replaced(AUTO.split("history")[0], steady="{velocities: [1.0], pressures: [1e5], direction: [0, 1]}")
+    nx, ny = points_of(tmp_path, text=curve)
+    assert nx < ny <= along[0]  # time steps leave less for the mesh of a march
+
+
+def test_a_measured_map_and_a_table_have_the_mesh_of_their_waves(tmp_path: Path) -> None:
+    """To one step of fast lengths: the shortest wave of a map is known to 5 %."""
+    own = points_of(tmp_path)
+    np.save(tmp_path / "road.npy", pc.surface(yaml.safe_load(ROUGH), grid={"points": 128, "size": 1e-3}))
+    there = "{shape: topography, path: road.npy, unit: m, size: [1e-3, 1e-3]}"
+    assert np.all(np.abs(np.subtract(points_of(tmp_path, f"surface={there}"), own)) <= 16)
+    q = 2 * np.pi / np.array([5e-4, 2.5e-4, 1.25e-4])
+    rows = "\n".join(f"{k:.9g} {1e-18 * (k / q[0]) ** -3.6:.9g}" for k in q)
+    (tmp_path / "psd.txt").write_text(f"q[1/m] C2D[m^4]\n{rows}\n")
+    assert points_of(tmp_path, "surface={shape: rough, spectrum: psd.txt}") == own
+
+
+@pytest.mark.mpi(2)
+def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """On all ranks the same points; in the logs, and by `info`."""
+    path = shared_path / "job.yaml"
+    if comm.rank == 0:
+        path.write_text(AUTO + "steady: {velocities: [1.0], pressures: [1e5]}\n")
+    comm.barrier()
+    job = on_root(comm, lambda: load(path, [f"output.directory={shared_path / 'out'}"]))
+    slab = Slab(comm, *job.grid.points)
+    assert runner.run(job, slab, runner.Options(quiet=True)) == 0
+    assert curve.run(job, slab, curve.request(job), quiet=True) == 0
+    if comm.rank == 0:
+        said, sound = info.describe(shared_path / "out")
+        assert sound
+        nx, ny = points_of(shared_path)
+        text = f"mesh: {nx} x {ny} points, chosen by numerics.accuracy (friction 5 %, area 30 %): the shortest wave, "
+        assert said.count(text) == 1
+        for name in ("run.log", "steady.log"):
+            assert text in (shared_path / "out" / name).read_text()
+
+
+def test_check_says_it(tmp_path: Path, main: Main) -> None:
+    job_of(tmp_path, AUTO)
+    code, said, _ = main("check", tmp_path / "job.yaml")
+    assert code == 0
+    assert "mesh: " in said
+    assert "it slides along (1, 0)" in said
+
+
+def test_from_python_and_in_a_sweep(tmp_path: Path) -> None:
+    text = AUTO + "sweep: {numerics.accuracy.friction: [0.05, 0.01]}\n"
+    (tmp_path / "job.yaml").write_text(text)
+    coarse, fine = (case.job.grid.points for case in load_cases(tmp_path / "job.yaml"))
+    assert (coarse, fine) == (points_of(tmp_path), points_of(tmp_path, "numerics.accuracy.friction=0.01"))
+    assert load(yaml.safe_load(AUTO)).grid.points == coarse
+
+
+@pytest.mark.parametrize(
+    ("surface", "sentence"),
+    [
+        ("{shape: sphere, radius: 1e-2}", "1:16: grid.points: auto: the surface has no shortest wave"),
+        ("{shape: file, path: job.npy}", "1:16: grid.points: auto: heights from a file or an array are given on one"),
+        ("{shape: rough, hurst: 2}", "2:32: surface.hurst must be a Hurst exponent above 0 and up to 1"),
+    ],
+)
+def test_mistakes(tmp_path: Path, surface: str, sentence: str) -> None:
+    np.save(tmp_path / "job.npy", np.zeros((4, 4)))
+    told = mistakes_of(tmp_path, AUTO.replace(ROUGH, surface))
+    assert any(sentence in text for text in told), told
+    assert not any("points must" in text for text in told)
+
+
+@pytest.mark.parametrize("value", ["{friction: 0}", "{friction: 0.1, areas: 0.1}", "1", "big"])
+def test_mistakes_of_the_accuracy(tmp_path: Path, value: str) -> None:
+    (text,) = mistakes_of(tmp_path, AUTO, f"numerics.accuracy={value}")
+    assert "numerics.accuracy" in text
