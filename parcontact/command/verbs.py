@@ -61,12 +61,10 @@ def check(options: argparse.Namespace) -> int:
     cases, chosen = cases_of(options)
     job = chosen[0].job
     print(jobs.describe(job))
-    if job.included:
-        print(f"\n{job.included}")
-    if job.origin.mesh:
-        print(f"\n{job.origin.mesh}")
-    if steps := describe_steps(job):
-        print(f"\nstages that choose their time steps: {steps}")
+    steps = describe_steps(job)
+    steps = steps and f"stages that choose their time steps: {steps}"
+    for text in filter(None, (job.included, job.origin.mesh, steps)):
+        print(f"\n{text}")
     doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
     for warning in dict.fromkeys(doubts):
         print(f"warning: {warning}")

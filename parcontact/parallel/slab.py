@@ -43,6 +43,11 @@ class Slab:
         self.shape = (self.rows.stop - self.rows.start, nx)
         self.tally = Tally() if tally is None else tally
 
+    @staticmethod
+    def alone(nx: int, ny: int) -> "Slab":
+        """The slab of a map that this rank has for itself."""
+        return Slab(MPI.COMM_SELF, nx, ny)
+
     def resized(self, nx: int, ny: int) -> "Slab":
         """The slab of a map of another size on the same ranks."""
         return Slab(self.comm, nx, ny, self.tally)

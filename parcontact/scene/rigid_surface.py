@@ -11,7 +11,6 @@ from .. import job as jobs
 from ..job import Grid, Job
 from ..job.checks import meaning
 from ..parallel.fft import FFT, Spectrum
-from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics import heightfile
@@ -76,7 +75,7 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
 def shortest_of(job: Job) -> float | None:
     """Return the shortest wave [m] of the measured surface of a job on its grid, as `shortest_measured`; on this rank
     alone."""
-    slab = Slab(MPI.COMM_SELF, *job.grid.points)
+    slab = Slab.alone(*job.grid.points)
     return shortest_measured(job, make_surface(job, FFT(slab, measured=False))[0])
 
 

@@ -13,6 +13,7 @@ from parcontact.job import load, load_cases
 from parcontact.parallel.root import on_root
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
+from parcontact.run.run import Options
 from parcontact.steady_sliding import curve
 from parcontact.summary import info
 
@@ -75,7 +76,7 @@ def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path:
     comm.barrier()
     job = on_root(comm, lambda: load(path, [f"output.directory={shared_path / 'out'}"]))
     slab = Slab(comm, *job.grid.points)
-    assert runner.run(job, slab, runner.Options(quiet=True)) == 0
+    assert runner.run(job, slab, Options(quiet=True)) == 0
     assert curve.run(job, slab, curve.request(job), quiet=True) == 0
     if comm.rank == 0:
         said, sound = info.describe(shared_path / "out")
