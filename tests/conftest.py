@@ -8,7 +8,7 @@ import time
 import zlib
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import hypothesis
 import pytest
@@ -111,17 +111,22 @@ def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest
     return run
 
 
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
-    """The figures that have been saved."""
+@pytest.fixture(autouse=True)
+def drawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
+    """The figures that have been saved: files with nothing on them, unless a test is marked `rendered`."""
+    figures: list[Any] = []
+    if "matplotlib" not in sys.modules and not {"main", "drawn"} & set(request.fixturenames):
+        return figures  # nor is it imported for a test that draws nothing
     from matplotlib.figure import Figure
 
-    figures: list[Figure] = []
-    draw = Figure.savefig
+    draw, rendered = Figure.savefig, request.node.get_closest_marker("rendered")
 
-    def save(figure: Figure, *args: object, **options: object) -> None:
+    def save(figure: Figure, file: Any, **options: Any) -> None:
         figures.append(figure)
-        draw(figure, *args, **options)  # type: ignore[arg-type]
+        if rendered:
+            draw(figure, file, **options)
+        else:
+            draw(Figure(figsize=(0.1, 0.1)), file, **{**options, "dpi": 20})
 
     monkeypatch.setattr(Figure, "savefig", save)
     return figures
@@ -137,13 +142,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def elsewhere(item: pytest.Item) -> bool:
     """Whether a test is for other numbers of ranks than this one: it names its own, or makes groups of all smaller ones
-    from the most that tests run on, or runs on two ranks, and on three or four as its name has it."""
+    from the most that tests run on, or runs on two, three or four ranks as its name has it."""
     mark = item.get_closest_marker("mpi")
     if mark is None:
         return False
     groups = "communicators" in getattr(item, "fixturenames", ())
-    own = (MOST_RANKS,) if groups else (2, 3 + zlib.crc32(item.nodeid.encode()) % 2)
-    return WORLD.size not in (mark.args or own)
+    own = MOST_RANKS if groups else 2 + zlib.crc32(item.nodeid.encode()) % 3
+    return WORLD.size not in (mark.args or (own,))
 
 
 @pytest.hookimpl(trylast=True)

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from parcontact.parallel.fft import FFT, footprint
 from parcontact.parallel.slab import Slab
 
-pytestmark = pytest.mark.mpi(2, 3)
+pytestmark = pytest.mark.mpi(3)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

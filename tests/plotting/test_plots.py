@@ -157,6 +157,7 @@ def test_curve_of_few_points(tmp_path: Path, drawn: list[Figure], points: Sequen
     assert touching(drawn[0]) == []
 
 
+@pytest.mark.rendered
 @pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
 def test_formats(tmp_path: Path, kind: str, start: bytes) -> None:
     out = curve(tmp_path)
@@ -202,6 +203,7 @@ def test_comparison(tmp_path: Path, drawn: list[Figure]) -> None:
     assert touching(drawn[0]) == []
 
 
+@pytest.mark.rendered
 @pytest.mark.parametrize("kind", ["loads", "loads of a strip"])
 def test_movie(tmp_path: Path, kind: str) -> None:
     """A frame for each saved instant."""

@@ -59,6 +59,7 @@ def test_nothing_to_draw(tmp_path: Path, rows: list[tuple[Any, ...]]) -> None:
     assert all(np.isfinite(one.y).all() for chart in found for one in chart.series)
 
 
+@pytest.mark.rendered
 def test_the_picture(tmp_path: Path) -> None:
     (picture,) = plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))], Options())
     assert picture == tmp_path / "picture.png"

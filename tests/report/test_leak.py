@@ -52,6 +52,7 @@ def table(path: Path) -> list[dict[str, str]]:
 
 
 @pytest.mark.mpi
+@pytest.mark.rendered
 def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Path) -> None:
     """The saved gaps and the run itself give the same flow, in single and in double precision of the maps; K falls with
     the load, and is that of `pc.leak`."""

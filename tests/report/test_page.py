@@ -21,6 +21,8 @@ from parcontact.parallel.slab import Slab
 from parcontact.report import log, origin, page
 from parcontact.steady_sliding import curve
 
+pytestmark = pytest.mark.rendered
+
 VOID = {"meta", "link", "img", "input", "br"}
 LOADS_FROM = {"src", "href", "srcset", "data", "poster", "action"}
 

@@ -17,7 +17,7 @@ from parcontact.parallel.slab import Slab
 from . import truth
 
 if TYPE_CHECKING:
-    from conftest import RunParcontact
+    from conftest import Main, RunParcontact
 
 LENGTH, POINTS, SLOPE = 1e-3, 192, 0.05
 JOB = """
@@ -121,7 +121,7 @@ def test_mistakes_name_their_key(road: Path, more: str, sentence: str) -> None:
     assert ":3:" in str(failure.value)
 
 
-def test_the_verb_surface(road: Path, run_parcontact: "RunParcontact") -> None:
+def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParcontact") -> None:
     """What it says is what the truth has; its picture is one; two ranks speak once."""
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=""))
     done = run_parcontact(["surface", "job.yaml", "--out", "road.png"], ranks=2, cwd=road)
@@ -130,9 +130,9 @@ def test_the_verb_surface(road: Path, run_parcontact: "RunParcontact") -> None:
     (slope,) = re.findall(r"rms slope +(\S+)", done.stdout)
     assert float(slope) == pytest.approx(SLOPE, rel=0.05)
     assert matplotlib.image.imread(road / "road.png").shape[:2] == (900, 1160)
-    refused = run_parcontact(["surface", "job.yaml", "--out", "road.doc"], ranks=0, cwd=road)
-    assert refused.returncode == 2
-    assert refused.stderr.startswith("parcontact: --out must end in .png, .pdf, .svg")
+    code, _, err = main("surface", road / "job.yaml", "--out", road / "road.doc")
+    assert code == 2
+    assert err.startswith("parcontact: --out must end in .png, .pdf, .svg")
 
 
 # -- the grid of the map, and a map without a job ---------------------------------------------------------------------
@@ -196,20 +196,21 @@ def test_an_array_has_points_but_no_size(road: Path) -> None:
         jobs.load(job, {"grid.size": "from surface"})
 
 
-def test_a_map_without_a_job(road: Path, run_parcontact: "RunParcontact") -> None:
+def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.MonkeyPatch) -> None:
     """What it is like, a picture, and a job to start from that loads, with the whole map; nothing is replaced."""
     words = ["surface", "road.npy", "--set", "surface.unit=um", "--set", "surface.size=[1e-3, 1e-3]"]
-    done = run_parcontact([*words, "--job", "start/job.yaml"], ranks=2, cwd=road)
-    assert done.returncode == 0, done.stderr
+    monkeypatch.chdir(road)
+    code, out, err = main(*words, "--job", "start/job.yaml")
+    assert code == 0, err
     for line in (r"size +0.001 x 0.001 m", r"points +192 x 192", r"pixel +5.208e-06 x 5.208e-06 m"):
-        assert re.search(f"^{line}$", done.stdout, re.MULTILINE)
+        assert re.search(f"^{line}$", out, re.MULTILINE)
     for line in (r"missing +(2.\d+|1.9\d)%", r"rms slope +0.0", r"spectrum +waves of 0.001 to 1.042e-05 m"):
-        assert re.search(f"^{line}", done.stdout, re.MULTILINE)
+        assert re.search(f"^{line}", out, re.MULTILINE)
     assert matplotlib.image.imread(road / "road-surface.png").ndim == 3
     found = jobs.load(road / "start/job.yaml")
     assert (found.grid.points, found.grid.size) == ((POINTS, POINTS), (LENGTH, LENGTH))
-    assert run_parcontact([*words, "--job", "start/job.yaml"], cwd=road).returncode == 2
-    bare = run_parcontact(["surface", "road.npy"], cwd=road)
-    assert bare.returncode == 2
-    assert "says no unit of its heights" in bare.stderr
-    assert "--set surface.unit=um" in bare.stderr
+    assert main(*words, "--job", "start/job.yaml")[0] == 2
+    code, _, err = main("surface", "road.npy")
+    assert code == 2
+    assert "says no unit of its heights" in err
+    assert "--set surface.unit=um" in err

@@ -120,10 +120,10 @@ def same(out: Path, whole: Path) -> None:
 
 
 def test_asked_to_stop(runs: Runs, whole: Path, tmp_path: Path) -> None:
-    """By a signal to mpirun, to one rank, or by a file: it saves and says run again; in the end nothing has changed."""
+    """By a signal to one rank (to mpirun: `test_disturbed.py`), or by a file: it saves and says run again; in the end
+    nothing has changed."""
     out = tmp_path / "out"
     asked: list[Callable[[subprocess.Popen[str]], None]] = [
-        lambda process: process.send_signal(signal.SIGUSR1),
         lambda process: os.kill(children(process)[1], signal.SIGTERM),
         lambda process: (out / "stop").touch(),
     ]

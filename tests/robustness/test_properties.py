@@ -17,7 +17,7 @@ from . import scenes
 from .trial import trial, witness
 from .witness import distance
 
-FEW = 120  # scenes of Hypothesis; each is marched twice
+FEW = 80  # scenes of Hypothesis; each is marched twice
 SEEDS = range(6)  # of scenes on many ranks
 
 

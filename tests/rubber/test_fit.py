@@ -17,7 +17,7 @@ from . import measured
 from .measured import Array
 
 if TYPE_CHECKING:
-    from conftest import RunParcontact
+    from conftest import Main
     from matplotlib.figure import Figure
 
 JOB = """
@@ -28,30 +28,30 @@ history: [{pressure: 1.0e4, velocity: 1.0e6, distance: 1.0e-3, cells_per_step: 1
 """
 
 
-def test_a_table_becomes_a_material(tmp_path: Path, run_parcontact: "RunParcontact") -> None:
+@pytest.mark.rendered
+def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
     """The file is included by a job, the picture has a picture's size, and frequencies beyond the data are told."""
     measured.write_sweeps(tmp_path / "rubber.csv", noise=0.02)
     job = tmp_path / "job.yaml"
     job.write_text(JOB.replace("{include: rubber}", "{model: elastic, shear_modulus: 1.0e6}"))
     words: list[str | Path] = ["fit", "rubber.csv", "--out", "materials/rubber.yaml", "--reference", "20", "--job", job]
-    done = run_parcontact(words, ranks=0)
-    assert done.returncode == 0, done.stderr
-    assert "12 branches" in done.stdout
-    assert "warning: the job's frequencies reach 1.8 decades above the measured band" in done.stdout
+    code, out, err = main(*words)
+    assert code == 0, err
+    assert "12 branches" in out
+    assert "warning: the job's frequencies reach 1.8 decades above the measured band" in out
     job.write_text(JOB)
     found = jobs.load(job).material
     assert isinstance(found, jobs.Zener)
     assert len(found.branches) == 12
     assert matplotlib.image.imread(tmp_path / "materials" / "rubber.png").shape[:2] == (900, 1200)
-    again = run_parcontact(words, ranks=0)
-    assert again.returncode == 0  # its own files are made anew
-    ratio = run_parcontact(["fit", "rubber.csv", "--poisson", "-1"], ranks=0)
-    assert ratio.returncode == 2
-    assert "must be a Poisson ratio above -1 and up to 0.5, got '-1'" in ratio.stderr
+    assert main(*words)[0] == 0  # its own files are made anew
+    code, _, err = main("fit", "rubber.csv", "--poisson", "-1")
+    assert code == 2
+    assert "must be a Poisson ratio above -1 and up to 0.5, got '-1'" in err
     (tmp_path / "mine.yaml").write_text("title: mine\n")
-    refused = run_parcontact(["fit", "rubber.csv", "--out", "mine.yaml"], ranks=0)
-    assert refused.returncode == 2
-    assert refused.stderr.startswith("parcontact: mine.yaml is there and was not written by parcontact fit")
+    code, _, err = main("fit", "rubber.csv", "--out", "mine.yaml")
+    assert code == 2
+    assert err.startswith("parcontact: mine.yaml is there and was not written by parcontact fit")
     assert (tmp_path / "mine.yaml").read_text() == "title: mine\n"
 
 

@@ -41,7 +41,7 @@ def test_tolerance_of_friction() -> None:
     assert calls_per_step(256, stages)[1] == pytest.approx(calls_per_step(256, stages, 1e-7)[1], rel=1e-3)
 
 
-@pytest.mark.mpi(2, 3)
+@pytest.mark.mpi(3)
 @pytest.mark.parametrize("velocity", [0.3, [0.0, 0.3]])
 def test_memory(comm: MPI.Intracomm, velocity: Any) -> None:
     """At most one map of a rank's rows per branch and 14 more, counted and traced, beside the blocks of transforms

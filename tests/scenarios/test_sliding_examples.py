@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from parcontact.storage import tables
 
 if TYPE_CHECKING:
-    from conftest import RunParcontact
+    from conftest import Main, RunParcontact
 
 
 def test_example_of_full_contact() -> None:
@@ -38,7 +38,8 @@ def test_example_of_a_sphere() -> None:
     assert_allclose(np.interp([0.2, 0.6, 1.0, 1.4, 1.8, 2.2], t, friction), promised, rtol=3e-2)
 
 
-def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", tmp_path: Path) -> None:
+@pytest.mark.rendered
+def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", main: "Main", tmp_path: Path) -> None:
     """As a user would, at an eighth of the waves and points: friction peaks and settles, the area falls; a picture."""
     job = JOBS / "velocity_step.yaml"
     smaller = ["--set", "grid.points=128", "--set", "surface.0.short_wavelength=1.25e-4", "--quiet"]
@@ -52,5 +53,5 @@ def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", tmp_path: P
     assert friction[peak] > 1.4 * friction[late].max()
     assert friction[peak] > 1.4 * friction[slow].max()
     assert area[late].max() < 0.3 * area[slow].min()
-    assert run_parcontact(["plot", tmp_path / "out"], ranks=0).returncode == 0
+    assert main("plot", tmp_path / "out")[0] == 0
     assert (tmp_path / "out/picture.png").stat().st_size > 10_000

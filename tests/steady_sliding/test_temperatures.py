@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import RunParcontact
+from conftest import Main, RunParcontact
 from mpi4py import MPI
 
 from parcontact import job as jobs
@@ -88,13 +88,13 @@ def test_bell_of_an_interface_is_shifted_like_the_bulk(tmp_path: Path) -> None:
     assert one.measures.friction == pytest.approx(other.measures.friction, rel=1e-10)
 
 
-def test_table_theory_and_picture(tmp_path: Path, run_parcontact: RunParcontact) -> None:
+def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: RunParcontact) -> None:
     """A row for each temperature, sorted, also where the curve goes on; theory over the same points; a master curve."""
     changes = ["--set", "numerics.tolerance=1e-6", "--set", "interface={shear_stress: 1.0e4}"]
     (tmp_path / "job.yaml").write_text(ROUGH + PARTS)
     words = ["steady", "job.yaml", "--out", "out", "--quiet", *changes]
-    done = run_parcontact([*words, "--temperatures=20"])
-    assert done.returncode == 0, done.stderr
+    code, _, err = main(*words, "--temperatures=20")
+    assert code == 0, err
     before = (tmp_path / "out/steady.csv").read_text().splitlines()[1:]
     done = run_parcontact([*words, "--temperatures=20,-5,60"], ranks=2)
     assert done.returncode == 0, done.stderr

@@ -181,16 +181,16 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_pat
     for ours, theirs in zip(rows(tmp_path / "out" / "study.csv"), table, strict=True):
         for name in ("mu_max", "mu_end", "area_corrected"):  # of one solve to 1e-7 each
             assert float(ours[name]) == pytest.approx(float(theirs[name]), rel=1e-5)
+    stop.touch()  # before the first case
     changed = main("study", job, "--set", "material.modulus_inf=3e5")[1]
     assert "4 cases, 0 of them are there already" in changed
 
 
-def test_a_case_that_cannot_be(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+def test_a_case_that_cannot_be(main: Main, tmp_path: Path) -> None:
     """All cases are read before the first is run; nothing is written."""
     job = tmp_path / "wave.yaml"
     job.write_text(WAVE.replace("waves: [1, 0]", "waves: [9, 0]").replace("[32, 64, 128]", "[16, 32]"))
-    found = run_parcontact(["study", job])
-    assert found.returncode == 2
-    assert "9" in found.stderr
-    assert "Traceback" not in found.stderr
+    code, _, err = main("study", job)
+    assert code == 2
+    assert "9" in err
     assert not (tmp_path / "out").exists()
