@@ -4,6 +4,7 @@
 
     fft      a forward and a backward transform, over FFTW alone; planning them, the first time and again
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
+    adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
@@ -20,9 +21,9 @@ Operator calls are those on the finest grid, coarser ones counted by their share
 CPU times, those of `march`, `scale` and `start` wall times. What is compared takes turns, round by round;
 shown are the median, and of the ratios of each round the median and the quartiles. The pressure error is the relative
 L2 distance from a solution to 1e-11, for every program alike, that of friction from steps to a tolerance of 5e-5,
-beside peers 1e-7. `--peers DIRECTORY` installs tamaas and aspher there, each in an environment of its own, and gives
-each 7 minutes of CPU time for `solve` and for `slide` to find the loosest tolerance by which it reaches the error; one
-that does not has a ratio of "more than".
+beside peers 1e-7. `--peers DIRECTORY` installs tamaas, aspher and Adhesion there, each in an environment of its own,
+and gives each 7 minutes of CPU time for `solve`, `adhesion` and `slide` to find the loosest tolerance by which it
+reaches the error; one that does not has a ratio of "more than".
 """
 
 import argparse
@@ -35,6 +36,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import runs
+from bench.adhesive import adhesion
 from bench.effects import effects
 from bench.program import start
 from bench.scaling import WORLD, march, scale, traffic
@@ -45,7 +47,7 @@ from bench.table import Line
 FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 PARTS = {"fft": fft, "solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
-PARTS |= {"folded": folded, "traffic": traffic, "memory": held, "sizes": sizes, "large": large}
+PARTS |= {"folded": folded, "traffic": traffic, "memory": held, "sizes": sizes, "large": large, "adhesion": adhesion}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 
@@ -79,7 +81,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--points", type=int, default=512, help="along x and y")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--json", type=Path, help="write the lines into this file, too")
-    parser.add_argument("--peers", type=Path, help="compare with tamaas and aspher, installed into this directory")
+    parser.add_argument(
+        "--peers", type=Path, help="compare with tamaas, aspher and Adhesion, installed into this directory"
+    )
     parser.add_argument("--picture", type=Path, help="draw the effects, like jobs/pictures/ablation.png")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
@@ -102,7 +106,7 @@ def main() -> int:
         print(f"WARNING: others keep {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores busy: trust counts, not times")
     lines = list[tuple[str, Line]]()
     for part, line in measure(asked.parts, asked):
-        print(f"{part:<8}{line}", flush=True)
+        print(f"{part:<9}{line}", flush=True)
         lines.append((part, line))
     if asked.json is not None:
         asked.json.write_text(as_json(lines) + "\n")

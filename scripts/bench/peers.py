@@ -71,6 +71,36 @@ def solve(tolerance):
     )
     return np.asarray(found.pressure).reshape(heights.shape)
 {COLD}"""
+TAMAAS_ADHESIVE = f"""{TAMAAS}
+def solve(tolerance):
+    model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
+    model.E, model.nu = 1.0, 0.0
+    solver = tm.PolonskyKeerRey(model, heights, tolerance, tm.PolonskyKeerRey.gap, tm.PolonskyKeerRey.gap)
+    law = tm.ExponentialAdhesionFunctional(heights)
+    law.parameters = {{"rho": float(given["range"]), "surface_energy": float(given["work"])}}
+    solver.addFunctionalTerm(law)
+    solver.max_iter = 20000
+    solver.solve(float(given["gap"]))
+    return model.traction
+{COLD}"""
+ADHESION_COLD = f"""\
+from Adhesion.Interactions import Exponential
+from Adhesion.System import BoundedSmoothContactSystem
+from ContactMechanics import PeriodicFFTElasticHalfSpace
+from NuMPI.Optimization.CCGWithoutRestart import constrained_conjugate_gradients
+from SurfaceTopography import Topography
+gap, law = float(given["gap"]), Exponential(float(given["work"]), float(given["range"]))
+body = PeriodicFFTElasticHalfSpace(heights.shape, young=1.0, physical_sizes=(1.0, 1.0))
+system = BoundedSmoothContactSystem(body, law, Topography(heights, physical_sizes=(1.0, 1.0)))
+def solve(tolerance):
+    objective, start = system.primal_objective(0.0, gradient=True), np.full(heights.size, gap)
+    own = {{"mean_val": gap, "gtol": tolerance * body.area_per_pt, "maxiter": 20000}}
+    found = constrained_conjugate_gradients(objective, system.primal_hessian_product, start, **own)
+    gaps = found.x.reshape(heights.shape)
+    p = -body.evaluate_force(gaps + heights) / body.area_per_pt
+    free = gaps > 0.0  # there p is -sigma: its mean is the load
+    return p - (p + law.evaluate(gaps, gradient=True)[1])[free].mean()
+{COLD}"""
 TAMAAS_SLIDING = f"""{TAMAAS}
 def attempt(tolerance):
     model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
