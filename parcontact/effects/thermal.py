@@ -1,26 +1,35 @@
-"""Heat of sliding: how warm the rubber becomes below the contact (`physics.heat`)."""
+"""Heat of sliding: how warm the rubber becomes below the contact (`physics.heat`, `physics.heat_memory`)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, replace
 from typing import Any, ClassVar, Literal
 
+import numpy as np
 from numpy.typing import DTypeLike
 from pydantic import Field
 
+from ..errors import InputError
+from ..history.timeline import Timeline
 from ..job.checks import limits
-from ..job.sections.part import Part, Rule
+from ..job.sections.part import Part
 from ..job.sections.quantities import Positive
-from ..job.text.fault import Fault
-from ..physics.entries import Entry
-from ..physics.heat import Conductor
+from ..parallel import spectra
+from ..parallel.fft import Spectrum
+from ..parallel.slab import Array
+from ..physics.entries import Entry, Saved
+from ..physics.exponentials import Exponentials, fit
+from ..physics.flash import Flash, flash_of
+from ..physics.heat import Conductor, depths_of
+from ..physics.heat_memory import Heating, HeatMemory
 from ..physics.units import Units
-from .effect import Decision, Instant
+from .effect import Decision, Effect, Instant
+from .folded_branches import phases
 
-
-def _no_march(thermal: Any, history: Any) -> Iterator[Fault]:
-    if thermal is not None and history:
-        yield Fault("is for steady sliding: leave out the history, and solve with `parcontact steady`", ("thermal",))
+LOOSEST, SHARE = 1e-3, 0.1  # accuracy: of the memory of heat: a share of the job's accuracy, this at most
+DECAYED = 10.0  # accuracy: heat of the longest wave of the box is forgotten when so many times its diffusion is over
 
 
 class Thermal(Part):
@@ -37,33 +46,138 @@ class Thermal(Part):
         return Conductor(self.conductivity, self.diffusivity)
 
 
+def exponentials_of(job: Any) -> Exponentials:
+    """Return the sum of exponentials of a job: from its shortest step since it slides to its longest wave of heat."""
+    body = job.section("thermal").conductor
+    longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
+    steps, slides = [longest / 10.0], False
+    for phase in phases(Timeline.of(job)):
+        slides = slides or any(phase.velocity)
+        if slides and phase.duration:
+            steps += [phase.first, phase.last]
+    return fit(min(step for step in steps if step > 0.0), longest, min(LOOSEST, SHARE * job.numerics.asked.strictest))
+
+
 class ThermalColumns:
-    """The mean temperature rise of the contact, weighted by heat, and the highest one of the surface [K]."""
+    """The mean temperature rise of the contact, weighted by heat, and the highest one of the surface [K].
+
+    Under a surface at rest the mean is weighted by the pressure. `rise` is the map [K], `flash` what it is like over
+    the contact.
+    """
 
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
-    rules: ClassVar[tuple[Rule, ...]] = (Rule(("thermal", "history"), _no_march),)
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 
     @staticmethod
     def decide(job: Any) -> Decision:
         section: Thermal | None = job.section("thermal")
-        why = "there is no thermal section" if section is None else f"feedback is {section.feedback}"
-        return Decision("thermal", section is not None, why)
+        if section is None:
+            return Decision("thermal", False, "there is no thermal section")
+        why = f"feedback is {section.feedback}"
+        return Decision("thermal", True, f"{why}; {exponentials_of(job).kept} exponentials" if job.history else why)
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        return ()
+        """Return the types of the map of temperatures, and of those that hold its spectra."""
+        count, rubs = 2 + exponentials_of(job).kept, job.section("interface") is not None
+        return [np.float64] * (count + rubs + math.ceil(count / spectra.per_map(job.grid.nx)))
 
-    def __init__(self, scene: Any) -> None: ...
+    def __init__(self, scene: Any) -> None:
+        self._setup, self._slab, job = scene.setup, scene.slab, scene.job
+        self._rubs, self._pulled = scene.choices.interface is not None, job.section("adhesion") is not None
+        body = job.section("thermal").conductor
+        self.memory = HeatMemory(scene.setup.fft, job.grid.size, body, exponentials_of(job), self._rubs)
+        self.rise, self.flash = self._slab.zeros(), Flash()
+        self._force, self._area = np.zeros(2), 0.0  # of the body [N], and in contact, at the end of the last step
+        self._warmed = self._current = False  # whether there was any heat, and whether the memory knows what is pressed
 
-    def follow(self, instant: Instant) -> None: ...
+    def follow(self, instant: Instant) -> None:
+        step, pressure = instant.step, instant.pressure
+        if self._pulled:
+            pressure = np.maximum(pressure, 0.0)
+        rubbed = np.where(pressure > 0.0, 1.0, 0.0) if self._rubs else None
+        sums = float(np.count_nonzero(pressure)), float(pressure.sum(dtype=np.float64))
+        area, mean = (value / self._slab.points for value in self._slab.sum(*sums))
+        scales = 1.0 / area if area > 0.0 else 0.0, 1.0 / mean if mean > 0.0 else 0.0
+        heating, weights = self._heat(instant), pressure
+        if any(step.velocity):
+            if not self._current or not step.dt:
+                self.memory.take(rubbed, pressure, scales)
+            if step.dt:
+                pressed = self._setup.fft.forward(pressure)
+                at = self._setup.half_space, self._setup.units.length, step.velocity, self._setup.prony
+                heating = replace(heating, depths=depths_of(pressed, self._setup.fft, *at))
+                self.memory.advance(step.dt, heating, rubbed, pressed, scales, self.rise)
+            self._warmed = self._current = True
+            if heating.whole[1] > 0.0:
+                weights = pressure * (scales[1] * heating.pressed[1])
+                weights += 0.0 if rubbed is None else rubbed * (scales[0] * heating.rubbed[1])
+        elif self._warmed and step.dt:
+            self.memory.rest(step.dt, self.rise)
+            self._current = False
+        if self._warmed:
+            self.flash = flash_of(self._slab, self.rise, weights)
+
+    def _heat(self, instant: Instant) -> Heating:
+        """Return the heat of a step, by the forces at both of its ends, and remember those of its end."""
+        measures, velocity = instant.measures, instant.step.velocity
+        speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
+        own = measures.friction_interface * measures.normal_force
+        force = np.array([measures.force_x, measures.force_y]) + own * np.array(velocity) / (speed or 1.0)
+        pressed = tuple(max(0.0, -float(each @ velocity)) / box for each in (self._force, force))
+        share = self._area / measures.contact_area if measures.contact_area > 0.0 else 0.0
+        self._force, self._area = force, measures.contact_area
+        return Heating((own * speed / box * (share if self._current else 1.0), own * speed / box), pressed)
 
     def values(self) -> Sequence[float]:
-        return (0.0, 0.0)
+        return self.flash.mean, self.flash.highest
+
+    # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, units: Units) -> dict[str, Entry]:
-        """Nothing is remembered."""
-        return {}
+        """Return the map, all spectra as maps, and what has no room in these; collective."""
+        known, flags = self.memory.sum, np.array([self._area, self._warmed, self._current])
+        found = {
+            "rise": Entry(self.rise, 1.0, "K"),
+            "mean": Entry(self.memory.mean.waves, 1.0, "J/m^2"),
+            "flash": Entry(np.array(astuple(self.flash)), 1.0, "K"),
+            "force": Entry(self._force.copy(), 1.0, "N"),
+            "state": Entry(flags),
+            "grid": Entry(np.array([known.first, known.spacing]), given=True),
+        }
+        per = spectra.per_map(self._slab.nx)
+        columns = spectra.edges(self._slab.nx)
+        for number, name, spectrum in self._spectra():
+            rest = found.setdefault(f"edges {number // per}", Entry(np.zeros(self._slab.shape), optional=True))
+            where, field = columns * (number % per), np.empty(self._slab.shape)
+            spectra.to_map(self._setup.fft, spectrum, field, np.asarray(rest.value)[:, where : where + columns])
+            found[name] = Entry(field, optional=True)
+        return found
 
-    def restore(self, saved: Any) -> None: ...
+    def _spectra(self) -> Iterator[tuple[int, str, Spectrum]]:
+        """Yield all spectra with a number and a name; more waves along the depth come last."""
+        yield 0, "pressed", self.memory.pressed
+        if self._rubs:
+            yield 1, "rubbed", self.memory.rubbed
+        yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(self.memory.waves))
+
+    def restore(self, saved: Saved) -> None:
+        """Go on from a checkpoint; collective. Waves of shorter steps than before, which it lacks, begin at 0."""
+        per, columns = spectra.per_map(self._slab.nx), spectra.edges(self._slab.nx)
+        for number, name, spectrum in self._spectra():
+            if name in saved:
+                rest, where = saved[f"edges {number // per}"], columns * (number % per)
+                spectra.from_map(self._setup.fft, saved[name], rest[:, where : where + columns], spectrum)
+        self.memory.mean.waves[...] = saved["mean"]
+        self.flash = Flash(*map(float, saved["flash"]))
+        self._force, self._area = np.array(saved["force"]), float(saved["state"][0])
+        self._warmed, self._current = bool(saved["state"][1]), bool(saved["state"][2])
+
+
+def temperature_of(effects: Mapping[str, Effect]) -> Array:
+    """Return this rank's rows of the temperature rise [K]; raises InputError without the effect that has it."""
+    thermal = effects.get("thermal")
+    if not isinstance(thermal, ThermalColumns):
+        raise InputError("there is no field 'temperature' without a thermal section in the job")
+    return thermal.rise.copy()

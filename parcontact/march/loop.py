@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..effects.thermal import temperature_of
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.budget import ErrorSums
@@ -83,11 +84,14 @@ class March:
         save(path, self.scene, self.state, facts)
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], a new array; collective.
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or the rise of
+        `temperature` [K], a new array; collective. Raises InputError for a temperature that is not calculated.
 
         `height` is that of the rigid surface where it is now, so that `gap = displacement - height - approach`.
         """
         scene, state, units = self.scene, self.state, self.scene.units
+        if name == "temperature":
+            return temperature_of(scene.followers)
         if name == "pressure":
             return state.pressure * (state.alpha * units.pressure)
         if name == "displacement":

@@ -234,3 +234,50 @@ def displace(h, rows, along_x, along_y, out):
         j = rows[k]
         for i in range(h.shape[1]):
             out[j, i] = along_x[i] * along_y[j] * h[k, i]
+
+
+@loop
+def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
+    """Advance all waves of heat, form the spectrum of the temperature in `out`, and keep the present sources
+    (`physics.heat_memory`).
+
+    `known` are rates, weights, shares of heat at depth, decays and the end of the sum; `sources` the spectra of what is
+    rubbed and pressed, each before the step and after. `out` may be one of the latter; without any rubbing these
+    spectra have no row. `heats` has the heat of both at the two ends of the step.
+    """
+    rates, weights, deep, fall, end = known
+    spread_x, spread_y = spread
+    rubbed, fresh, pressed, now = sources
+    rubs = fresh.shape[0] > 0
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            k2 = spread_x[i] + spread_y[j]
+            slows = np.exp(-k2 * dt)
+            fresh_here = scales[0] * fresh[j, i] if rubs else 0.0j
+            old_here = rubbed[j, i] if rubs else 0.0j
+            now_here = scales[1] * now[j, i]
+            on_before, on_after = heats[0, 0] * old_here, heats[0, 1] * fresh_here
+            in_before, in_after = heats[1, 0] * pressed[j, i], heats[1, 1] * now_here
+            total = 0.0j
+            for n in range(rates.size):
+                rate = rates[n] + k2
+                x = rate * dt
+                e = fall[n] * slows if n < waves.shape[0] else 0.0
+                if x < 1e-3:
+                    mean = 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))
+                    after = 0.5 - x * (1.0 / 6.0 - x / 24.0)
+                else:
+                    mean = (1.0 - e) / x
+                    after = (1.0 - mean) / x
+                c = dt * ((mean - after) * (on_before + deep[n] * in_before) + after * (on_after + deep[n] * in_after))
+                if n < waves.shape[0]:
+                    c += e * waves[n, j, i]
+                    waves[n, j, i] = c
+                total += weights[n] * c
+            if k2 > 0.0:
+                root = np.sqrt(k2)
+                total += 2.0 / np.pi * np.arctan(root / end) / root * on_after / effusivity
+            if rubs:
+                rubbed[j, i] = fresh_here
+            pressed[j, i] = now_here
+            out[j, i] = total

@@ -1,16 +1,19 @@
 """Temperatures of contacts: exact for a wave in full contact, what they need, and that they cost nothing else."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from marching import marched
 from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab
+from parcontact.python.simulation import Simulation
 from parcontact.steady_sliding.sliding import SteadySliding
 
 PRESSURE, SPEED, LENGTH = 1e5, 0.2, 1e-3
@@ -18,9 +21,9 @@ RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "r
 WARM = {"conductivity": 0.2, "diffusivity": 1e-7}
 
 
-def job(**more: Any) -> Job:
+def data(**more: Any) -> dict[str, Any]:
     """A wave on 32 cells, in full contact."""
-    data = {
+    found = {
         "grid": {"points": [32, 4], "size": [LENGTH, LENGTH / 8]},
         "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [2, 0]},
         "material": RUBBER,
@@ -29,7 +32,11 @@ def job(**more: Any) -> Job:
         "thermal": WARM,
         **more,
     }
-    return Job.model_validate({key: value for key, value in data.items() if value is not None})
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def job(**more: Any) -> Job:
+    return Job.model_validate(data(**more))
 
 
 def states(made: Job) -> SteadySliding:
@@ -78,13 +85,104 @@ def test_a_map_costs_as_a_branch() -> None:
     assert counts["operator"] == 1
 
 
+# -- marches ----------------------------------------------------------------------------------------------------------
+
+ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
+RUBS = {"shear_stress": 1e5}
+SLIDE = {"pressure": PRESSURE, "velocity": SPEED, "distance": 4 * LENGTH, "cells_per_step": 1}
+PARTIAL = {"shape": "wave", "amplitude": 1e-5, "waves": [2, 0]}
+
+
+def march_data(**more: Any) -> dict[str, Any]:
+    return data(**{"steady": None, "history": [SLIDE], "numerics": {"tolerance": 1e-8}, **more})
+
+
+def test_a_march_becomes_steady() -> None:
+    """A wave in full contact that slides by eight times the box: its rise becomes the steady one, beside the mean that
+    goes on to grow. To the 1.3 % that steps of a 16th of the wave leave, pi^2/3/16^2, and what is left of the start."""
+    fast = {**WARM, "diffusivity": 1e-6}  # forgets in a tenth of the time
+    march = marched(march_data(history=[{**SLIDE, "distance": 8 * LENGTH}], thermal=fast))[0]
+    sliding = states(job(numerics={"tolerance": 1e-8}, thermal=fast))
+    sliding.solve((SPEED, 0.0), PRESSURE)
+    found, steady = march.field("temperature"), sliding.field("temperature")
+    assert np.abs(found - found.mean() - steady).max() < 0.03 * np.abs(steady).max()
+
+
+def test_heat_in_is_heat_stored() -> None:
+    """An elastic wave that is rubbed fast, slowly, and then rests: the mean temperature is that of a half space under
+    so much constant heat, as measured forces have made, to 1e-6; and the heat in the body is their work, to 1e-9."""
+    slow = {**SLIDE, "velocity": SPEED / 4, "distance": LENGTH}
+    rest = {"pressure": PRESSURE, "duration": 0.01, "time_step": 1e-3}
+    made = march_data(material=ELASTIC, interface=RUBS, surface=PARTIAL, history=[SLIDE, slow, rest])
+    means, work = [0.0], [0.0]
+    march, rows = marched(
+        made,
+        [
+            lambda state: means.append(float(state.field("temperature").mean())),
+            lambda state: work.append(-state.row.measures.force_x),
+        ],
+    )
+    area = LENGTH * LENGTH / 8
+    powers = np.array([work[2] * SPEED, work[-20] * SPEED / 4, 0.0]) / area  # W/m^2
+    starts = np.array([0.0, 4 * LENGTH / SPEED, 8 * LENGTH / SPEED])
+    changes = np.diff(powers, prepend=0.0)
+    for row, mean in zip(rows[1:], means[2:], strict=True):
+        ages = np.sqrt(np.maximum(row.time - starts, 0.0))
+        exact = 2 / math.sqrt(math.pi) * float(changes @ ages) / math.sqrt(0.2**2 / 1e-7)
+        assert mean == pytest.approx(exact, rel=1e-6)
+    heat = march.scene.followers["thermal"].memory.mean.stored * area  # type: ignore[attr-defined]
+    distances = np.diff([row.distance for row in rows])
+    assert heat == pytest.approx(float(np.sum(np.array(work[2:]) * distances)), rel=1e-9)
+
+
+@pytest.mark.mpi(2)
+def test_a_restart_goes_on_bit_for_bit(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """Also at rest after sliding; on another number of ranks to 1e-9 (sums in another order)."""
+    grid = {"points": [16, 6], "size": [LENGTH, LENGTH / 2]}
+    rest = {"pressure": PRESSURE, "duration": 1e-3, "time_step": 2e-4}
+    history = [{**SLIDE, "distance": LENGTH / 4}, rest, {**SLIDE, "velocity": [0.1, 0.05], "distance": LENGTH / 4}]
+    made = march_data(grid=grid, interface=RUBS, surface=PARTIAL, history=history)
+    whole = Simulation(made, comm=comm)
+    saved = []
+    for row in whole.steps():
+        if row.step in (3, 7):
+            whole.save(shared_path / f"{row.step}.h5")
+            saved.append(row.step)
+    assert saved == [3, 7]
+    for step in saved:
+        again = Simulation.restore(shared_path / f"{step}.h5", comm=comm)
+        again.run()
+        assert np.array_equal(again.field("temperature"), whole.field("temperature"))
+        assert again.row.flash_temperature == whole.row.flash_temperature
+    alone = Simulation.restore(shared_path / "7.h5", comm=MPI.COMM_SELF)
+    alone.run()
+    rows = alone.field("temperature")[whole.rows]
+    assert np.abs(rows - whole.field("temperature")).max(initial=0.0) < 1e-9 * whole.row.max_temperature
+
+
+def test_a_step_costs_two_transforms_more() -> None:
+    """Of the pressure and of the rise, and one of what is rubbed; the map of a branch takes none, and an application of
+    the operator two. No operator, and no collective but three sums."""
+    plain, warm, rubbed = (
+        marched(march_data(**more))[0].scene.slab.tally for more in ({"thermal": None}, {}, {"interface": RUBS})
+    )
+    steps = 128
+    assert warm["fft"] - plain["fft"] == 2 * steps + 1  # one more before the first step
+    assert rubbed["fft"] - plain["fft"] == 3 * steps + 2
+    assert warm["operator"] == rubbed["operator"] == plain["operator"]
+
+
+def test_without_it_nothing() -> None:
+    """A job without the section has the counts of everything as before, and no map is held."""
+    assert "thermal" not in marched(march_data(thermal=None))[0].scene.followers
+
+
 @pytest.mark.parametrize(
     ("lines", "sentence"),
     [
         ("thermal: {conductivity: 0.2}", "5:10: thermal.diffusivity is missing"),
         ("thermal: {conductivity: -1, diffusivity: 1.0e-7}", "thermal.conductivity must be a positive conductivity"),
         ("output: {fields: [temperature]}", "output.fields has temperature, which needs a thermal section"),
-        ("thermal: {conductivity: 0.2, diffusivity: 1.0e-7}\nhistory: [{pressure: 1.0e5}]", "is for steady sliding"),
     ],
 )
 def test_mistakes(tmp_path: Any, lines: str, sentence: str) -> None:

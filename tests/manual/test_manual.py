@@ -140,7 +140,8 @@ def test_the_page_has_range_unit_and_default() -> None:
 
 COLUMNS = {
     "measures.csv": [
-        *row.columns(0, (*AdhesionColumns.columns, *InterfaceColumns.columns, *LeakageColumns.columns)),
+        *row.columns(0, (*AdhesionColumns.columns, *InterfaceColumns.columns)),
+        *(*LeakageColumns.columns, *ThermalColumns.columns),
         "dissipated_K",
     ],
     "leak.csv": leak.Instant._fields,
