@@ -11,8 +11,7 @@
     folded   what branches without a map save, and what friction is then wrong by
     effects  what each effect adds to a step at equal iterations; --picture draws it
     start    the command line, over an interpreter that only imports numpy
-    traffic  what passes through memory in a cold iteration and in a sliding step, loop by loop, counted on one rank
-    scale    a transform, a cold solve and a sliding step on two ranks, over one, by part; and what memory lets at most
+    scale    a transform, a cold solve and a sliding step on two ranks, over one
     memory   bytes of a run as they are planned and held, and in maps
     sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
     large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
@@ -39,7 +38,7 @@ import runs
 from bench.adhesive import adhesion
 from bench.effects import effects
 from bench.program import start
-from bench.scaling import WORLD, march, scale, traffic
+from bench.scaling import WORLD, march, scale
 from bench.slides import folded, held, slide, steady
 from bench.solves import fft, large, sizes, solve
 from bench.table import Line
@@ -47,7 +46,7 @@ from bench.table import Line
 FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 PARTS = {"fft": fft, "solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
-PARTS |= {"folded": folded, "traffic": traffic, "memory": held, "sizes": sizes, "large": large, "adhesion": adhesion}
+PARTS |= {"folded": folded, "memory": held, "sizes": sizes, "large": large, "adhesion": adhesion}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 

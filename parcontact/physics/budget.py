@@ -2,8 +2,8 @@
 
 Each part is an estimate of a relative error (1 is all of it), found by experiment: spheres, cylinders and rough
 surfaces from 0.4 % to full contact, bodies of one to twelve branches, starts and jumps of velocity, against runs with
-finer steps, meshes and tolerances. `scripts/error_budget.py` tells how they compare with true errors, in the mean over
-several random surfaces: on one of them an error may happen to be next to nothing, of which no estimate knows.
+finer steps, meshes and tolerances. `scripts/error_coverage.py` tells how they compare with true errors in random
+scenes. On one of them an error may happen to be next to nothing, of which no estimate knows.
 
 solver: from the `complementarity` C of the certificate (see `solve.contact.Certificate`). Friction is wrong in
     proportion to it, less where many spots of contact average it out, by the root of the root of their number. Area is

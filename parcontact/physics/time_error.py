@@ -18,7 +18,7 @@ It knows nothing else of the material or of the speed. Jumps, loads that change 
 (`embedded`). Together they are 0.5 to 2.7 times the true error of 36 slides in steps of a cell, a half and a quarter:
 spheres, cylinders and rough surfaces from 0.8 % to full contact, 0.005 to 10 m/s, bodies of one branch, of five and of
 twelve, steady or at three hundred times the speed of before; but for one error of 42 % (0.43). The constants are
-fitted to these; the scenes of `scripts/error_budget.py` are others.
+fitted to these; most scenes of `scripts/error_coverage.py` are others.
 
 Over one step the pair differs in the second order of the step where all branches are slow, in the first where some are
 as fast as the step is short; the error that all steps of the exponential integrator leave in the end is of an order of

@@ -1,4 +1,4 @@
-"""The arithmetic of the error budget; what it says of real runs is in scripts/error_budget.py and its test."""
+"""The arithmetic of the error budget; what it says of real runs is in scripts/error_coverage.py."""
 
 import math
 from dataclasses import astuple, replace

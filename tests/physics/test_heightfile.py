@@ -140,7 +140,7 @@ def test_cut_short(comm: MPI.Intracomm, shared_path: Path) -> None:
         (b"", "has shape (0, 7)"),
         (b"# only a comment\n", "has shape (0, 7)"),
         (b"1 2 3\n", ":1 has 3 numbers"),
-        (b"1,2,3,4,5,6,7\n" * NY, ":1 has 1 numbers"),
+        (b"1,2,3,4,5,6,7\n" * NY, "its numbers are separated by commas"),
         (b"1 2 3 4 5 6 7\n" * (NY - 1) + b"1 2 3 4 5 6 high\n", "cannot be read: could not convert string to float"),
         (b"1 2 3 4 5 6 7\n" * (NY - 1) + b"1 2 3 4 5 6\n", f":{NY} has 6 numbers"),
         (b"\xff\xfe\x00 2 3 4 5 6 7\n" * NY, "cannot be read: "),

@@ -1,17 +1,14 @@
-"""Iterations do not grow out of hand at any load, and the last gap closes without coming and going.
-
-At 512 x 512 points `scripts/load_sweep.py` finds at most 34.
-"""
+"""Iterations do not grow out of hand at any load, and the last gap closes without coming and going."""
 
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from marching import load_script
 from numpy.testing import assert_allclose
 
+from . import load_sweep
+
 LIMIT = 60  # iterations to 1e-6
-load_sweep = load_script("load_sweep")
 
 
 @pytest.mark.parametrize("surface", ["sixteen cells", "two cells", "paraboloid"])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from parcontact.job import Job, load, load_cases
 from parcontact.parallel.slab import Slab
 from parcontact.report import prediction
-from parcontact.summary import slide, sweep_table
+from parcontact.summary import slide
 from parcontact.summary.slide import Slide
 from parcontact.theory import hertz
 
@@ -158,30 +158,3 @@ def test_tyre() -> None:
     assert ours.mu_max > 1.2 * ours.mu_dyn
     assert theirs.mu_max < ours.mu_max
     assert theirs.contact_area < ours.contact_area
-
-
-def test_claims(tmp_path: Path) -> None:
-    """The table from made-up sweeps: whether a claim holds is said as it is."""
-    claims = load_script("paper_claims")
-    for name, key, values in (
-        ("fig09_velocities", "history.1.velocity", (0.1, 0.3, 1.0)),
-        ("fig10_pressures", "history.1.pressure", (1e5, 3e6, 1e7)),
-    ):
-        (tmp_path / name).mkdir()
-        cases = load_cases(JOBS / "paper" / f"{name}.yaml", [f"sweep=[{{{key}: [{', '.join(map(repr, values))}]}}]"])
-        frictions, areas = (
-            ((0.01, 0.02, 0.015), (0.1, 0.1, 0.1)) if "velocity" in key else ((0.3, 0.1, 0.03), (0.2, 1, 1))
-        )
-        rows = [
-            {**case.settings, "case": case.number, "mu_max": 2 * mu, "mu_dyn": mu, "contact_area": area}
-            | {"theory_mu_max": mu, "theory_mu_dyn": 0.9 * mu, "theory_contact_area": 0.5 * area}
-            for case, mu, area in zip(cases, frictions, areas, strict=True)
-        ]
-        rows = [{"case": row.pop("case"), **row, "state": "finished"} for row in rows]
-        sweep_table.save(tmp_path / name / "sweep.csv", list(rows[0]), rows)
-    found = dict(claims.claims(tmp_path))
-    assert found["mu_max grows with V1 throughout"] == "no"
-    assert found["steady friction is highest at 0.3 m/s in both"] == "0.3 m/s; theory: 0.3 m/s"
-    assert found["in full contact both agree"] == "to 10.0 %"
-    assert found["in full contact friction falls like 1/P"].startswith("like P^-1.00")
-    assert "-50 ... -50 %" in found["the theory's contact area is smaller, by less than 15 %"]

@@ -31,10 +31,6 @@ SMALL = {
         r"curve: the most of them +\d{2,3}[. ].*12 branches over.*info.*allowed 0.001: branches with a map +5 .*"
         r"in all.*planned.*each branch.*solve: speed of 2 ranks",
     ),
-    "error_budget": Small(
-        ["rough", "--points", "48", "--finer", "4", "--surfaces", "1"],
-        r"(?s)rough, exp .*time friction: estimates are \d\.?\d* to \d\.?\d* times ",
-    ),
     "error_coverage": Small(
         ["--scenes", "2", "--from", "13"], r"(?s)first half: 2 \| both .*2 scenes, .*written: ", (0, 1)
     ),
@@ -43,17 +39,11 @@ SMALL = {
     ),
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
-    "load_sweep": Small(["128", "1e-4"], r"(?s)at most [12]?\d\n.*at 1.01: .* 0 reversals"),
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
-    "paper_claims": Small(["--from", "nowhere"], r"", (1,)),  # it reads sweeps: tests/scenarios/test_paper.py has some
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),
-    "random_steady": Small(["--trials", "2", "--points", "64"], r"2 made: 0 with faults; .*2 solved"),
     "steady_table": Small(["128"], r"(?m)^[0-2] are off", (0, 1)),  # at 512 points none is
-    "time_steps": Small(
-        ["48", "cylinder", "--accuracies", "0.05", "--ladder", "2", "1", "0.5"], r"(?m)^error over accuracy: 0\.\d\d at"
-    ),
 }
 
 

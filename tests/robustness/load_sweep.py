@@ -1,12 +1,9 @@
 """Iterations of cold contact solves over all loads, from one point to all but one in ten thousand, and the last gap.
 
-    python scripts/load_sweep.py [points] [tolerance]
-
 Rough surfaces down to sixteen and to two cells per wave, and a sphere. For Westergaard's and Johnson's waves at 0.99, 1
 and 1.01 of the load of full contact: how many points are open after each iteration.
 """
 
-import sys
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -86,22 +83,3 @@ def reversals(count: list[int]) -> int:
     """How often a count that has fallen rises, or the other way round."""
     steps = [after - before for before, after in pairwise(count) if after != before]
     return sum(first * second < 0 for first, second in pairwise(steps))
-
-
-def main(points: int = 512, tolerance: float = 5e-6) -> None:
-    surfaces = {"16 cells": rough(points, 16), "2 cells": rough(points, 2), "paraboloid": paraboloid(points)}
-    for name, heights in surfaces.items():
-        print(f"{name}: load/E*, contact, iterations")
-        most = 0
-        for load, area, found in sweep(heights, tolerance):
-            print(f"  {load:9.2e} {area:10.6f} {found.iterations:4d} {found.failure}")
-            most = max(most, found.iterations)
-        print(f"  at most {most}")
-    for two_ways, name in ((False, "Westergaard"), (True, "Johnson")):
-        for share in (0.99, 1.0, 1.01):
-            count = last_gap(points // 4, two_ways, share, 1e-3 * tolerance)
-            print(f"{name} at {share}: open points {count}, {reversals(count)} reversals")
-
-
-if __name__ == "__main__":
-    main(*(kind(word) for kind, word in zip((int, float), sys.argv[1:], strict=False)))
