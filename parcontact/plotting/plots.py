@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..job.reading import CASES
 from ..storage import files, hdf5
 from ..summary import sweep_table, theory_settings
-from . import charts, histories, maps, steady, style, sweep
+from . import charts, histories, maps, steady, style, sweep, units
 from .charts import Chart
 from .run import Run, label_frames
 
@@ -202,7 +202,7 @@ def _name_directories(directories: Sequence[Path]) -> list[str]:
 
 
 def _name_cases(directories: Sequence[Path]) -> list[str]:
-    """Return the keys in which cases of one sweep differ, as `velocity 0.1, seed 2`; nothing for other directories."""
+    """Return the keys in which cases of one sweep differ, as `velocity 1 m/s, seed 2`; nothing for others."""
     paths = [directory.absolute() for directory in directories]
     table = paths[0].parent.parent / sweep.TABLE if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
@@ -211,8 +211,10 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
     rows = [known[path.name] for path in paths if path.name in known]
     keys = list(rows[0])[1 : list(rows[0]).index("state")] if rows else []
     differing = [key for key in keys if len({row[key] for row in rows}) > 1]
-    told = ({key.split(".")[-1]: row[key] for key in differing} for row in rows)
-    names = [
-        ", ".join(f"{key} {v:.4g}" if isinstance(v, float) else f"{key} {v}" for key, v in one.items()) for one in told
-    ]
+    names = [", ".join(_name_value(key.split(".")[-1], row[key]) for key in differing) for row in rows]
     return names if len(set(names)) == len(paths) and all(names) else []
+
+
+def _name_value(key: str, value: Any) -> str:
+    """Return a key of a sweep and its value, as `velocity 100 mm/s`."""
+    return f"{key} {units.text(value, sweep.UNITS.get(key, ''), 4)}" if isinstance(value, float) else f"{key} {value}"

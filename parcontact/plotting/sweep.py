@@ -20,6 +20,7 @@ from .charts import FRACTION, Axis, Chart, Series
 TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "force": "N", "size": "m", "distance": "m", "duration": "s"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "shear_modulus": "Pa"}
+UNITS |= {"work": "J/m²", "range": "m"}
 MAX_LINES = 3  # of a second key
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 PANELS = (  # measures and their columns by the names of lines

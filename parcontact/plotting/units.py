@@ -11,12 +11,12 @@ PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 def prefixed(unit: str, largest: float) -> tuple[str, float]:
     """Return the unit with the prefix that suits the largest value, and its size in the unit without one.
 
-    Squares as m² go up by a million; they keep the larger unit down to a thousandth of it. No unit and degrees have no
+    Squares, m², go up by a million; they keep the larger unit down to a thousandth of it. No unit and degrees have no
     prefix, and there are no kiloseconds.
     """
     if unit in ("", "°C") or not largest:
         return unit, 1.0
-    square = unit.endswith("²")
+    square = unit == "m²"
     order = math.log10(abs(largest)) + 1e-9
     power = 3 * math.floor((order + 3.0) / 6.0 if square else order / 3.0)
     power = min(max(power, min(PREFIXES)), 0 if unit == "s" else max(PREFIXES))

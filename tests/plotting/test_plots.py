@@ -249,7 +249,7 @@ def test_cases_of_a_sweep_are_told_apart_by_their_keys(tmp_path: Path, drawn: li
     (tmp_path / "sweep.csv").write_text("case,history.1.velocity,surface.0.seed,state\n" + "".join(rows))
     for chosen, expected in (
         (cases[:2], ["seed 1", "seed 2"]),
-        (cases, ["velocity 0.1, seed 1", "velocity 0.1, seed 2", "velocity 10, seed 2"]),
+        (cases, ["velocity 100 mm/s, seed 1", "velocity 100 mm/s, seed 2", "velocity 10 m/s, seed 2"]),
     ):
         assert asked(*chosen, "--compare", "--out", tmp_path / "both.png") == 0
         texts = drawn.pop().legends[0].get_texts()

@@ -20,6 +20,7 @@ def test_prefixes(largest: float, label: str) -> None:
         (999.96, "m", "1 km"),
         (2.5e-8, "m²", "0.025 mm²"),
         (3e-10, "m²", "300 µm²"),
+        (0.05, "J/m²", "50 mJ/m²"),
         (0.3, "", "0.3"),
         (0.0, "s", "0 s"),
     ],
