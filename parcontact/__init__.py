@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .python.results import open
     from .python.simulation import Simulation
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = ["InputError", "JobError", "RunError", "Simulation", "leak", "material", "open", "steady", "surface"]
 
 _ROOMS = {
