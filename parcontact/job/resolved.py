@@ -11,7 +11,7 @@ from .text import yamltext
 
 RESOLVED = "job.resolved.yaml"
 STEADY_RESOLVED = "steady.resolved.yaml"
-SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady")  # versions differ in other sections
+SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady", "adhesion")  # others differ by version
 FILES = ("file", "topography")  # shapes that come from files
 
 

@@ -22,6 +22,14 @@ class StepError(RunError):
     """A step that could not be made; the run is as it was before it."""
 
 
+class DetachedError(Exception):
+    """The surfaces have come off in a step that ends at `time` [s] under a `load`; the run is as it was before it."""
+
+    def __init__(self, time: float, load: float, sentence: str) -> None:
+        super().__init__(sentence)
+        self.time, self.load = time, load
+
+
 def where(scene: Scene, step: Step) -> str:
     """Return number, time and stage of a step."""
     return f"step {step.number} at t = {step.time:g} s (stage {scene.choices.timeline.history[step.stage].name!r})"

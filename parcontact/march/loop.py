@@ -14,6 +14,7 @@ from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
+from .failure import DetachedError
 from .rest import next_step
 from .state import State, entries, first_state, restored, save
 from .step import make_step
@@ -22,12 +23,14 @@ from .step import make_step
 class March:
     """A scene at an instant; it advances step by step.
 
-    `compare`, if there is one, returns a row with errors that are known better than from the step alone.
+    `compare`, if there is one, returns a row with errors that are known better than from the step alone. `detached`
+    says, in a sentence, that surfaces which stick have come off under their load: there is no further step then.
     """
 
     def __init__(self, scene: Scene, state: State | None = None) -> None:
         self.scene = scene
         self.compare: Callable[[Row], Row] = lambda row: row
+        self.detached = ""
         self.state = self._weighed(first_state(scene) if state is None else state)
 
     @property
@@ -46,12 +49,19 @@ class March:
         """
         timeline = self.timeline() if timeline is None else timeline
         stop = len(timeline) if until is None else timeline.first_reaching(until)
-        while self.row.step < len(timeline):
+        while self.row.step < len(timeline) and not self.detached:
             yield next_step(self.scene, self.state, timeline, stop)
 
     def advance(self, step: Step) -> Row:
         """Make the next state; collective. Raises StepError, and stays where it is, when that cannot be."""
-        self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
+        try:
+            self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
+        except DetachedError as end:
+            assert self.state.sticking is not None
+            held = f"{self.row.measures.pressure:g} Pa at t = {self.row.time:g} s was held"
+            self.detached = f"detached at t = {end.time:g} s: {end}; {held}"
+            memory = replace(self.state.sticking, detached=(end.time, end.load))
+            self.state = replace(self.state, sticking=memory)
         return self.row
 
     def _weighed(self, state: State, since: Row | None = None) -> State:
@@ -124,6 +134,8 @@ def run(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None
         steps = march.steps()
     for step in steps:
         march.advance(step)
+        if march.detached:
+            return False
         if run_tasks(march, tasks):
             return True
     return False

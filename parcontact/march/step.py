@@ -23,10 +23,11 @@ from ..solve.problem import Approach, MeanPressure, Problem
 from ..storage.row import Row
 from . import failure, sticking
 from .errors import Solved, estimate_errors
-from .failure import StepError
+from .failure import DetachedError, StepError
 from .starts import Past, cells_moved, make_start
 from .state import State, energies_of
 
+UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
 FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 
 
@@ -128,7 +129,14 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
 def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: MeanPressure | Approach) -> Solved:
     """Solve a step with adhesion, measure it and let the body go on; collective. Raises StepError."""
     assert state.sticking is not None
-    stuck = sticking.solve(scene, state.sticking, step, trial, control, state.spare)
+    path = sticking.Path(_value_before(scene, state, trial, control), control)
+    stuck, remark = sticking.solve(scene, state.sticking, step, trial, path, state.spare), ""
+    if stuck.detached:
+        sentence = f"nothing holds the surfaces under a {step.control} of {step.load:g}{UNITS[step.control]} any more"
+        if not scene.goes_on_open:
+            raise DetachedError(step.time, step.load, sentence)
+        stuck = sticking.open_up(scene, stuck, trial)
+        remark = f"{failure.where(scene, step)}: {sentence}" if state.row.measures.contact_area > 0.0 else ""
     contact = stuck.contact
     if contact.failure and not _accepts(scene, contact):
         moved = math.hypot(*cells_moved(scene, step, state.position))
@@ -138,7 +146,14 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
     memory = scene.material.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
-    return Solved(step, trial, contact, measures, memory, stuck=stuck)
+    return Solved(step, trial, contact, measures, memory, remark, stuck=stuck)
+
+
+def _value_before(scene: Scene, state: State, trial: Trial, control: MeanPressure | Approach) -> float:
+    """Return what was, after the last step, of what is prescribed in this one, in the run's units."""
+    if isinstance(control, MeanPressure):
+        return state.row.measures.pressure / (trial.alpha * scene.units.pressure)
+    return state.approach
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:

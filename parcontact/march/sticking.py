@@ -4,7 +4,7 @@ The gap is a part of the state: under the same load there are several equilibria
 starts from the last two gaps, extrapolated in time and moved with the surface by whole cells.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +17,20 @@ from ..physics.body import Trial
 from ..physics.entries import Entry, MapCount, Saved
 from ..scene import Scene
 from ..solve.adhesive import kernels
+from ..solve.certificate import Certificate
 from ..solve.contact import Contact
 from ..solve.problem import Approach, MeanPressure
 from .starts import cells_moved
 
+MANY_ITERATIONS = 15  # tuning: of a solve that is near a snap, or starts far away
+JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
+LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
+LOOSE = 3.0  # tuning: times the tolerance of parts
+OPEN = 10.0  # physics: ranges of attraction between surfaces that have come off
 LEAST_TENSION = 1e-2  # physics: of the largest attraction: less is not counted as an area under tension
+
+
+NEVER = (-1.0, 0.0)
 
 
 class PastGap(NamedTuple):
@@ -34,68 +43,128 @@ class PastGap(NamedTuple):
 
 @dataclass(frozen=True)
 class StickingMemory:
-    """Memory of a contact that sticks: the last gaps, the newest first, and a spare map.
+    """Memory of a contact that sticks: the last gaps, the newest first, and two spare maps.
 
     `lag` is what a free body lacks (`solve.adhesive.sticking`) per pressure, for the modulus `modulus`, None of a
     periodic one. `surface` is the energy of the surfaces and `snapped` that lost in snaps, in the unit of energies.
+    `detached` is when nothing held the surfaces any more [s], under which load; NEVER before.
     """
 
     pasts: tuple[PastGap, PastGap]
     spare: Array
+    held: Array
     lag: Array | None
     modulus: float = 0.0
     surface: float = 0.0
     snapped: float = 0.0
+    detached: tuple[float, float] = NEVER
 
 
 class StuckContact(NamedTuple):
-    """The contact of a step, the memory after it, where the surfaces touch, and whether they have come apart."""
+    """The contact of a step, the memory after it, where the surfaces touch, and its numbers for columns; `detached`
+    says that nothing holds the load any more."""
 
     contact: Contact
     memory: StickingMemory
     touching: Array
-    detached: bool
     columns: tuple[float, ...]
+    detached: bool
 
 
 def count_maps(free: bool) -> MapCount:
     """Count the maps of a memory, in a `free` box or a periodic one."""
-    return MapCount(held=3 + free, saved=2 + free)
+    return MapCount(held=4 + free, saved=2 + free)
 
 
 def at_rest(scene: Scene) -> StickingMemory:
     """Return the memory before the first step, in new maps."""
     slab = scene.slab
     lag = slab.zeros() if scene.choices.isolated.on else None
-    return StickingMemory((PastGap(slab.zeros()), PastGap(slab.zeros())), slab.zeros(), lag)
+    pasts = PastGap(slab.zeros()), PastGap(slab.zeros())
+    return StickingMemory(pasts, slab.zeros(), slab.zeros(), lag)
 
 
-def solve(
-    scene: Scene, memory: StickingMemory, step: Step, trial: Trial, control: Approach | MeanPressure, pressure: Array
-) -> StuckContact:
-    """Solve a step from the memory of the one before, with its pressure in a map; collective."""
+@dataclass(frozen=True)
+class Path:
+    """The way of the prescribed load from the last step to this one, in the unit of the solver."""
+
+    before: float
+    control: Approach | MeanPressure
+
+    def at(self, share: float) -> Approach | MeanPressure:
+        """Return what is prescribed at a share of the way; exact at its end."""
+        if share == 1.0:
+            return self.control
+        return replace(self.control, value=self.before + share * (self.control.value - self.before))
+
+
+def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: Path, pressure: Array) -> StuckContact:
+    """Solve a step from the memory of the one before, with its pressure in a map; collective.
+
+    A jump goes along its path in parts, and so does a step that takes many iterations, so that it does not pass over an
+    equilibrium on its way. Where shorter parts are of no help the contact snaps, or comes off.
+    """
+    law, gap, lag = scene.law(trial.alpha), memory.spare, memory.lag
     assert scene.sticking is not None
-    law = scene.law(trial.alpha)
     assert law is not None
-    gap, lag = memory.spare, memory.lag
-    _start(scene, memory, step, trial, control, gap)
     if lag is not None and memory.modulus:
         lag *= memory.modulus / trial.alpha
-    contact, detached = scene.sticking.solve(law, trial.effective, control, gap, lag, pressure)
+    whole = JUMP_STRIDE if step.jump else 1.0
+    _start(scene, memory, step, trial, path, gap, still=step.jump)
+    reached, stride, iterations, began = 0.0, whole, 0, memory.held
+    while True:
+        share = min(reached + stride, 1.0)
+        loose = 1.0 if share == 1.0 else LOOSE
+        contact, detached = scene.sticking.solve(law, trial.effective, path.at(share), gap, lag, pressure, loose)
+        iterations += contact.iterations
+        hard = detached or contact.failure or contact.iterations > MANY_ITERATIONS
+        if hard and stride > LEAST_STRIDE * whole:
+            if reached == 0.0:
+                _start(scene, memory, step, trial, path, gap, still=True)
+            else:
+                gap[...] = began
+            stride *= 0.5
+            continue
+        if detached or contact.failure or share == 1.0:
+            break
+        easy = contact.iterations <= MANY_ITERATIONS // 3
+        reached, stride = share, min((1.0 + easy) * stride, whole)
+        began[...] = gap
+    contact = replace(contact, iterations=iterations)
     pasts = PastGap(gap, step.position, True), memory.pasts[0]
-    now = StickingMemory(pasts, memory.pasts[1].gap, lag, trial.alpha, memory.surface, memory.snapped)
-    return StuckContact(contact, now, gap == 0.0, detached, _columns(scene, trial, contact.p))
+    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.surface, memory.snapped)
+    columns = _columns(scene, trial, contact.p)
+    return StuckContact(contact, now, gap == 0.0, columns, detached)
+
+
+def open_up(scene: Scene, stuck: StuckContact, trial: Trial) -> StuckContact:
+    """Return the contact with the surfaces apart: where nothing holds a load, and the run goes on; collective."""
+    contact, law, gap = stuck.contact, scene.law(trial.alpha), stuck.memory.pasts[0].gap
+    assert law is not None
+    contact.p.fill(0.0)
+    contact.u.fill(0.0)
+    highest = scene.slab.reduce((), [float(trial.effective.max(initial=-np.inf))])[0]
+    d = -highest - OPEN * law.range
+    np.subtract(-d, trial.effective, out=gap)
+    contact = replace(contact, d=d, failure="", certificate=Certificate(0.0, 0.0, 0.0))
+    return stuck._replace(contact=contact, touching=gap == 0.0, columns=_columns(scene, trial, contact.p))
 
 
 def _start(
-    scene: Scene, memory: StickingMemory, step: Step, trial: Trial, control: Approach | MeanPressure, out: Array
+    scene: Scene,
+    memory: StickingMemory,
+    step: Step,
+    trial: Trial,
+    path: Path,
+    out: Array,
+    still: bool = False,
 ) -> None:
-    """Put the gap from which a step starts into a map; collective."""
+    """Put the gap from which a step starts into a map: extrapolated, or `still` that of the last step; collective."""
     now, before = memory.pasts
     if not now.known:
-        _of_undeformed(scene, trial.effective, control, out)
+        _of_undeformed(scene, trial.effective, path.at(0.0 if still else 1.0), out)
         return
-    growth = step.growth if before.known else 0.0
+    growth = step.growth if before.known and not still else 0.0
     slab, points = scene.slab, scene.choices.grid.points
     along_x, along_y = (
         round(moved) % count for moved, count in zip(cells_moved(scene, step, now.position), points, strict=True)
@@ -140,6 +209,7 @@ def entries(memory: StickingMemory, height: float, modulus: float) -> dict[str, 
         "known": Entry(np.array([float(now.known), float(before.known)])),
         "modulus": Entry(memory.modulus, modulus, "Pa"),
         "energies": Entry(np.array([memory.surface, memory.snapped])),
+        "detached": Entry(np.array(memory.detached)),
     }
     return found if memory.lag is None else {**found, "lag": Entry(memory.lag, height, "m")}
 
@@ -151,4 +221,5 @@ def restored(memory: StickingMemory, saved: Saved) -> StickingMemory:
     now, before = memory.pasts
     pasts = PastGap(now.gap, (x, y), known[0]), PastGap(before.gap, (x_before, y_before), known[1])
     surface, snapped = saved["energies"].tolist()
-    return StickingMemory(pasts, memory.spare, memory.lag, float(saved["modulus"]), surface, snapped)
+    modulus, maps = float(saved["modulus"]), (memory.spare, memory.held, memory.lag)
+    return StickingMemory(pasts, *maps, modulus, surface, snapped)

@@ -70,6 +70,8 @@ class Simulation:
             if (step := next(steps, None)) is None:
                 return
             march.advance(step)
+            if march.detached:
+                return
             yield self.row
 
     def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
@@ -106,8 +108,8 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether all steps of the history are made."""
-        return self._march.row.step >= len(self._march.timeline())
+        """Whether all steps of the history are made, or surfaces that stick have come off under their load."""
+        return bool(self._march.detached) or self._march.row.step >= len(self._march.timeline())
 
     # -- fields -------------------------------------------------------------------------------------------------------
 

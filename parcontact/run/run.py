@@ -86,7 +86,7 @@ class Run:
             self._refuse_lost_results()
             if self.slab.root:
                 self.directory.prune(0)
-        elif self.saved != self.march.row.step:
+        elif self.saved != self.march.row.step or self.march.detached:
             self.save(last=True)
         return self._log_summary()
 
@@ -216,10 +216,11 @@ class Run:
                 rows = tables.read(self.directory.path / "measures.csv")
                 for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
                     console.say(text)
-        finished = row.step >= len(self.timeline)
+        detached = self.march.detached
+        finished = row.step >= len(self.timeline) or bool(detached)
         if self.slab.root and finished:
-            self.directory.note(saved=True, finished=(row.step, row.time))
-        how = "done" if finished else f"stopped at t = {row.time:g} s as asked for, run again to go on"
+            self.directory.note(saved=True, finished=(row.step, row.time), detached=detached)
+        how = detached or "done" if finished else f"stopped at t = {row.time:g} s as asked for, run again to go on"
         console.say(f"{how}: results in {self.directory.path}")
         return DONE
 

@@ -100,6 +100,8 @@ def _find_origin(
     if origin and origin.contents.step >= len(timeline):
         when = f"at t = {origin.contents.time:g} s"
         reason = f"finished before, {when} (--restart never: run it afresh; --until T: go on)"
+    elif origin and (came_off := restart.detached_at(origin.contents, job)) is not None:
+        reason = f"detached before, at t = {came_off:g} s (--restart never: run it afresh)"
     elif origin and until is not None and reached(origin.contents.time, until):
         reason = f"is at t = {origin.contents.time:g} s, not before --until {until:g}"
     return origin, warnings, reason

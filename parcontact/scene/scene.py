@@ -100,7 +100,8 @@ class Setup:
 
 @dataclass
 class Scene:
-    """Everything a march needs."""
+    """Everything a march needs. `sticking` solves contacts with adhesion, None without; where nothing holds a load any
+    more, a run that `goes_on_open` goes on."""
 
     setup: Setup
     motion: Motion
@@ -111,6 +112,7 @@ class Scene:
     probe: Probe
     energy: ElasticEnergy | ZenerEnergy | None
     sticking: StickingSolver | None = None
+    goes_on_open: bool = False
     followers: dict[str, Effect] = field(default_factory=dict)
 
     @property
@@ -170,6 +172,7 @@ def build_on(setup: Setup) -> Scene:
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
     if chosen.adhesion is not None:
         scene.sticking = _sticking(setup, solver.workspace, operators)
+        scene.goes_on_open = chosen.job.section("adhesion").detached == "open"
     scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}
     values_of(scene.followers)  # refuses those that do not fit, before anything is written
     return scene
@@ -239,10 +242,12 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
 
 def _sticking(setup: Setup, workspace: Workspace, operators: Operators) -> StickingSolver:
     """Make the solver of contacts that stick."""
-    numerics, height = setup.choices.numerics, setup.height / setup.units.height
+    numerics = setup.choices.numerics
     by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
-    gaps = GapSolver(setup.slab, by_gap, height, numerics.tolerance, numerics.max_iterations)
-    return StickingSolver(gaps, workspace, operators.operator if setup.choices.isolated.on else None)
+    gaps = GapSolver(setup.slab, by_gap, numerics.max_iterations)
+    return StickingSolver(
+        gaps, workspace, numerics.tolerance, operators.operator if setup.choices.isolated.on else None
+    )
 
 
 def _body_and_energy(

@@ -23,12 +23,13 @@ SECTIONS = (*SCENE, "initial", "numerics", "steady")  # what a marker keeps of a
 @dataclass(frozen=True)
 class Claim:
     """The part of a verb in a directory: the `id` of its run, its job, whether it has `saved` a checkpoint, and the
-    step and time after which it has `finished`."""
+    step and time after which it has `finished`; of surfaces that came off, how it has `detached`."""
 
     job: dict[str, Any]
     id: str = field(default_factory=lambda: secrets.token_hex(16))
     saved: bool = False
     finished: tuple[int, float] | None = None
+    detached: str = ""
 
 
 def kept(data: Mapping[str, Any]) -> dict[str, Any]:

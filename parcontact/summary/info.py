@@ -159,6 +159,8 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     step, time = int(columns["step"][-1]), columns["time"][-1]
     ended = claim is not None and claim.finished is not None and claim.finished[0] == step
     how = "finished" if ended else "not finished"
+    if ended and claim is not None and claim.detached:
+        yield f"  {claim.detached}"
     yield f"  run: {how} after step {step}, t = {time:g} s, {len(columns['step'])} rows"
     last = {name: columns[name][-1] for name in ("pressure", "friction", "contact_area", "approach")}
     yield "  last row: " + ", ".join(f"{name} {value:.6g}" for name, value in last.items())

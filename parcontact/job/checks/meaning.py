@@ -202,7 +202,7 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
     if stage.control == "approach":
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
-    return float((0.75 * force * radius / modulus) ** (1 / 3))
+    return float((0.75 * max(force, 0.0) * radius / modulus) ** (1 / 3))
 
 
 # -- slides that come round -------------------------------------------------------------------------------------------

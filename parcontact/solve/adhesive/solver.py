@@ -36,11 +36,12 @@ import numpy as np
 from ...parallel.slab import Array, Slab
 from .. import kernels as maps
 from ..certificate import Certificate
-from ..iterate import LEAST_HEIGHT, LEAST_SHARE
+from ..iterate import LEAST_SHARE
 from ..problem import Approach, MeanPressure, Operator
 from . import kernels
 
 LEAST_CURVATURE = 0.1  # tuning: of the elastic one: with less the majorized step is made
+LONGEST_STRIDE = 64.0  # tuning: of majorized steps that follow each other, as where a contact snaps
 MAX_HALVINGS = 12  # of a step that raises E
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of the terms of a change of E
 MAX_STALLED_ITERATIONS = 120  # iterations without a better certificate after which a solve gives up
@@ -86,7 +87,8 @@ class GapSolution:
 
 @dataclass
 class _Iterate:
-    """A gap in numbers: its mean, the uniform part m of the pressure, the approach; under which load or mean gap."""
+    """A gap in numbers: its mean, the uniform part m of the pressure, the approach; under which load or mean gap; and
+    by how much majorized steps are lengthened, where one follows the other."""
 
     law: Law
     heights: Array
@@ -96,16 +98,14 @@ class _Iterate:
     mean_gap: float = 0.0
     m: float = 0.0
     d: float = 0.0
+    stride: float = 1.0
 
 
 class GapSolver:
-    """Loop for contacts with adhesion on one grid; `height` is that of the surface, from lowest to highest."""
+    """Loop for contacts with adhesion on one grid."""
 
-    def __init__(
-        self, slab: Slab, operators: GapOperators, height: float, tolerance: float, max_iterations: int
-    ) -> None:
-        self.slab, self.operators = slab, operators
-        self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
+    def __init__(self, slab: Slab, operators: GapOperators, max_iterations: int) -> None:
+        self.slab, self.operators, self.max_iterations = slab, operators, max_iterations
         self._q, self._q_new, self._image, self._gap = (slab.zeros() for _ in range(4))
         self._c, self._c_old, self._t = (slab.zeros() for _ in range(3))
         self._working = slab.zeros(np.bool_)
@@ -115,7 +115,9 @@ class GapSolver:
         """Bytes that it holds on a rank that has so many points."""
         return (7 * 8 + 1) * cells
 
-    def solve(self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array) -> GapSolution:
+    def solve(
+        self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array, tolerance: float
+    ) -> GapSolution:
         """Solve from the `gap`, in whose place the solution will be; collective."""
         it = self._begin(law, heights, control, gap)
         g, other = gap, self._gap
@@ -125,14 +127,16 @@ class GapSolver:
             z = self.operators.operator.apply(self._c, self._q_new)
             certificate = self._certify(it, g, z)
             best = min(best, (certificate.worst, iteration))
-            failure = "" if lost else self._verdict(certificate.worst, iteration, *best)
-            if stuck > 1 and failure is None:
+            failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best)
+            if stuck > 2 and failure is None:
                 failure = f"stalled: no step lowers the energy, at a certificate of {certificate.worst:.3g}"
             if failure is not None:
                 if g is not gap:
                     gap[...] = g
                 self._q += it.m
                 return GapSolution(gap, self._q, it.d, certificate, iteration, failure, lost)
+            if stuck > 1:  # even where z points across a bound, c does not
+                z[...] = self._c
             slope, scale = self._turn(it, members, scale)
             step = self._step(it, g, slope)
             if self._descend(it, g, step, other):
@@ -192,7 +196,10 @@ class GapSolver:
         return self.slab.reduce((), [lowest])[0] - kernels.traction(*it.law, 0.0)
 
     def _certify(self, it: _Iterate, g: Array, z: Array) -> Certificate:
-        """How wrong the gap is: by `z` at most, weighted by the pressure; collective."""
+        """How wrong the gap is: by `z`, weighted by the pressure, over a length; collective.
+
+        The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it.
+        """
         sums = kernels.judge(self._working, self._q, it.m, self._c, g, it.heights, z)
         load, first, second, wrong = self.slab.sum(*sums)
         least = LEAST_TRACTION * it.law.strength
@@ -200,17 +207,16 @@ class GapSolver:
         if load > 0.0:
             mean = first / load
             spread = math.sqrt(max(second / load - mean**2, 0.0))
-        length = max(min(max(spread, LEAST_SHARE * abs(mean + it.d)), self.height), LEAST_HEIGHT * self.height)
-        length = min(length, it.law.range)
+        length = min(max(spread, LEAST_SHARE * abs(mean + it.d), LEAST_SHARE * it.law.range), it.law.range)
         return Certificate(SHARPER * wrong / max(load, least) / length, 0.0, 0.0, length)
 
-    def _verdict(self, worst: float, iteration: int, best: float, best_at: int) -> str | None:
+    def _verdict(self, worst: float, tolerance: float, iteration: int, best: float, best_at: int) -> str | None:
         """None: go on; empty: solved; else what happened instead."""
-        if worst <= self.tolerance:
+        if worst <= tolerance:
             return ""
         if not np.isfinite(worst):
             return "met numbers that are not finite"
-        asked = f"{worst:.3g} where {self.tolerance:.3g} was asked for"
+        asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
         if iteration - best_at >= MAX_STALLED_ITERATIONS:
             return f"stalled: no better certificate than {best:.3g} in {MAX_STALLED_ITERATIONS} iterations, now {asked}"
         if iteration >= self.max_iterations:
@@ -242,7 +248,12 @@ class GapSolver:
         if isinstance(it.control, MeanPressure):
             own = 0.0
         true = stiff - points * mean**2 / self.operators.least_mean + own - soft
-        return slope / (true if true > LEAST_CURVATURE * stiff else stiff) if stiff > 0.0 else 0.0
+        if true > LEAST_CURVATURE * stiff:
+            it.stride = 1.0
+            return slope / true
+        step = it.stride * slope / stiff if stiff > 0.0 else 0.0
+        it.stride = min(2.0 * it.stride, LONGEST_STRIDE)
+        return step
 
     def _descend(self, it: _Iterate, g: Array, step: float, out: Array) -> bool:
         """Make the step, or a shorter one, to the gap `out` and its pressure; returns whether any lowers E;
@@ -267,4 +278,5 @@ class GapSolver:
                 it.mean_gap = mean
                 return True
             step *= 0.5
+            it.stride = 1.0
         return False

@@ -27,23 +27,32 @@ class StickingSolver:
 
     gaps: GapSolver
     workspace: Workspace
+    tolerance: float
     free: Operator | None = None
 
     def solve(
-        self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array, lag: Array | None, out: Array
+        self,
+        law: Law,
+        heights: Array,
+        control: Approach | MeanPressure,
+        gap: Array,
+        lag: Array | None,
+        out: Array,
+        loose: float = 1.0,
     ) -> tuple[Contact, bool]:
         """Solve from a gap, in whose place the solution will be, and put the pressure into `out`; collective.
 
         `lag` is `(A - B) p` of a free body, in whose place the new one will be. Returns the contact, and whether the
-        surface has come off.
+        surface has come off. The tolerance is `loose` times that of the run.
         """
+        tolerance = loose * self.tolerance
         if self.free is None or lag is None:
-            found = self.gaps.solve(law, heights, control, gap)
+            found = self.gaps.solve(law, heights, control, gap, tolerance)
             out[...] = found.p
             return self._contact(found, heights, out, found.iterations), found.detached
         iterations, passes, share, last = 0, 0, 1.0, lag
         while True:
-            found = self.gaps.solve(law, heights - lag, control, gap)
+            found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
             iterations, passes = iterations + found.iterations, passes + 1
             out[...] = found.p
             change = self.free.apply(out, self.workspace.other_displacement)
@@ -53,10 +62,10 @@ class StickingSolver:
             share = self._share(share, out, change, last) if passes > 1 else 1.0
             last = change.copy()
             lag += share * change
-            if found.failure or found.detached or worst <= self.gaps.tolerance:
+            if found.failure or found.detached or worst <= tolerance:
                 break
             if passes == MAX_PASSES:
-                asked = f"{worst:.3g} where {self.gaps.tolerance:.3g} was asked for"
+                asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
                 found = replace(found, failure=f"did not settle in {passes} passes of a free body: changes are {asked}")
                 break
         return self._contact(found, heights, out, iterations), found.detached

@@ -1,0 +1,131 @@
+"""Steps of contacts that stick: restarts, ranks, jumps of the load, detachment."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import begun, column, marched
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+from restarting import ELASTIC, ROUGH, SPHERE, ZENER, Bench, cut, rows, same
+
+from parcontact.summary import info
+
+STICK = {"work": 0.05, "range": 1e-6}
+PULL = {"name": "pull", "approach": {"from": 1e-6, "to": -2e-6}, "duration": 4e-4, "time_step": 1e-4}
+LOAD = {"name": "load", "pressure": {"from": 2e3, "to": 1e3}, "duration": 3e-4, "time_step": 1e-4}
+SLIDE = {"name": "slide", "pressure": 1e3, "velocity": [0.2, 0.1], "duration": 2e-4, "time_step": 1e-4}
+OFF = {"name": "off", "force": {"from": 0.0, "to": -5e-3}, "duration": 1e-3, "time_step": 1e-4}
+SCENES: dict[str, tuple[str, dict[str, Any]]] = {
+    "rough": ("viscoelastic", {"history": [LOAD, SLIDE]}),
+    "free": ("free", {"history": [PULL, {**SLIDE, "name": "slide on"}]}),
+    "off": ("free", {"history": [OFF]}),
+}
+
+
+def sticking(bench: Bench, name: str) -> dict[str, Any]:
+    scene, changes = SCENES[name]
+    return bench.job(scene, adhesion=STICK, **changes)
+
+
+@pytest.mark.mpi(2, 3)
+@pytest.mark.parametrize("name", SCENES)
+def test_cut_in_the_middle(bench: Bench, name: str) -> None:
+    """What a run makes after a restart is what it makes at once, to the last bit; also where it detaches."""
+    whole = bench.where / "whole"
+    assert bench.run(sticking(bench, name), whole) == 0
+    total = len(rows(whole)) - 1
+    part = cut(bench, whole, total // 2)
+    assert bench.run(sticking(bench, name), part) == 0
+    if bench.comm.rank == 0:
+        same(whole, part, total)
+
+
+@pytest.mark.parametrize("control", ["approach", "pressure"])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_conditions_of_contact(boundary: str, control: str) -> None:
+    """`p = c - sigma(g)`: the gap is not negative; where it is open, p is minus the attraction to the tolerance, which
+    bounds what is wrong with the gap over the range; where it is closed, p is not less than that."""
+    grid = {"points": 32, "size": 4e-4, "boundary": boundary}
+    history = [{"approach": -5e-7, "pressure": 50.0}[control]]
+    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": ELASTIC, "adhesion": STICK}
+    march, _ = marched({**job, "history": [{control: history[0]}], "numerics": {"tolerance": 1e-6}})
+    p, gap, strength = march.field("pressure"), march.field("gap"), 0.05 / 1e-6
+    touching = gap <= 1e-14
+    assert 0 < touching.sum() < 200
+    assert gap.min() > -1e-14  # rounding of lengths of 1e-6 to 1e-4
+    assert p[touching].min() >= -strength * (1.0 + 1e-6)
+    assert_allclose(p[~touching], -strength * np.exp(-gap[~touching] / 1e-6), atol=1e-3 * strength)
+    assert march.row.measures.contact_area == touching.sum() / touching.size
+
+
+@pytest.mark.mpi(2, 3)
+def test_ranks(comm: MPI.Intracomm) -> None:
+    """The same contact on any number of ranks, to a hundred times the tolerance."""
+    job = {"grid": {"points": [20, 14], "size": [1e-3, 7e-4]}, "surface": ROUGH, "material": ZENER, "adhesion": STICK}
+    job |= {"history": [LOAD, SLIDE], "numerics": {"tolerance": 1e-7}}
+    alone, together = (column(marched(job, comm=each)[1], "approach") for each in (MPI.COMM_SELF, comm))
+    assert_allclose(together, alone, rtol=1e-5)
+
+
+def test_a_jump_of_load_passes_no_equilibrium() -> None:
+    """A wave with Johnson's parameter 0.3 is in partial contact under 0.3 pi E* h/lambda, which a ramp reaches, and in
+    full contact only from 0.3877 on (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423): 0.585 of its length; a cell
+    is 0.8 % of it, and the range adds to it."""
+    length, amplitude, modulus, n = 1e-3, 5e-6, 4e6, 128
+    work = 0.3**2 * np.pi**2 * modulus * amplitude**2 / (2.0 * length)
+    reach = float(np.sqrt(2.0 * length / n * work / modulus))
+    job = {
+        "grid": {"points": [n, 1], "size": [length, length / n]},
+        "surface": {"shape": "wave", "amplitude": amplitude, "waves": [1, 0]},
+        "material": ELASTIC,
+        "adhesion": {"work": work, "range": reach},
+        "history": [{"pressure": 0.3 * np.pi * modulus * amplitude / length}],
+    }
+    march, _ = marched(job)
+    assert 0.56 < march.row.measures.contact_area < 0.62
+
+
+def test_detached(bench: Bench) -> None:
+    """Under a force of which no part holds the run ends, with exit code 0, and says when; going on says it too."""
+    out = bench.where / "out"
+    data = sticking(bench, "off")
+    assert bench.run(data, out) == 0
+    last = len(rows(out)) - 1
+    assert 0 < last < 10
+    assert "detached at t = " in (out / "run.log").read_text()
+    assert "detached at t = " in info.describe_directory(out)[0]
+    assert bench.run(data, out) == 0
+    assert len(rows(out)) - 1 == last
+
+
+def test_open_after_detachment() -> None:
+    """If the job says so, the run goes on with open surfaces, without pressure; approached, they touch again."""
+    job = {"grid": {"points": 20, "size": 1e-3, "boundary": "free"}, "surface": SPHERE, "material": ELASTIC}
+    history = [OFF, {"name": "on", "approach": {"from": -3e-6, "to": 2e-6}, "duration": 1.0, "time_step": 0.5}]
+    _, found = marched({**job, "adhesion": {**STICK, "detached": "open"}, "history": history})
+    pressures, areas = column(found, "pressure"), column(found, "contact_area")
+    assert len(found) == 1 + 10 + 1 + 2
+    assert pressures[10] == areas[10] == 0.0
+    assert areas[-1] > 0.0
+
+
+def test_no_adhesion_remembers_nothing() -> None:
+    job = {"grid": {"points": 8, "size": 1e-3}, "surface": SPHERE, "material": ELASTIC, "history": [{"pressure": 1e3}]}
+    march = begun(job)
+    assert march.state.sticking is None
+    assert not [name for name in march.entries() if name.startswith("sticking")]
+
+
+def test_the_memory_that_a_plan_tells(bench: Bench, tmp_path: Path) -> None:
+    """To the byte; see `plan/test_memory`."""
+    from parcontact.job import Job
+    from parcontact.plan import memory
+
+    for name in ("rough", "free"):
+        planned = Job.model_validate(sticking(bench, name))
+        march, _ = marched(planned)
+        assert memory.total(planned) == march.scene.slab.tally["map bytes"]
+        maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
+        assert sum(each.nbytes + 4 * len(each) for each in maps) == memory.saved(planned)
