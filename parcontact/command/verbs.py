@@ -57,6 +57,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
 def check(options: argparse.Namespace) -> int:
     from .. import job as jobs
     from ..history.chosen import describe_steps
+    from ..run.sweep_warnings import doubts_of
 
     cases, chosen = cases_of(options)
     job = chosen[0].job
@@ -65,8 +66,7 @@ def check(options: argparse.Namespace) -> int:
     steps = steps and f"stages that choose their time steps: {steps}"
     for text in filter(None, (job.included, job.origin.mesh, steps)):
         print(f"\n{text}")
-    doubts = [text for case in chosen for text in (*case.job.warnings, *_doubts(case.job))]
-    for warning in dict.fromkeys(doubts):
+    for warning in doubts_of(chosen, _doubts):
         print(f"warning: {warning}")
     if cases[0].settings:
         print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
@@ -75,17 +75,17 @@ def check(options: argparse.Namespace) -> int:
 
 
 def _doubts(job: Job) -> list[str]:
-    """Return the doubts that only a look at heights and measured moduli raises."""
+    """Return the doubts about a job, also those that only a look at heights and measured moduli raises."""
     from ..job.checks import meaning
 
     if meaning.says_all(job.surface) and not job.measured:
-        return []
+        return list(job.warnings)
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..scene import sanity, set_up
     from ..scene.measured_range import describe_beyond
 
-    found = list(describe_beyond(job))
+    found = [*job.warnings, *describe_beyond(job)]
     if sanity.is_quickly_made(job):
         found += sanity.check_heights(set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
     return found
@@ -100,20 +100,16 @@ def plan(options: argparse.Namespace) -> int:
     from ..parallel.slab import Slab
     from ..plan.memory import count_side_by_side
     from ..plan.planning import Planner
-    from ..run import sweep_warnings
+    from ..run.sweep_warnings import doubts_of
 
     chosen = on_root(world, lambda: cases_of(options)[1])
-    job, several = chosen[0].job, len(chosen) > 1
-    slab = Slab(world, *job.grid.points)
-    if several:
-        on_root(world, lambda: sweep_warnings.warn_once(chosen))
-    doubts = [] if several else [*job.warnings, *on_root(world, lambda: _doubts(job))]
+    doubts = on_root(world, lambda: doubts_of(chosen, _doubts))
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
-    if several:
+    if len(chosen) > 1:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
         lines = planner.plan_sweep(chosen, Groups(world, at_once))
     else:
-        lines = planner.plan(job, slab)
+        lines = planner.plan(chosen[0].job, Slab(world, *chosen[0].job.grid.points))
     for line in (*(f"warning: {text}" for text in doubts), *lines):
         if world.rank == 0:
             print(line, flush=True)

@@ -94,7 +94,7 @@ def steady(
     slab = Slab(all_ranks(comm), *found.grid.points)
     wanted = curve.request(found, *asked.values())
     base = set_up(found, slab)
-    warn_of(found, base)
+    warn_of(base, wanted.temperatures)
     sliding = SteadySliding(base)
     points: list[Point | None] = []
     failures: list[str] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
@@ -106,8 +106,8 @@ def of_parts(**parts: Any) -> Job:
     return _sound(jobs.load(rest | parts))
 
 
-def warn_of(job: Job, setup: Setup) -> None:
-    """Warn, on root, of what is allowed but means little; collective."""
-    for text in sanity.find_doubts(setup):
+def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:
+    """Warn, on root, of what is allowed but means little, also at temperatures [deg C]; collective."""
+    for text in sanity.find_doubts(setup, temperatures):
         if setup.slab.root:
             warnings.warn(text, UserWarning, stacklevel=4)

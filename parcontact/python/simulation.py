@@ -184,7 +184,7 @@ class Simulation:
             saved = self._saved
             wisdom.recall(choices(self.job).transforms, self._slab, saved.numbers.get("plans/all") if saved else None)
             self._march_made = start.first(self.job, self._slab, saved=saved)
-            warn_of(self.job, self._march_made.scene.setup)
+            warn_of(self._march_made.scene.setup)
         return self._march_made
 
     def _wait_for_all(self, what: str) -> None:

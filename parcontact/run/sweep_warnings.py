@@ -2,11 +2,11 @@
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
-from ..job import Case
+from ..job import Case, Job
 
-NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")  # in which warnings of one kind may differ
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")  # in which warnings of one kind may differ
 
 Kinds = dict[str, tuple[str, list[int]]]  # the first text of each kind, and the numbers of the cases that have it
 
@@ -41,6 +41,18 @@ class SweepWarnings:
                 whole.setdefault(kind, (text, []))[1].extend(cases)
         told = [(text, sorted(cases)) for text, cases in whole.values() if len(cases) > 1 or not self._at_once]
         return [f"{text} ({name_cases(cases)})" for text, cases in told]
+
+
+def doubts_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[str]]) -> list[str]:
+    """Return the doubts about the jobs of cases, each kind once; of several with the cases that it holds for."""
+    if len(cases) == 1:
+        return list(dict.fromkeys(doubts(cases[0].job)))
+    noted = SweepWarnings(at_once=False)
+    for case in cases:
+        noted.begin(case.number)
+        for text in doubts(case.job):
+            noted.shows(text)
+    return noted.summary([noted.kinds])
 
 
 def warn_once(cases: Sequence[Case]) -> list[str]:

@@ -5,12 +5,14 @@ import re
 import sys
 import time
 from contextlib import suppress
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
 from tqdm import tqdm
 
 from ..streams import printable
+from . import files
 from .row import Row
 
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
@@ -56,6 +58,9 @@ class LogFile(logging.FileHandler):
         """Continue the file or begin it; raises OSError."""
         super().__init__(path, encoding="utf-8")
         self.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+
+    def _open(self) -> TextIOWrapper:
+        return TextIOWrapper(files.open_to_append(Path(self.baseFilename)), encoding="utf-8", write_through=True)
 
     def handleError(self, record: logging.LogRecord) -> None:  # the name is that of the library
         """Go on without the line."""

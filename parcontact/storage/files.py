@@ -1,10 +1,12 @@
 """Files that are never half-written: a new file has another name until it is whole, what is not ours is put aside."""
 
+import errno
 import os
 import secrets
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -33,6 +35,17 @@ def replaced(path: Path, is_ours: Callable[[Path], bool] | None = None) -> Itera
         with suppress(OSError):
             part.unlink()
         raise
+
+
+def open_to_append(path: Path) -> FileIO:
+    """Open a file of ours at its end, or begin it. Raises OSError, also for a link, which may lead anywhere."""
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise OSError(f"{path} is a link, which may lead anywhere; move it away") from None
+        raise
+    return FileIO(handle, "ab")
 
 
 def write(path: Path, text: str) -> None:

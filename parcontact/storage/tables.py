@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..errors import InputError
+from . import files
 
 MEND = "mend the line, or move the file away to go on without its rows"
 
@@ -17,7 +18,7 @@ class GrowingTable:
     def __init__(self, path: Path, names: Sequence[str]) -> None:
         """Continue the file, or begin it with the names of the columns; raises OSError."""
         self.path = path
-        self._file = path.open("ab", buffering=0)
+        self._file = files.open_to_append(path)
         if self._file.tell() == 0:
             self.append(names)
 

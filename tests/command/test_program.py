@@ -220,6 +220,18 @@ def test_info_and_check(main: Main, tmp_path: Path) -> None:
     assert main("check", path)[0] == 0
 
 
+@pytest.mark.parametrize("verb", [["check"], ["plan", "--seconds", "0.1"]])
+def test_doubts_of_a_sweep_are_told_once(main: Main, tmp_path: Path, verb: list[str]) -> None:
+    """Each kind of them, of the heights too, which the job alone does not tell; numbers differ from case to case."""
+    rough = {"hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2.5e-4, "rms_height": 6e-5}
+    changes = {"surface": {"shape": "rough", **rough}, "sweep": {"surface.0.seed": [1, 2]}}
+    code, out, _ = main(*verb[:1], job(tmp_path / "job.yaml", **changes), *verb[1:])
+    told = [line for line in out.splitlines() if "its rms slope is" in line]
+    assert code == 0
+    assert len(told) == 1
+    assert told[0].endswith("(cases 0-1)")
+
+
 def test_check_reads_a_measured_road(main: Main, tmp_path: Path) -> None:
     np.save(tmp_path / "road.npy", np.zeros((8, 8)))
     path = job(tmp_path / "job.yaml", surface={"shape": "topography", "path": "road.npy", "size": [1e-3, 1e-3]})

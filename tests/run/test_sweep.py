@@ -201,7 +201,7 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
     case = here / "cases" / "001"
     for text in ((case / "run.log").read_text(), info.describe(case)[0]):
-        assert f"last three quarters of its 0.0005 m, is {float(rows[1]['mu_dyn']):.6g}\n" in text
+        assert f"last three quarters of the slide of 0.0005 m, is {float(rows[1]['mu_dyn']):.6g}\n" in text
 
 
 def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:

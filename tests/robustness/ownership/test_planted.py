@@ -20,6 +20,24 @@ def test_planted_picture(main: Main, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "picture.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # files that are left open then
+@pytest.mark.parametrize(
+    ("name", "verb"), [("run.log", ()), ("measures.csv", ()), ("steady.csv", ("steady",)), ("steady.log", ("steady",))]
+)
+def test_planted_links_where_a_run_goes_on(main: Main, tmp_path: Path, name: str, verb: tuple[str, ...]) -> None:
+    """A link where a table or a log is continued is replaced, or ends the run with a sentence; it is not followed."""
+    words = [*verb, "job.yaml", "--out", "out"]
+    curve = ["--velocities", "0.1,0.2", "--pressures", "1e4"] if verb else []
+    assert main(*words, *(curve or ["--until", "0.003"]))[0] == DONE
+    (tmp_path / "precious").write_bytes((tmp_path / "out" / name).read_bytes())
+    (tmp_path / "out" / name).unlink()
+    (tmp_path / "out" / name).symlink_to(tmp_path / "precious")
+    before = (tmp_path / "precious").read_bytes()
+    code, said = main(*words, *(curve and [*curve[:1], "0.1,0.2,0.3", *curve[2:]]))
+    assert (tmp_path / "precious").read_bytes() == before
+    assert code == DONE or f"out/{name} is a link, which may lead anywhere; move it away" in said
+
+
 # -- fields that cannot be read ---------------------------------------------------------------------------------------
 
 
