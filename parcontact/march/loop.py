@@ -102,6 +102,8 @@ class March:
         scene, state, units = self.scene, self.state, self.scene.units
         if name == "temperature":
             return temperature_of(scene.followers)
+        if name == "gap" and state.sticking is not None and state.sticking.pasts[0].known:
+            return state.sticking.pasts[0].gap * units.height
         if name == "pressure":
             return state.pressure * (state.alpha * units.pressure)
         if name == "displacement":

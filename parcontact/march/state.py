@@ -111,19 +111,25 @@ def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approac
 
 def completed(scene: Scene, state: State) -> State:
     """Return the state with the energies [J] and the columns of effects in its row."""
-    work, stored, lost, split = energies_of(scene, state.energy)
+    work, stored, lost, split = energies_of(scene, state.energy, state.sticking)
     added = values_of(scene.followers)
     row = replace(state.row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
     return replace(state, row=row)
 
 
-def energies_of(scene: Scene, memory: EnergyMemory | None) -> tuple[float, float, float, tuple[float, ...]]:
-    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for."""
+def energies_of(
+    scene: Scene, memory: EnergyMemory | None, stuck: StickingMemory | None
+) -> tuple[float, float, float, tuple[float, ...]]:
+    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for.
+
+    The work is that on the body, with adhesion that of the load.
+    """
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
     unit = scene.energy.unit
     lost = tuple(float(value) * unit for value in memory.dissipated)
-    return memory.work * unit, memory.stored * unit, math.fsum(lost), lost
+    work = memory.work * unit if stuck is None else stuck.energies.work
+    return work, memory.stored * unit, math.fsum(lost), lost
 
 
 # -- checkpoints ------------------------------------------------------------------------------------------------------

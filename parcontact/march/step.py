@@ -7,6 +7,7 @@ of the old one in its place when the step has been made. What works in place com
 
 import math
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..solve.contact import Contact
 from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
 from ..storage.row import Row
-from . import failure, sticking
+from . import failure, sticking, sticking_energies
 from .errors import Solved, estimate_errors
 from .failure import DetachedError, StepError
 from .starts import Past, cells_moved, make_start
@@ -45,8 +46,10 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
             break
         step = verdict
     contact, slid = solved.contact, math.dist(step.position, state.position)
-    _tell_effects(scene, solved, slid)
     energy = _advance_energy(scene, state, solved)
+    if solved.stuck is not None and energy is not None:
+        solved = replace(solved, stuck=_count_energies(scene, state, solved, energy, slid))
+    _tell_effects(scene, solved, slid)
     if state.chosen is not None and verdict is not None:
         state.chosen.add(verdict)
     if solved.body.displacement is scene.solver.workspace.pressure:
@@ -59,7 +62,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         contact.iterations,
         contact.certificate,
         scene.slab.tally["operator"] - calls,
-        *energies_of(scene, energy),
+        *energies_of(scene, energy, None if solved.stuck is None else solved.stuck.memory),
         seconds=time.perf_counter() - began,
         remark=solved.remark,
         errors=errors.budget,
@@ -86,6 +89,23 @@ def _advance_energy(scene: Scene, state: State, solved: Solved) -> EnergyMemory 
         return None
     now, before = Pressed(solved.contact.p, solved.trial.alpha), Pressed(state.pressure, state.alpha)
     return scene.energy.advance(state.energy, solved.step.dt, now, before, solved.contact.u, solved.body)
+
+
+def _count_energies(
+    scene: Scene, state: State, solved: Solved, energy: EnergyMemory, slid: float
+) -> sticking.StuckContact:
+    """Return a contact with adhesion with its energies, after those of the body; collective."""
+    assert scene.energy is not None
+    assert state.energy is not None
+    assert solved.stuck is not None
+    kept, old = ((each.stored, float(each.dissipated.sum())) for each in (energy, state.energy))
+    body = scene.energy.unit * ((kept[0] - old[0]) + (kept[1] - old[1]))
+    stuck, memory = solved.stuck, solved.stuck.memory
+    changes = body, state.row.measures, solved.measures, slid
+    gap = memory.pasts[0].gap
+    energies = sticking_energies.after_step(scene, memory.energies, gap, solved.trial, stuck.pushed, *changes)
+    columns = (*stuck.columns[:2], energies.surfaces, energies.lost)
+    return stuck._replace(memory=replace(memory, energies=energies), columns=columns)
 
 
 def _tell_effects(scene: Scene, solved: Solved, slid: float) -> None:
@@ -129,7 +149,7 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
 def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: MeanPressure | Approach) -> Solved:
     """Solve a step with adhesion, measure it and let the body go on; collective. Raises StepError."""
     assert state.sticking is not None
-    path = sticking.Path(_value_before(scene, state, trial, control), control)
+    path = _path(scene, state, trial, control)
     stuck, remark = sticking.solve(scene, state.sticking, step, trial, path, state.spare), ""
     if stuck.detached:
         sentence = f"nothing holds the surfaces under a {step.control} of {step.load:g}{UNITS[step.control]} any more"
@@ -149,11 +169,11 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
     return Solved(step, trial, contact, measures, memory, remark, stuck=stuck)
 
 
-def _value_before(scene: Scene, state: State, trial: Trial, control: MeanPressure | Approach) -> float:
-    """Return what was, after the last step, of what is prescribed in this one, in the run's units."""
-    if isinstance(control, MeanPressure):
-        return state.row.measures.pressure / (trial.alpha * scene.units.pressure)
-    return state.approach
+def _path(scene: Scene, state: State, trial: Trial, control: MeanPressure | Approach) -> sticking.Path:
+    """Return the way of what is prescribed since the last step, in the run's units."""
+    pressure = state.row.measures.pressure / (trial.alpha * scene.units.pressure)
+    before = pressure if isinstance(control, MeanPressure) else state.approach
+    return sticking.Path(before, control, state.approach, pressure)
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:

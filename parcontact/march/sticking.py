@@ -21,6 +21,7 @@ from ..solve.certificate import Certificate
 from ..solve.contact import Contact
 from ..solve.problem import Approach, MeanPressure
 from .starts import cells_moved
+from .sticking_energies import NO_ENERGIES, PathWork, StickingEnergies
 
 MANY_ITERATIONS = 15  # tuning: of a solve that is near a snap, or starts far away
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
@@ -46,8 +47,8 @@ class StickingMemory:
     """Memory of a contact that sticks: the last gaps, the newest first, and two spare maps.
 
     `lag` is what a free body lacks (`solve.adhesive.sticking`) per pressure, for the modulus `modulus`, None of a
-    periodic one. `surface` is the energy of the surfaces and `snapped` that lost in snaps, in the unit of energies.
-    `detached` is when nothing held the surfaces any more [s], under which load; NEVER before.
+    periodic one. `energies` are counted where they are asked for. `detached` is when nothing held the surfaces any more
+    [s], under which load; NEVER before.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -55,19 +56,19 @@ class StickingMemory:
     held: Array
     lag: Array | None
     modulus: float = 0.0
-    surface: float = 0.0
-    snapped: float = 0.0
+    energies: StickingEnergies = NO_ENERGIES
     detached: tuple[float, float] = NEVER
 
 
 class StuckContact(NamedTuple):
-    """The contact of a step, the memory after it, where the surfaces touch, and its numbers for columns; `detached`
-    says that nothing holds the load any more."""
+    """The contact of a step, the memory after it, where the surfaces touch, and its numbers for columns; `pushed`
+    [J] is the work of the load along its path; `detached` says that nothing holds the load any more."""
 
     contact: Contact
     memory: StickingMemory
     touching: Array
     columns: tuple[float, ...]
+    pushed: float
     detached: bool
 
 
@@ -86,10 +87,13 @@ def at_rest(scene: Scene) -> StickingMemory:
 
 @dataclass(frozen=True)
 class Path:
-    """The way of the prescribed load from the last step to this one, in the unit of the solver."""
+    """The way of the prescribed load from the last step to this one; approach and mean pressure of the last one; in the
+    units of the solver."""
 
     before: float
     control: Approach | MeanPressure
+    approach: float
+    pressure: float
 
     def at(self, share: float) -> Approach | MeanPressure:
         """Return what is prescribed at a share of the way; exact at its end."""
@@ -112,6 +116,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     whole = JUMP_STRIDE if step.jump else 1.0
     _start(scene, memory, step, trial, path, gap, still=step.jump)
     reached, stride, iterations, began = 0.0, whole, 0, memory.held
+    work = PathWork(scene, path.approach, path.pressure)
     while True:
         share = min(reached + stride, 1.0)
         loose = 1.0 if share == 1.0 else LOOSE
@@ -125,6 +130,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
                 gap[...] = began
             stride *= 0.5
             continue
+        work.go_on(contact)
         if detached or contact.failure or share == 1.0:
             break
         easy = contact.iterations <= MANY_ITERATIONS // 3
@@ -132,9 +138,9 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
         began[...] = gap
     contact = replace(contact, iterations=iterations)
     pasts = PastGap(gap, step.position, True), memory.pasts[0]
-    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.surface, memory.snapped)
+    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.energies)
     columns = _columns(scene, trial, contact.p)
-    return StuckContact(contact, now, gap == 0.0, columns, detached)
+    return StuckContact(contact, now, gap == 0.0, columns, work.total * trial.alpha, detached)
 
 
 def open_up(scene: Scene, stuck: StuckContact, trial: Trial) -> StuckContact:
@@ -208,7 +214,7 @@ def entries(memory: StickingMemory, height: float, modulus: float) -> dict[str, 
         "positions": Entry(np.array([*now.position, *before.position]), 1.0, "m"),
         "known": Entry(np.array([float(now.known), float(before.known)])),
         "modulus": Entry(memory.modulus, modulus, "Pa"),
-        "energies": Entry(np.array([memory.surface, memory.snapped])),
+        "energies": Entry(np.array(memory.energies), 1.0, "J"),
         "detached": Entry(np.array(memory.detached)),
     }
     return found if memory.lag is None else {**found, "lag": Entry(memory.lag, height, "m")}
@@ -220,6 +226,5 @@ def restored(memory: StickingMemory, saved: Saved) -> StickingMemory:
     known = [bool(each) for each in saved["known"]]
     now, before = memory.pasts
     pasts = PastGap(now.gap, (x, y), known[0]), PastGap(before.gap, (x_before, y_before), known[1])
-    surface, snapped = saved["energies"].tolist()
     modulus, maps = float(saved["modulus"]), (memory.spare, memory.held, memory.lag)
-    return StickingMemory(pasts, *maps, modulus, surface, snapped)
+    return StickingMemory(pasts, *maps, modulus, StickingEnergies(*saved["energies"].tolist()))

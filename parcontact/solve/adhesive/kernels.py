@@ -224,6 +224,18 @@ def weigh_off(p, a, level):
 
 
 @loop
+def surface_energy(kind, s, rho, g):
+    """Sum of `-gamma(g)`."""
+    total = 0.0
+    for j in range(g.shape[0]):
+        row = 0.0
+        for i in range(g.shape[1]):
+            row -= energy(kind, s, rho, g[j, i])
+        total += row
+    return total
+
+
+@loop
 def tension(p, least):
     """The number of points with more tension than that, and the sum of all tension."""
     count, total = 0.0, 0.0

@@ -49,18 +49,20 @@ class StickingSolver:
         if self.free is None or lag is None:
             found = self.gaps.solve(law, heights, control, gap, tolerance)
             out[...] = found.p
-            return self._contact(found, heights, out, found.iterations), found.detached
+            u = self.workspace.displacement
+            np.add(gap, heights, out=u)
+            u += found.d
+            return self._contact(found, out, found.iterations), found.detached
         iterations, passes, share, last = 0, 0, 1.0, lag
         while True:
             found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
             iterations, passes = iterations + found.iterations, passes + 1
             out[...] = found.p
-            change = self.free.apply(out, self.workspace.other_displacement)
-            change -= heights + gap
+            change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
             change -= lag + found.d
             found, worst = self._judge(control, found, out, change)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
-            last = change.copy()
+            last = change
             lag += share * change
             if found.failure or found.detached or worst <= tolerance:
                 break
@@ -68,7 +70,7 @@ class StickingSolver:
                 asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
                 found = replace(found, failure=f"did not settle in {passes} passes of a free body: changes are {asked}")
                 break
-        return self._contact(found, heights, out, iterations), found.detached
+        return self._contact(found, out, iterations), found.detached
 
     def _judge(
         self, control: Approach | MeanPressure, found: GapSolution, p: Array, change: Array
@@ -91,9 +93,6 @@ class StickingSolver:
         wanted = -share * along / size if size > 0.0 else 1.0
         return min(max(wanted, LEAST_SHARE), MOST_SHARE)
 
-    def _contact(self, found: GapSolution, heights: Array, p: Array, iterations: int) -> Contact:
-        """The solution as a contact, with the displacement `g + h + d` in the workspace."""
-        u = self.workspace.displacement
-        np.add(found.gap, heights, out=u)
-        u += found.d
-        return Contact(p, u, found.d, found.certificate, iterations, found.failure)
+    def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
+        """The solution as a contact, whose displacement is in the workspace."""
+        return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)
