@@ -39,7 +39,7 @@ from .convolution import (
     travelling_wavenumbers,
     wavenumbers,
 )
-from .layer import Layer
+from .layer import Layer, LongWaves
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
 from .wake import wake
@@ -73,8 +73,16 @@ class HalfSpace:
 
     @property
     def reach(self) -> float:
-        """Distance beyond which points hardly act on each other: the thickness of a layer."""
-        return math.inf if self.layer is None else self.layer.thickness
+        """Distance beyond which points hardly act on each other: the thickness of a layer, half of it where that hardly
+        yields to long waves."""
+        if self.layer is None:
+            return math.inf
+        return self.layer.thickness * (1.0 if self.long_waves is None else 0.5)
+
+    @property
+    def long_waves(self) -> LongWaves | None:
+        """What waves longer than a layer's softest one need of a preconditioner, if there are any."""
+        return None if self.layer is None else self.layer.long_waves(self.size)
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 
@@ -93,8 +101,8 @@ class HalfSpace:
 
         At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
         acts on mean values only. Waves on a layer that are longer than its softest one count as stiff as that: contact
-        is in patches, which such waves would join (iterations on a thin incompressible layer: 200 without that, 20
-        with it).
+        is in patches, which such waves would join. What they are stiffer within patches is left to
+        `solve.preconditioner.long_waves`.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)

@@ -32,7 +32,19 @@ FAR = 50.0  # accuracy: thicknesses; farther away a unit pressure moves the laye
 KNOTS_PER_THICKNESS = 16  # accuracy: of the spline through the correction, whose error is below 1e-6 of it then
 NODES = 900  # accuracy: of the integral over wavenumbers: 5 for each oscillation of the Bessel function
 SOFTEST_BETWEEN, SOFTEST_TRIED = (1e-3, 1e2), 2000  # tuning: wavenumbers times thickness, of a preconditioner
+HARDLY_STIFFER = 0.8  # tuning: stiffness of the softest wave over that of the longest ones
 SERIES_BELOW = 1.0  # accuracy: sinh(y) - y by its series, whose twelve terms are exact to rounding
+
+
+@dataclass(frozen=True)
+class LongWaves:
+    """Compliance `c0 + c2 q^2` by which waves longer than a layer's softest one are stiffer than that, in a box of a
+    `size`; all in one unit of length."""
+
+    c0: float
+    c2: float
+    thickness: float
+    size: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -75,6 +87,21 @@ class Layer:
         stiffness = q / ((1.0 - self.poisson) * self.compliance_ratio(q))
         softest = int(np.argmin(stiffness))
         return float(q[softest]), float(stiffness[softest])
+
+    def long_waves(self, size: tuple[float, float]) -> LongWaves | None:
+        """Return what makes waves in a box stiffer than the softest one that are longer; None where they are hardly
+        stiffer, or there are none.
+
+        The compliance of long waves on a bonded layer is `mean_compliance` plus, of order q^2,
+        `d^3 ((3 - 4 nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible one.
+        """
+        nu, softest, stiffness = self.poisson, *self.softest_wave
+        least = stiffness * self.mean_compliance
+        if self.base == "smooth" or least > HARDLY_STIFFER or softest * max(size) < 2 * np.pi:
+            return None
+        second = (3.0 - 4.0 * nu) / (6.0 * (1.0 - nu)) - (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu) ** 2)
+        c0, c2 = self.mean_compliance / (1.0 - least), self.thickness**3 * second / (1.0 - least) ** 2
+        return LongWaves(c0, c2, self.thickness, size)
 
     def coefficients(self, x: Array, y: Array, dx: float, dy: float, of_half_space: Array) -> Array:
         """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.

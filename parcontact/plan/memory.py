@@ -3,7 +3,6 @@
 Each class says what it holds; here this is added up.
 """
 
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from ..physics.convolution import Convolution, MirroredConvolution
 from ..physics.energy import ElasticPressure
 from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
+from ..physics.layer import Layer
 from ..physics.lowest import shape_of
 from ..scene import choices
 from ..scene.rigid_surface import highest_waves
@@ -60,9 +60,10 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
         found["single transforms and preconditioner"] = blocks + part.preconditioner(single, 4)
     else:
         found["preconditioner"] = part.preconditioner(whole, 8)
-    reach = math.inf if job.body is None else job.body.thickness
-    tolerance, grids = job.numerics.tolerance, grids_for(grid.dx, grid.dy, reach)
-    found["solver"] = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept)
+    body, tolerance = part.half_space, job.numerics.tolerance
+    grids = grids_for(grid.dx, grid.dy, body.reach)
+    solver = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept, body.long_waves)
+    found["solver"] = solver
     if chosen.adhesion is not None:
         found["adhesion"] = 2 * Convolution.footprint(whole, grid.ny) + GapSolver.footprint(part.cells(grid.points))
     if chosen.spectrum.on:
@@ -156,7 +157,14 @@ class _Part:
     @property
     def own_lengths(self) -> Points | None:
         """Lengths of the operator's own transforms; None if it takes those of the grid."""
-        return HalfSpace(self.job.grid.size, free=choices(self.job).isolated.on).own_lengths(self.job.grid.points)
+        return self.half_space.own_lengths(self.job.grid.points)
+
+    @property
+    def half_space(self) -> HalfSpace:
+        """The body, in m."""
+        poisson, body, free = self.job.material.poisson, self.job.body, choices(self.job).isolated.on
+        layer = None if body is None else Layer(body.thickness, body.base, poisson)
+        return HalfSpace(self.job.grid.size, poisson, free=free, layer=layer)
 
     def preconditioner(self, spectrum: int, itemsize: int) -> int:
         """Bytes of the inverse of the half space beside a transform of maps of such items."""

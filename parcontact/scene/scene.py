@@ -228,7 +228,7 @@ def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) ->
     grids = grids_for(body.size[0] / slab.nx, body.size[1] / slab.ny, body.reach)
     workspace = Workspace(setup.slab, tolerance, operator_type)
     free = setup.choices.isolated.on
-    return ContactSolver(workspace, height, tolerance, limit, grids, free), operators
+    return ContactSolver(workspace, height, tolerance, limit, grids, free, body.long_waves), operators
 
 
 def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:

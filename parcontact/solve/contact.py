@@ -39,11 +39,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..parallel.slab import Array, reused
+from ..physics.layer import LongWaves
 from . import kernels
 from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
 from .local_load import LEAST_CUT, LocalLoad
 from .preconditioner.extension import ExtendedPreconditioner
+from .preconditioner.long_waves import LongWavePreconditioner
 from .problem import Problem
 from .workspace import Workspace
 
@@ -52,7 +54,9 @@ MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after whi
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
 STEP = 0.95  # beside edges of contact, and 1 far from them
 MAX_STEP_RATIO = 1.25  # of the exact step over the one made, or its inverse: beyond it, steps are exact from then on
-MAX_STEP_RATIO_FREE = 2.0  # the same in a box with nothing around, where K is less near to the inverse at its edges
+MAX_STEP_RATIO_FREE = (
+    2.0  # the same in a box with nothing around, at whose edges K is less near to the inverse; on thin layers
+)
 ITERATIONS_UNTIL_EXACT_STEPS = 5  # without a better certificate
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at the bounds, the next one takes no notice of its direction
@@ -87,7 +91,8 @@ class ContactSolver:
 
     Parameters: the `workspace` that it works in; `height` of the surface from its lowest to its highest point, in the
     unit of h; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells by which a residual is extended
-    (`extension.grids_for`); whether the box is `free`, with nothing around.
+    (`extension.grids_for`); whether the box is `free`, with nothing around; the `long_waves` of a layer, for which K
+    is not stiff enough.
     """
 
     def __init__(
@@ -98,12 +103,15 @@ class ContactSolver:
         max_iterations: int,
         grids: int | None = None,
         free: bool = False,
+        long_waves: LongWaves | None = None,
     ) -> None:
         self.workspace, self.slab = workspace, workspace.slab
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
-        self._extended = ExtendedPreconditioner(self.slab, most=grids)
+        self._extended: ExtendedPreconditioner | LongWavePreconditioner = ExtendedPreconditioner(self.slab, most=grids)
         self._rough_inverse = grids == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is only roughly the inverse
-        self._most_ratio = MAX_STEP_RATIO_FREE if free else MAX_STEP_RATIO
+        if long_waves is not None and not self._rough_inverse:
+            self._extended = LongWavePreconditioner(self.slab, long_waves, self._extended)
+        self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
         self._local_load = LocalLoad(self.slab)
 
     @staticmethod
@@ -115,9 +123,12 @@ class ContactSolver:
         rank: int,
         grids: int | None = None,
         kept: type[np.floating] = np.float64,
+        long_waves: LongWaves | None = None,
     ) -> int:
         """Bytes that it holds on a rank, with its workspace."""
         cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, grids)
+        if long_waves is not None and grids != 0 and min(nx, ny) > 1:
+            cells += LongWavePreconditioner.footprint(nx, ny, ranks, rank, long_waves)
         return Workspace.footprint(nx, ny, tolerance, ranks, rank, kept) + cells
 
     def solve(self, problem: Problem, start: Array, length: float = 1.0) -> Contact:

@@ -48,6 +48,8 @@ JOBS: dict[str, Json] = {
     "waves of two cells": {"grid": {"points": 16}, "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [8, 0]}},
     "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed", "tolerance": 1e-4}},
     "mixed, loose": {"history": [SLIDE], "numerics": {"precision": "mixed"}},
+    "thin layer": {"body": {"thickness": 1e-4}},
+    "thinnest layer": {"body": {"thickness": 4.2e-5}, "history": [CELLS]},
     "free, mixed, loose": {
         "grid": {"boundary": "free"},
         "surface": {"shape": "sphere", "radius": 1e-2},

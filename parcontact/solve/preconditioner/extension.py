@@ -33,12 +33,12 @@ Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> int | None:
     """Return the most grids of larger cells to use with distances dx and dy of points; None for all that there are.
 
-    Points further apart than the `reach` do not act on each other: no cell is longer than about that. On a layer it is
-    the thickness.
+    Points further apart than the `reach` do not act on each other: no cell is longer than about that, if it is not the
+    first.
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return 0
-    return None if reach == math.inf else max(round(math.log2(reach / max(dx, dy))), 0)
+    return None if reach == math.inf else max(round(math.log2(reach / max(dx, dy))), 1)
 
 
 class ExtendedPreconditioner:
@@ -52,7 +52,7 @@ class ExtendedPreconditioner:
         self._steps = pyramid.steps_of(slab)[:most]
         grids = [step.coarse for step in self._steps]
         self._floors = [
-            (np.float32(floor) * _lengths(slab.ny, level)[grid.rows], _lengths(slab.nx, level))
+            (np.float32(floor) * lengths(slab.ny, level)[grid.rows], lengths(slab.nx, level))
             for level, grid in enumerate(grids, 1)
         ]
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
@@ -88,13 +88,13 @@ class ExtendedPreconditioner:
     def _add_up(self, maps: Maps) -> None:
         for k, step in enumerate(self._steps):
             points, cells = maps[k : k + 2]
-            _add_up(points, step.points_beside(points, 0, -1), step.above, cells[step.own])
+            add_up(points, step.points_beside(points, 0, -1), step.above, cells[step.own])
             step.complete(cells)
 
     def _add_up_back(self, maps: Maps) -> None:
         for k, step in reversed(list(enumerate(self._steps))):
             points, cells = maps[k : k + 2]
-            _add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
+            add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
 
     def _interpolate(self, known: Maps, maps: Maps) -> None:
         for k, step in reversed(list(enumerate(self._steps))):
@@ -109,7 +109,7 @@ class ExtendedPreconditioner:
             step.complete(cells)
 
 
-def _lengths(points: int, level: int) -> NDArray[np.float32]:
+def lengths(points: int, level: int) -> NDArray[np.float32]:
     """How many points there are of each cell along one direction: fewer in the last one."""
     length = 1 << level
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
@@ -139,7 +139,7 @@ def _row(own, beside, j):
 
 
 @loop
-def _add_up(points, beside, above, cells):
+def add_up(points, beside, above, cells):
     """The sums over cells."""
     pairs = points.shape[1] // 2
     for j in range(cells.shape[0]):
@@ -152,7 +152,7 @@ def _add_up(points, beside, above, cells):
 
 
 @loop
-def _add_up_back(cells, beside, above, points):
+def add_up_back(cells, beside, above, points):
     """Add the value of each cell to its points."""
     pairs = points.shape[1] // 2
     for j in range(points.shape[0]):
