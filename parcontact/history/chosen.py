@@ -51,17 +51,18 @@ class Bounds:
     most: float
 
 
-def most_cells(grid: Grid, surface: Sequence[Any]) -> int:
+def most_cells(job: Planned) -> int:
     """Return how many cells the longest step slides, a power of two: an eighth of the shortest wave.
 
     It is one cell where that is shorter, or where a file may have any wave.
     """
-    waves = [2.0 * MOST_CELLS * WAVE_STEPS]
-    for shape in surface:
+    grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
+    cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
+    for shape in job.surface:
         if isinstance(shape, Wave):
             waves += [n / abs(count) for n, count in zip(grid.points, shape.waves, strict=True) if count]
         elif isinstance(shape, Rough):
-            waves.append(shape.short_wavelength / max(grid.dx, grid.dy))
+            waves.append(shape.short_wavelength / max(cells, default=max(grid.dx, grid.dy)))
         elif not isinstance(shape, Sphere | Cylinder | Flat):
             return 1
     return int(min(MOST_CELLS, 2 ** max(0, math.floor(math.log2(min(waves) / WAVE_STEPS * (1.0 + SAME_TIME))))))
@@ -163,7 +164,7 @@ class ChosenSteps:
     @classmethod
     def of(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
         """Return those that the stages of a job had chosen when a checkpoint with these arrays was written."""
-        found = cls(most_cells(job.grid, job.surface))
+        found = cls(most_cells(job))
         if saved is not None and SYMBOLS.keys() <= saved.keys():
             ends = iter(saved["clock/ends"].tolist())
             for stage, count in zip(saved["clock/stages"], saved["clock/counts"], strict=True):
@@ -209,7 +210,7 @@ def describe_steps(job: Planned) -> str:
         return ""
     if not job.remembers:
         return f"{names}: one cell of sliding per step and one step at rest, as an elastic body has no error of time"
-    cells = most_cells(job.grid, job.surface)
+    cells = most_cells(job)
     slides = any(stage.chooses and stage.speed for stage in job.history)
     limits = f", and are at most {cells} cell{'s' * (cells > 1)} long" * slides
     return f"{names}: steps follow their error, for numerics.accuracy {job.numerics.asked.of_steps:g}{limits}"

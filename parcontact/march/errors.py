@@ -132,15 +132,22 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
         measures.friction,
         measures.contact_area,
         measures.contact_area_corrected,
-        math.hypot(step.velocity[0] / grid.dx, step.velocity[1] / grid.dy) * step.dt,
+        _cells_slid(run, step, (grid.dx, grid.dy)),
         step.dt,
         max(certificate.members / measures.contact_area - 1.0, 0.0),
         look.angle,
         apart,
         measures.friction_interface,
+        step.velocity,
     )
     time = time_error(run, observed, points)
     return Estimate(estimate(run, observed, points, time), time, observations)
+
+
+def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> float:
+    """Return by how many cells the surface slides in a step: of mean sides, or across straight edges of contact."""
+    dx, dy = cell if run.straight else (run.mean_cell, run.mean_cell)
+    return math.hypot(step.velocity[0] / dx, step.velocity[1] / dy) * step.dt
 
 
 def _look(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObservation, IntegratorDifference]:
@@ -187,8 +194,11 @@ def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony |
     job = setup.job
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
     waves += [setup.shortest] if setup.shortest is not None else []
-    cells = min(waves) / max(job.grid.dx, job.grid.dy) if waves else None
-    return RunProperties(cells, 1 in job.grid.points or _ridges(job.surface), folded, exponential, prony)
+    (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
+    cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # across a line of points there is nothing
+    cells = min(waves) / max(cell) if waves else None
+    straight = 1 in job.grid.points or _ridges(job.surface)
+    return RunProperties(cells, straight, folded, exponential, prony, cell)
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:

@@ -14,9 +14,8 @@ time: from how far the spots of contact, or the waves of the surface, pass in a 
 folded: the bound of the branches without a map.
 mesh: of friction by how much its two views differ, by the slopes of the rigid surface and of the body (`slopes`), and
     what both have in common: from the cells per shortest wave of a rough surface, and per radius of the spots of
-    contact, which are small under small loads whatever the waves, less where many of them average it out, and where
-    little is open. Of the corrected area from the correction itself. Where there is a run on half the mesh, both from
-    their difference to it.
+    contact, along the sliding and across it (`mesh_error`). Of the corrected area from the correction itself. Where
+    there is a run on half the mesh, both from their difference to it.
 
 Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
 wrong with pressures then counts more, by about the root of the ratio. Pressures that are wrong by the complementarity
@@ -34,23 +33,20 @@ per wave make of marches is then added in full.
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import asdict, astuple, dataclass, field, fields, replace
+from dataclasses import astuple, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .entries import Entry, Saved
-from .time_error import RunProperties, StepObservation, count_spots, share_of_area, spot_radius, time_error
+from .mesh_error import SPOTS_ORDER, SPOTS_POWER, WAVES_ORDER, area_by_mesh, friction_by_mesh
+from .time_error import RunProperties, StepObservation, count_spots, share_of_area, time_error
 
-SOLVER_FRICTION, SPOTS_POWER = 1.1, 0.25  # times the complementarity, over this power of the number of spots
+SOLVER_FRICTION = 1.1  # times the complementarity, over the power SPOTS_POWER of the number of spots
 SOLVER_AREA, SOLVER_AREA_POWER = 0.1, 0.7  # times this power of it
 PENETRATING = 0.8  # of the points that penetrate without pressure are missing in the contact, but for those in excess
-WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
-SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 CORRECTED_ORDER = 1.0  # of the corrected area
-EDGES, STRAIGHT_EDGES = 0.25, 3.0  # of the correction of the area; along edges that follow the grid
-SMALL_SPOTS = 0.6  # of the square of the correction, which is large where spots of contact are a few cells wide
 NOISE = 0.4  # of the slope of the surface, times the complementarity: tangential force where there is no friction
 BY_ENERGY, BY_ENERGY_WAVES = 1.0, 0.2  # of the difference of the views, and of what waves make, in steady sliding
 PRESSURES = 0.3  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
@@ -62,26 +58,43 @@ LEAST_WAY = 1e-60  # m: smaller weights are those of rest
 
 @dataclass(frozen=True)
 class Parts:
-    """Relative errors by what makes them."""
+    """Relative errors by what makes them; `across` is that part of the mesh's which the cells across the sliding make,
+    0 where nothing slides."""
 
     solver: float
     time: float
     folded: float
     mesh: float
+    across: float = 0.0
 
     @property
     def total(self) -> float:
         """The sum of all."""
         return self.solver + self.time + self.folded + self.mesh
 
+    @property
+    def along(self) -> float:
+        """What the cells along the sliding make, or all of the mesh's where nothing slides."""
+        return self.mesh - self.across
 
-NAMES = tuple(part.name for part in fields(Parts))
+    def plain(self) -> dict[str, float]:
+        """Return the parts that add up, that of the mesh which is made across the sliding, and all of them."""
+        return {name: getattr(self, name) for name in NAMES} | {"mesh_across": self.across, "total": self.total}
+
+    def with_mesh(self, error: float) -> "Parts":
+        """Return the same with another error by the mesh, in the same proportion along and across."""
+        return replace(self, mesh=error, across=self.across * error / self.mesh if self.mesh > 0.0 else 0.0)
+
+
+NAMES = ("solver", "time", "folded", "mesh")  # that add up
 SUMS = "budget/sums"  # in a checkpoint
 REMEDIES = {
     "solver": "a smaller numerics.tolerance",
     "time": "shorter time steps",
     "folded": "a smaller numerics.branch_error",
     "mesh": "a finer grid",
+    "along": "more grid.points along the sliding",
+    "across": "more grid.points across the sliding",
 }
 SMALLER = "a smaller numerics.accuracy"  # where it has chosen the setting
 SHOWN = {"time": "time steps", "folded": "folded branches"}  # names of parts in sentences
@@ -130,30 +143,19 @@ def _with_interface(
 
 def _steady_friction(run: RunProperties, observed: StepObservation, points: int) -> Parts:
     share = min(max(1.0, 4.0 / (run.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
-    mesh = BY_ENERGY * observed.views_apart / max(observed.friction, PRESSURES * observed.slope)
-    mesh += share * _by_waves(run) + _by_spots(run, observed, points)
+    views = BY_ENERGY * observed.views_apart / max(observed.friction, PRESSURES * observed.slope)
+    along, across = friction_by_mesh(run, observed, points, share)
     solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
-    return Parts(solver, 0.0, run.folded, mesh)
+    return Parts(solver, 0.0, run.folded, views + along + across, across)
 
 
 def _friction(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:
     spots, steep = count_spots(run, observed, points), max(1.0, observed.slope / observed.friction)
     solver = SOLVER_FRICTION * observed.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
     noise = NOISE * max(observed.complementarity, ROUNDING) * observed.slope / observed.friction / math.sqrt(spots)
-    mesh = observed.views_apart / observed.friction + _by_waves(run) + _by_spots(run, observed, points)
-    return Parts(max(solver, noise), time, run.folded, mesh)
-
-
-def _by_waves(run: RunProperties) -> float:
-    """Return the error of friction that the cells per shortest wave make."""
-    return WAVES_FRICTION * (4.0 / run.cells_per_wave) ** WAVES_ORDER if run.cells_per_wave is not None else 0.0
-
-
-def _by_spots(run: RunProperties, observed: StepObservation, points: int) -> float:
-    """Return the error of friction that the cells per radius of the spots of contact make."""
-    radius = spot_radius(observed, points)
-    one = min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
-    return (1.0 - observed.area) * one / count_spots(run, observed, points) ** SPOTS_POWER
+    along, across = friction_by_mesh(run, observed, points)
+    mesh = observed.views_apart / observed.friction + along + across
+    return Parts(max(solver, noise), time, run.folded, mesh, across)
 
 
 def compared_with_half_mesh(
@@ -178,17 +180,14 @@ def compared_with_half_mesh(
         own, other = own * (1.0 + found.time), other * (1.0 + by_steps)
     friction = (abs(own - other) / own if own > 0.0 else 0.0) / (times - 1.0)
     area = (abs(here[1] - coarse[1]) / here[1] if here[1] > 0.0 else 0.0) / (2.0**CORRECTED_ORDER - 1.0)
-    return ErrorBudget(found and replace(found, mesh=friction), replace(budget.area, mesh=area))
+    return ErrorBudget(found and found.with_mesh(friction), budget.area.with_mesh(area))
 
 
 def _area(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:
     open_share = 1.0 - observed.area
     solver = SOLVER_AREA * observed.complementarity**SOLVER_AREA_POWER + PENETRATING * observed.penetrating
-    mesh = STRAIGHT_EDGES * observed.correction
-    if not run.straight:
-        mesh = EDGES * observed.correction + SMALL_SPOTS * observed.correction**2
-    mesh = max(mesh, 1.0 / (points * observed.area)) if observed.area > 0.0 else mesh  # it is counted in cells
-    return Parts(solver, share_of_area(run, observed) * time, run.folded * open_share, mesh)
+    along, across = area_by_mesh(run, observed, points)
+    return Parts(solver, share_of_area(run, observed) * time, run.folded * open_share, along + across, across)
 
 
 def weight_of(slid: float, seconds: float) -> float:
@@ -205,7 +204,7 @@ class ErrorSums:
     each part.
     """
 
-    sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
+    sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(fields(Parts)))))
 
     def plus(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> "ErrorSums":
         """Return the sums with one step of so many seconds, in which the surface slid so far [m]."""
@@ -222,7 +221,10 @@ class ErrorSums:
     @classmethod
     def restored(cls, saved: Saved) -> "ErrorSums":
         """Return the sums of a checkpoint."""
-        return cls(np.reshape(saved[SUMS], (2, -1))) if SUMS in saved else cls()
+        if SUMS not in saved:
+            return cls()
+        found = np.reshape(saved[SUMS], (2, -1))
+        return cls(np.pad(found, ((0, 0), (0, 1 + len(fields(Parts)) - found.shape[1]))))  # no directions in old ones
 
     @property
     def friction(self) -> Parts | None:
@@ -232,7 +234,7 @@ class ErrorSums:
     @property
     def friction_within(self) -> float:
         """Friction is known to so much, in the mean over the way: an error of its coefficient, not of a share of it."""
-        return float(self.sums[0, 1:].sum() / self.sums[1, 0]) if self.sums[1, 0] > 0.0 else math.nan
+        return float(self.sums[0, 1 : 1 + len(NAMES)].sum() / self.sums[1, 0]) if self.sums[1, 0] > 0.0 else math.nan
 
     @property
     def area(self) -> Parts | None:
@@ -246,7 +248,7 @@ class ErrorSums:
     def facts(self, accuracy: Any) -> dict[str, Any]:
         """Return as plain data the accuracy that was asked for, and the relative errors by part, and in all."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
-        parts = {name: asdict(each) | {"total": each.total} for name, each in found.items() if each is not None}
+        parts = {name: each.plain() for name, each in found.items() if each is not None}
         return {"accuracy": accuracy, **parts}
 
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
@@ -269,6 +271,8 @@ def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % of numerics.accuracy"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
+    if worst == "mesh" and worst not in chosen and parts.across:
+        worst = "along" if parts.along >= parts.across else "across"
     remedy = SMALLER if worst in chosen else REMEDIES[worst]
     return f". numerics.accuracy asks for {100 * accuracy:g} %: try {remedy}"
 
@@ -286,4 +290,5 @@ def per_cent(share: float) -> str:
 def describe(parts: Parts) -> str:
     """Return the total in per cent, and what it is made of."""
     shares = ", ".join(f"{SHOWN.get(name, name)} {per_cent(getattr(parts, name))}" for name in NAMES)
-    return f"{100 * parts.total:.3g} % ({shares})"
+    split = f": {per_cent(parts.along)} along, {per_cent(parts.across)} across the sliding" if parts.across else ""
+    return f"{100 * parts.total:.3g} % ({shares}{split})"

@@ -3,8 +3,8 @@
 Contact counted in cells is too large: a cell counts as a whole when the edge of contact goes through it. With the
 length S of all edges of contact, measured along the sides of cells of length dx, the area is in the mean
 `A - (pi - 1 + ln 2)/24 S dx` (V. A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161,
-arXiv:1701.02727). In cells that is `SIDE` for each side between a point in contact and one that is not, whatever the
-ratio of the sides of a cell: to stretch a map along x stretches its edges and the cells beside them alike.
+arXiv:1701.02727). In cells that is `SIDE` for each side between a point in contact and one that is not. Where cells are
+longer than wide it is less (`measures.excess_of`).
 """
 
 import math
@@ -14,7 +14,7 @@ from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
 from .interface import InterfaceFriction, Vector
-from .measures import SIDE, Measures
+from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
 
@@ -27,6 +27,12 @@ class Probe:
     surface: Surface
     units: Units
     interface: InterfaceFriction | None = None
+
+    @property
+    def _excess(self) -> float:
+        """Cells in excess per side on the edge of contact."""
+        (lx, ly), slab = self.surface.size, self.slab
+        return excess_of(lx / slab.nx, ly / slab.ny, 1 in (slab.nx, slab.ny))
 
     def measure(
         self,
@@ -57,7 +63,7 @@ class Probe:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
-        corrected = (count - SIDE * sides) / points
+        corrected = (count - self._excess * sides) / points
         own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]
         return Measures(

@@ -34,8 +34,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .measures import SIDE
+from .measures import excess_of
 from .prony import Prony
+
+Vector = tuple[float, float]
 
 ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
 PASSING_FRICTION = 0.66  # times the share of the radius of a spot that a step is, and what forces are late by
@@ -60,7 +62,7 @@ class RunProperties:
 
     `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
     column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator; `prony`: what
-    relaxes, None of an elastic body.
+    relaxes, None of an elastic body; `cell`: its sides, in any unit. `cells_per_wave` counts the longer ones.
     """
 
     cells_per_wave: float | None
@@ -68,16 +70,27 @@ class RunProperties:
     folded: float
     exponential: bool
     prony: Prony | None = None
+    cell: Vector = (1.0, 1.0)
+
+    @property
+    def mean_cell(self) -> float:
+        """The mean of the sides of a cell, in which radii of spots are counted."""
+        return 0.5 * (self.cell[0] + self.cell[1])
+
+    @property
+    def cells(self) -> float:
+        """The area of a cell over that of a square of its mean side."""
+        return self.cell[0] * self.cell[1] / self.mean_cell**2
 
 
 @dataclass(frozen=True)
 class StepObservation:
     """Observation of a step: the certificate's complementarity; by how much the embedded pair differs, with its order
     in the step; the rms slope of the surface under the pressure; friction; contact area, counted and corrected, as
-    shares; by how many cells the surface slid in it, in how many seconds; the points that penetrate without pressure,
-    as a share of those in contact; by what angle a wave turned that is as high as the surface under the pressure
-    and changes as much; by how much friction by the slopes of the rigid surface and of the body differ; what an
-    interface adds to friction."""
+    shares; by how many cells (of mean sides) the surface slid in it, in how many seconds; the points that penetrate
+    without pressure, as a share of those in contact; by what angle a wave turned that is as high as the surface under
+    the pressure and changes as much; by how much friction by the slopes of the rigid surface and of the body differ;
+    what an interface adds to friction; the direction in which the surface slides, 0 at rest."""
 
     complementarity: float
     difference: float
@@ -92,6 +105,7 @@ class StepObservation:
     angle: float = 0.0
     views_apart: float = 0.0
     interface: float = 0.0
+    way: Vector = (0.0, 0.0)
 
     @property
     def correction(self) -> float:
@@ -99,24 +113,24 @@ class StepObservation:
         return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
 
 
-def spot_radius(observed: StepObservation, points: int) -> float:
-    """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells;
-    infinite where there are no edges."""
-    sides = (observed.area - observed.corrected) * points / SIDE
+def spot_radius(run: RunProperties, observed: StepObservation, points: int) -> float:
+    """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells of
+    mean sides; infinite where there are no edges."""
+    sides = (observed.area - observed.corrected) * points / excess_of(*run.cell, run.straight)
     return ROUND * min(observed.area, 1.0 - observed.area) * points / sides if sides > 0.0 else math.inf
 
 
 def radius_of(run: RunProperties, observed: StepObservation, points: int) -> float:
     """Return the radius of spots, or half the width of a straight one."""
-    return spot_radius(observed, points) / (ROUND if run.straight else 1.0)
+    return spot_radius(run, observed, points) / (ROUND if run.straight else 1.0)
 
 
 def count_spots(run: RunProperties, observed: StepObservation, points: int) -> float:
     """Return the number of spots of contact; in full contact as many as half waves of the shortest length."""
     radius = radius_of(run, observed, points)
     if run.cells_per_wave is not None:
-        radius = min(radius, 0.5 * run.cells_per_wave)
-    one = 2.0 * radius if run.straight else math.pi * radius**2
+        radius = min(radius, 0.5 * run.cells_per_wave * (max(run.cell) / run.mean_cell))
+    one = 2.0 * radius if run.straight else math.pi * radius**2 / run.cells
     return max(1.0, observed.area * points / one) if one > 0.0 else 1.0
 
 

@@ -24,7 +24,8 @@ from ..job.checks.advice import STEPS_PER_WAVE
 from ..job.checks.cells import cells_per_wave, fast_length
 from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.sections.listing import plain
-from ..physics.budget import SPOTS_ORDER, per_cent
+from ..physics.budget import per_cent
+from ..physics.mesh_error import SPOTS_ORDER
 from ..physics.time_error import TIME_ORDER
 from .costs import Costs
 from .report import MARK, duration_text, ranks_text, unit_of

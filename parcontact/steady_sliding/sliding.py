@@ -178,6 +178,7 @@ class SteadySliding:
             penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
             views_apart=abs(slopes - friction),
             interface=measures.friction_interface,
+            way=velocity,
         )
         return friction, estimate_steady(self._known, seen, setup.slab.points)
 

@@ -9,8 +9,9 @@ from marching import SLS, begun
 
 from parcontact.history.chosen import MadeStep, most_cells
 from parcontact.history.timeline import Step
-from parcontact.job import Grid
+from parcontact.job import Grid, Job
 from parcontact.job.sections.geometry import Flat, HeightFile, Rough, Sphere, Wave
+from parcontact.job.sections.stages import Stage
 from parcontact.march.choosing import MOST_GROWTH, REJECTED, SAFETY, StepChooser
 from parcontact.march.loop import March
 
@@ -171,4 +172,17 @@ def wave(*waves: int) -> Wave:
 def test_longest_step_of_a_slide(surface: list[Any], cells: int) -> None:
     """A power of two of cells, on 64 x 32 of them: four, or an eighth of the shortest wave along either direction, of
     which those of a rough surface count with the longer side of a cell; one for any heights."""
-    assert most_cells(Grid(points=(64, 32), size=(1e-3, 1e-3)), surface) == cells
+    still = Stage.model_construct(velocity=(0.0, 0.0))
+    assert most_cells(job_with((64, 32), surface, still)) == cells
+
+
+def test_long_cells_count_along_the_slide() -> None:
+    """Cells four times as long across it: as many as on squares of the shorter side; along it as of the longer."""
+    rough = Rough.model_construct(long_wavelength=1.0, short_wavelength=32e-3 / 64)
+    stages = [Stage.model_construct(velocity=velocity) for velocity in ((1.0, 0.0), (0.0, 1.0))]
+    assert [most_cells(job_with((64, 16), [rough], stage)) for stage in stages] == [4, 1]
+
+
+def job_with(points: tuple[int, int], surface: list[Any], stage: Stage) -> Job:
+    changed = {"grid": Grid(points=points, size=(1e-3, 1e-3)), "surface": tuple(surface), "history": (stage,)}
+    return march_of(SLIDE).scene.job.model_copy(update=changed)

@@ -18,12 +18,12 @@ MESH = 0.25 / 19 + 0.6 / 19**2  # of the area of SEEN, corrected by a 19th
 
 def spots(seen: StepObservation, points: int) -> float:
     """As many as there are, of the radius of a spot, in the contact."""
-    return max(1.0, seen.area * points / (math.pi * min(spot_radius(seen, points), 4.0) ** 2))
+    return max(1.0, seen.area * points / (math.pi * min(spot_radius(KNOWN, seen, points), 4.0) ** 2))
 
 
 def by_spots(seen: StepObservation, points: int) -> float:
     """What the cells per radius of the spots make, of the share that is open, averaged over the spots."""
-    one = 0.13 / spot_radius(seen, points) ** 2.3
+    one = 0.13 / spot_radius(KNOWN, seen, points) ** 2.3
     return (1.0 - seen.area) * one / spots(seen, points) ** 0.25
 
 
@@ -37,10 +37,11 @@ def test_parts_add_up() -> None:
             1.7 * 4e-4 * (4e-4 / 7.2e-3) ** 0.25 * (1 - 0.9 * 0.1**2),
             1e-4,
             0.05 * 2**-2.5 + by_spots(SEEN, 10_000),
+            0.0,
         )
     )
     solver, time = 0.1 * 1e-3**0.7, 0.21 * 0.9 ** (1 / 3) * budget.friction.time
-    assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, MESH))
+    assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, MESH, 0.0))
     assert budget.area.total == pytest.approx(solver + time + 0.9e-4 + MESH)
 
 
@@ -80,9 +81,9 @@ def test_radius_of_a_spot() -> None:
     points, cells, sides = 10_000, 100 * math.pi, 80
     spot = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, cells / points, (cells - SIDE * sides) / points)
     hole = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1 - cells / points, 1 - (cells + SIDE * sides) / points)
-    assert spot_radius(spot, points) == pytest.approx(10.0)
-    assert spot_radius(hole, points) == pytest.approx(10.0)
-    assert spot_radius(StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
+    assert spot_radius(KNOWN, spot, points) == pytest.approx(10.0)
+    assert spot_radius(KNOWN, hole, points) == pytest.approx(10.0)
+    assert spot_radius(KNOWN, StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 1.0, 1.0), points) == math.inf
 
 
 def test_points_that_penetrate_are_missing_in_the_area() -> None:
@@ -129,7 +130,7 @@ def test_branches_count_by_the_friction_they_make() -> None:
     dt, moduli, times = 1e-3, np.array([1e6, 3e6]), np.array([1e-3, 1e-4])
     known = replace(KNOWN, prony=Prony(1e5, moduli, times))
     spot = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 0.1, 0.08, 1.0, dt)
-    x = 1.0 / spot_radius(spot, 10_000)
+    x = 1.0 / spot_radius(KNOWN, spot, 10_000)
 
     def mean(angle: float) -> float:
         weights = moduli * (angle / dt * times) / (1.0 + (angle / dt * times) ** 2)
@@ -170,7 +171,7 @@ def test_nearly_full_contact_has_edges_and_waves() -> None:
     """Of a branch that is far slower than the step; the pair counts by three tenths of what has edges, and the rest."""
     known = replace(KNOWN, prony=Prony(1e5, np.array([1e6]), np.array([1e3])))
     seen = StepObservation(0.0, 0.0, 2.0, 0.0, 0.1, 0.8, 0.75, 1.0, 1e-3, angle=0.2)
-    full, share = 0.8**4, 1.0 / spot_radius(seen, 10_000)
+    full, share = 0.8**4, 1.0 / spot_radius(KNOWN, seen, 10_000)
     passing, turning = 0.66 * 0.19 * share**2, 0.2**2 / 8.0
     found = time_error(known, seen, 10_000)
     assert found == pytest.approx((1.0 - full) * passing + full * turning, rel=1e-4)
@@ -265,9 +266,17 @@ def test_steady_friction_is_by_energy() -> None:
     assert budget.friction is not None
     solver = 1.1e-3 / spots(seen, 10_000) ** 0.25
     mesh = 4e-3 / (0.3 * 0.2) + 0.2 * 0.05 * 2**-2.5 + by_spots(seen, 10_000)
-    assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, mesh))
+    assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, mesh, 0.0))
     assert (budget.area.time, budget.area.mesh) == pytest.approx((0.0, MESH))
     assert estimate_steady(KNOWN, replace(seen, friction=0.0), 10_000).friction is None
+
+
+def test_a_checkpoint_without_directions_goes_on() -> None:
+    """Sums of an earlier version: solver, time, folded branches, mesh."""
+    old = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
+    found = ErrorSums.restored({"budget/sums": old.sums[:, :5].ravel()})
+    assert found.friction == old.friction
+    assert found.plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4).area == old.area
 
 
 def test_summary_goes_on() -> None:
@@ -277,6 +286,7 @@ def test_summary_goes_on() -> None:
     step = estimate(KNOWN, StepObservation(3e-3, 4e-4, 2.0, 0.01, 0.01, 0.1, 0.095), 10_000), 0.01, 2.0, 2e-4
     assert on.plus(*step).facts(0.01) == other.plus(*step).facts(0.01)
     friction = on.facts(0.01)["friction"]
+    assert friction.pop("mesh_across") == 0.0
     assert friction.pop("total") == pytest.approx(sum(friction.values()))
     assert on.sums[0, 0] == pytest.approx(0.02 * 3e-4)  # not changed by what was added to it
 

@@ -103,7 +103,7 @@ def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
 @settings(max_examples=40)
 @given(st.integers(1, 9), st.integers(1, 5), st.booleans(), st.integers(0, 99))
 def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int) -> None:
-    """Cells counted less `SIDE` for each side on the edge of contact: whole numbers, so the same on every rank.
+    """Cells counted less `excess_of` for each side on the edge of contact: whole numbers, so the same on every rank.
 
     In a periodic box of two cells each side is there twice, and counts twice; of one cell, not at all. Sides on the
     edge of a free box do not count.
@@ -119,7 +119,9 @@ def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int
     else:
         sides = sum(np.count_nonzero(np.diff(pressed, axis=axis)) for axis in (0, 1))
     assert found.contact_area == np.count_nonzero(pressed) / (nx * ny)
-    assert found.contact_area_corrected == (np.count_nonzero(pressed) - SIDE * sides) / (nx * ny)
+    long = min(LX / nx, LY / ny) / max(LX / nx, LY / ny)
+    excess = SIDE if 1 in (nx, ny) else SIDE * long**0.1
+    assert found.contact_area_corrected == (np.count_nonzero(pressed) - excess * sides) / (nx * ny)
 
 
 def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:

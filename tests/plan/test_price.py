@@ -15,7 +15,8 @@ from parcontact.job import Job
 from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.sections.listing import plain
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import SPOTS_ORDER, ErrorSums
+from parcontact.physics.budget import ErrorSums
+from parcontact.physics.mesh_error import SPOTS_ORDER
 from parcontact.physics.time_error import TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.costs import Costs, costs_of

@@ -15,7 +15,8 @@ from parcontact.errors import JobError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import CORRECTED_ORDER, WAVES_ORDER, ErrorBudget, Parts, compared_with_half_mesh
+from parcontact.physics.budget import CORRECTED_ORDER, ErrorBudget, Parts, compared_with_half_mesh
+from parcontact.physics.mesh_error import WAVES_ORDER
 from parcontact.run import half_mesh, runner
 from parcontact.run.half_mesh import HalfMesh, place_of
 from parcontact.run.run import STOPPED_EARLY, Options

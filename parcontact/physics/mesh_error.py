@@ -1,0 +1,67 @@
+"""How wrong friction and the contact area are by the mesh, part of the error budget (`budget`), from what a step shows.
+
+Friction is wrong by the cells along the sliding, and little by those across it: of c and c' cells per shortest wave
+
+    ALONG (4/c)^p + ACROSS (4/c')^p,      p = 2.5,
+
+and of the cells per radius of the spots of contact in the same proportion, with p = 2.3. Spots are small under small
+loads whatever the waves; many of them average it out, and where little is open there are few edges. On squares the two
+add up to what was found there by experiment; the share of those across is from 16 meshes of ten surfaces
+(`job.checks.cells`). The corrected area is wrong by a share of its correction, by each direction as its cells are long.
+"""
+
+import math
+
+from .time_error import RunProperties, StepObservation, Vector, count_spots, spot_radius
+
+WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
+SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
+SPOTS_POWER = 0.25  # of the number of spots, by which they average errors out
+ACROSS = 0.06  # of these errors, on squares: that of the cells across the sliding
+EDGES, STRAIGHT_EDGES = 0.25, 3.0  # of the correction of the area; along edges that follow the grid
+SMALL_SPOTS = 0.6  # of the square of the correction, which is large where spots of contact are a few cells wide
+
+
+def friction_by_mesh(
+    run: RunProperties, observed: StepObservation, points: int, share: float = 1.0
+) -> tuple[float, float]:
+    """Return the relative errors of friction by the cells along the sliding and across it, with a `share` of what waves
+    make; at rest all of it by the longer ones, which is said to be along."""
+    cells = cells_along_and_across(run, observed.way)
+    if not any(observed.way):
+        return share * _by_waves(run, cells[0]) + _by_spots(run, observed, points, cells[0]), 0.0
+    along, across = (share * _by_waves(run, cell) + _by_spots(run, observed, points, cell) for cell in cells)
+    return (1.0 - ACROSS) * along, ACROSS * across
+
+
+def area_by_mesh(run: RunProperties, observed: StepObservation, points: int) -> tuple[float, float]:
+    """Return the same of the corrected area, which is counted in cells."""
+    error = STRAIGHT_EDGES * observed.correction
+    if not run.straight:
+        error = EDGES * observed.correction + SMALL_SPOTS * observed.correction**2
+    error = max(error, 1.0 / (points * observed.area)) if observed.area > 0.0 else error
+    along, across = cells_along_and_across(run, observed.way)
+    return (error * along / (along + across), error * across / (along + across)) if any(observed.way) else (error, 0.0)
+
+
+def cells_along_and_across(run: RunProperties, way: Vector) -> tuple[float, float]:
+    """Return the lengths of cells along a way and across it, in the unit of `run.cell`; at rest the longer one."""
+    (dx, dy), (x, y) = run.cell, way
+    length = math.hypot(x, y)
+    if not length:
+        return max(dx, dy), max(dx, dy)
+    return math.hypot(x * dx, y * dy) / length, math.hypot(y * dx, x * dy) / length
+
+
+def _by_waves(run: RunProperties, cell: float) -> float:
+    """Return the error of friction on squares of cells of this length, by the shortest wave."""
+    if run.cells_per_wave is None:
+        return 0.0
+    return WAVES_FRICTION * (4.0 * (cell / max(run.cell)) / run.cells_per_wave) ** WAVES_ORDER
+
+
+def _by_spots(run: RunProperties, observed: StepObservation, points: int, cell: float) -> float:
+    """Return the same by the radius of the spots of contact."""
+    radius = spot_radius(run, observed, points) * (run.mean_cell / cell)
+    one = min(1.0, SPOTS_FRICTION / radius**SPOTS_ORDER) if radius > 0.0 else 0.0
+    return (1.0 - observed.area) * one / count_spots(run, observed, points) ** SPOTS_POWER
