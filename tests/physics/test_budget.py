@@ -271,14 +271,6 @@ def test_steady_friction_is_by_energy() -> None:
     assert estimate_steady(KNOWN, replace(seen, friction=0.0), 10_000).friction is None
 
 
-def test_a_checkpoint_without_directions_goes_on() -> None:
-    """Sums of an earlier version: solver, time, folded branches, mesh."""
-    old = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
-    found = ErrorSums.restored({"budget/sums": old.sums[:, :5].ravel()})
-    assert found.friction == old.friction
-    assert found.plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4).area == old.area
-
-
 def test_summary_goes_on() -> None:
     """From the entries of another, as if there had been one; as plain data it has parts that add up."""
     other = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)

@@ -56,3 +56,11 @@ def test_advice_names_the_direction_that_pays() -> None:
     assert told[0] == (more("across"), more("across"))
     assert told[1] == (more("along"), more("along"))
     assert told[2] == ("a finer grid", "a finer grid")
+
+
+def test_a_checkpoint_without_directions_goes_on() -> None:
+    """Sums of an earlier version: solver, time, folded branches, mesh."""
+    old = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
+    found = ErrorSums.restored({"budget/sums": old.sums[:, :5].ravel()})
+    assert found.friction == old.friction
+    assert found.plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4).area == old.area
