@@ -8,10 +8,12 @@ from __future__ import annotations
 import inspect
 import pydoc
 import re
+import textwrap
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from typing import Any
 
+ROOM = 90  # letters for the first sentence of a docstring in the list of names
 BLOCK = re.compile(r"^```\{eval-rst\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 DIRECTIVE = re.compile(r"^\.\. auto(?:class|function):: (\S+)\n(?:   :members:(.*)\n)?", re.MULTILINE)
 
@@ -22,14 +24,29 @@ def written(page: str) -> str:
 
 
 def _entries(block: str) -> Iterator[str]:
-    for name, members in DIRECTIVE.findall(block):
+    named = DIRECTIVE.findall(block)
+    width = max(len(_short(name)) for name, _ in named)
+    yield "```text\n" + "\n".join(f"{_short(name):{width}}  {_first_sentence(name)}" for name, _ in named) + "\n```"
+    for name, members in named:
         found: Any = pydoc.locate(name)
-        yield f"## {name}{_parameters(found)}\n\n{inspect.getdoc(found)}"
+        yield f"## {_short(name)}{_parameters(found)}\n\n{inspect.getdoc(found)}"
         named = [member.strip() for member in members.split(",") if member.strip()]
         all_of = members == "" and f"{name}\n   :members:" in block
         for member in named or (_public(found) if all_of else ()):
             value = inspect.getattr_static(found, member)
             yield f"### {member}{_parameters(getattr(value, '__func__', value))}\n\n{inspect.getdoc(value)}"
+
+
+def _short(name: str) -> str:
+    """Return a name as a program writes it: `pc.steady`; that of a result, which nobody makes, alone."""
+    package, _, last = name.rpartition(".")
+    return f"pc.{last}" if package == "parcontact" else last
+
+
+def _first_sentence(name: str) -> str:
+    """Return the beginning of a docstring, as far as a line of a terminal has room for it."""
+    text = re.split(r"(?<=[.:;]) ", " ".join((inspect.getdoc(pydoc.locate(name)) or "").split()))[0]
+    return textwrap.shorten(text.rstrip(".:;"), ROOM, placeholder=" ...")
 
 
 def _public(kind: type) -> list[str]:

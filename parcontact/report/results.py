@@ -61,7 +61,7 @@ def _theory(directory: Path, run: Run) -> list[Table]:
         for one in theory_beside.compare(directory, run.job.history)
         if one.run
     ]
-    head = ("result", "run", "Persson's theory", "theory over run, less 1")
+    head = ("result", "run", "Persson's theory", "difference of the theory")
     return [Table(head, rows, "beside Persson's theory; the area of the run as corrected for its edges")] * bool(rows)
 
 

@@ -81,4 +81,4 @@ def describe(directory: Path) -> str:
         settings = shared([directory, *directory.glob("cases/*")])
     except InputError as error:
         return f"theory of unknown settings: {error}"
-    return f"theory: {settings}" if settings else ""
+    return f"Persson's theory: {settings.sentence}" if settings else ""

@@ -90,10 +90,11 @@ def test_only_languages_that_are_run_or_output() -> None:
 def test_the_page_on_python_is_text() -> None:
     """Calls and docstrings of what it names, with all methods of a simulation, and only some of a material."""
     text = texts.plain("python", WRITERS)
-    assert "## parcontact.Simulation(job, set=None, comm=None)\n\nA job, run from Python" in text
+    assert "## pc.Simulation(job, set=None, comm=None)\n\nA job, run from Python" in text
+    assert re.search(r"^pc\.Simulation +A job, run from Python on the ranks", text, re.MULTILINE)  # in a list of names
     for method in ("steps()", "run(restart='auto', quiet=True)", "row", "restore(path, set=None, comm=None)"):
         assert f"\n### {method}\n\n" in text
-    assert re.findall(r"^### (.*)", text.partition("python.parts.Material")[2], re.MULTILINE) == [
+    assert re.findall(r"^### (.*)", text.partition("## Material")[2], re.MULTILINE) == [
         *("complex_modulus(omega)", "relaxation(t)", "creep(t)"),
     ]
     assert "{eval-rst}" not in text

@@ -173,7 +173,7 @@ def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
     paths = [one.output.directory for one in (ran, other)]
     assert theory_settings.read(paths[0]) == first
     assert theory_settings.shared(paths) == first
-    assert theory_settings.describe(paths[0]) == "theory: γ = 0.5, lattice"
+    assert theory_settings.describe(paths[0]) == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
     prediction.write(other, iter([]), second)
     assert theory_settings.shared(paths) is None
     table = (paths[0] / "theory.csv").read_bytes()
