@@ -1,4 +1,4 @@
-"""What is kept for a user from one run to the next: compiled loops, transform plans.
+"""Files that are kept for a user from one run to the next: compiled loops, transform plans.
 
 Both are handed to the machine as they are read, so they are kept only where nobody else can have put them: in a
 directory of this user with mode 0700, in the user's cache directory. Where there is no such place nothing is kept.

@@ -1,4 +1,4 @@
-"""What the program costs, in counts and in ratios measured within one run.
+"""Costs of the program, in counts and in ratios measured within one run.
 
     .venv/bin/python scripts/bench.py [PART...] [--points 512] [--rounds 15] [--json FILE] [--peers DIRECTORY]
 
@@ -51,7 +51,7 @@ ON_TWO_RANKS = {"march": march, "scale": scale}
 
 
 def measure(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, Line]]:
-    """What this process can measure first, then what two ranks can."""
+    """Measure the parts of this process first, then those of two ranks."""
     for part in parts:
         if part in PARTS:
             yield from ((part, line) for line in PARTS[part](asked.points, asked.rounds, asked))

@@ -1,4 +1,4 @@
-"""What the figures of the paper have in common: tables of runs and sweeps, and lines over distance or a key."""
+"""Parts that the figures of the paper share: tables of runs and sweeps, and lines over distance or a key."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ TITLE = 6.5  # points, of the title of a legend
 
 
 class MissingError(Exception):
-    """What a figure is drawn from is not there."""
+    """The results that a figure is drawn from are not there."""
 
 
 def there(path: Path) -> Path:
@@ -44,7 +44,7 @@ def explain(axes: Axes, directory: Path, **look: Any) -> None:
 
 
 def moduli(job: Job) -> tuple[float, float]:
-    """Of the first instant and in the end [Pa]."""
+    """Return the moduli of the first instant and in the end [Pa]."""
     series = relaxation_of(job.material)
     return series.modulus_inf + float(series.moduli.sum()), series.modulus_inf
 

@@ -11,6 +11,7 @@ from . import added_sections
 from .model import Job
 from .schema import SchemaOfKeys
 from .sections.part import Part, kind_key, literal_words
+from .sections.quantities import LARGEST, MOST
 from .text.fault import choices
 
 BOUNDS = {
@@ -82,9 +83,9 @@ def _keys(part: type[Part]) -> Iterator[Key]:
 
 
 def _bounds(schema: Any) -> Iterator[tuple[str, float]]:
-    """Yield the bounds of the numbers in all forms of a value."""
+    """Yield the bounds of the numbers in all forms of a value, without those of all numbers."""
     for name, value in schema.items() if isinstance(schema, dict) else enumerate(schema):
-        if name in BOUNDS:
+        if name in BOUNDS and abs(value) not in (LARGEST, MOST):
             yield name, value
         elif isinstance(value, dict | list):
             yield from _bounds(value)

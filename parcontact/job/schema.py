@@ -9,17 +9,34 @@ from __future__ import annotations
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core.core_schema import BeforeValidatorFunctionSchema, ComputedField, ModelField, TypedDictField
+from pydantic_core.core_schema import (
+    AfterValidatorFunctionSchema,
+    BeforeValidatorFunctionSchema,
+    ComputedField,
+    ModelField,
+    TypedDictField,
+)
 
 from . import added_sections
 from .model import extended
 from .sections.materials import Dma, Elastic, Zener
-from .sections.quantities import AUTO_POINTS, FROM_SURFACE, along_x, both, listed
+from .sections.quantities import (
+    AUTO_POINTS,
+    FROM_SURFACE,
+    LARGEST,
+    MOST,
+    along_x,
+    both,
+    bounded,
+    countable,
+    listed,
+)
 from .sections.stages import numbers
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 RANGE: Schema = {"type": "string", "pattern": "^[^:]+:[^:]+:[0-9]+$", "description": "first:last:count"}
+LIMITS: dict[Any, float] = {bounded: LARGEST, countable: MOST}  # the size of a number at most
 SHORT = (both, along_x, listed, numbers)  # validators that let one value stand for several
 
 
@@ -40,6 +57,14 @@ class SchemaOfKeys(GenerateJsonSchema):
         words = [FROM_SURFACE, *([AUTO_POINTS] if one_value.get("type") == "integer" else [])]
         ranges = [RANGE] if function is numbers else [{"enum": words}] if function is both else []
         return {"anyOf": [one_value, array, *ranges]}
+
+    def function_after_schema(self, schema: AfterValidatorFunctionSchema) -> Schema:
+        """Return the range of a number, as large as any may be where its type leaves that open."""
+        found, most = super().function_after_schema(schema), LIMITS.get(schema["function"]["function"])
+        if most is None:
+            return found
+        low = {} if {"minimum", "exclusiveMinimum"} & found.keys() else {"minimum": -most}
+        return {**found, **low, "maximum": most}
 
 
 def schema() -> Schema:

@@ -1,1 +1,1 @@
-"""What leaks through the gap of a contact."""
+"""Leakage through the gap of a contact."""

@@ -75,7 +75,7 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
 
 @dataclass(frozen=True)
 class Leak:
-    """What a gap lets through along x and along y.
+    """Flow through a gap along x and along y.
 
     `flow_x` and `flow_y` are the conductivities K [m^3]: a pressure that falls by `dp` over the length drives
     `K/(12 eta) dp/length` through each metre of width. `constriction` [m] is the smallest gap on the widest path in the

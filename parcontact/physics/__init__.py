@@ -1,1 +1,1 @@
-"""What is simulated. Nothing here sees a communicator."""
+"""The physics of the contact. Nothing here sees a communicator."""

@@ -1,4 +1,4 @@
-"""What a step did, in SI: load, tangential force, contact area, gaps, energies.
+"""Measures of a step, in SI: load, tangential force, contact area, gaps, energies.
 
 Contact counted in cells is too large: a cell counts as a whole when the edge of contact goes through it. With the
 length S of all edges of contact, measured along the sides of cells of length dx, the area is in the mean

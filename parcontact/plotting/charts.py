@@ -38,7 +38,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Axis:
-    """What an axis measures, in which SI unit."""
+    """The quantity of an axis and its SI unit."""
 
     name: str
     unit: str = ""

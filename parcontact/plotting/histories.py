@@ -21,7 +21,7 @@ VISCOUS = "friction_viscous"  # friction without that of the interface; in the t
 
 @dataclass(frozen=True)
 class Abscissa:
-    """What histories are drawn over: values in SI of some rows or all, stages, and whether each row has a mark; `loop`:
+    """The horizontal axis: values in SI of some rows or all, stages, and whether each row has a mark; `loop`:
     whether values come back, as loads and approaches do."""
 
     axis: Axis

@@ -33,7 +33,7 @@ FASTEST, SLOWEST = 20, 2  # frames per second
 
 @dataclass(frozen=True)
 class Options:
-    """What is asked for beyond the directories; '' and () leave it to what they hold. `out` is a file, `at` a step
+    """Options of a picture; '' and () leave the choice to what the directories hold. `out` is a file, `at` a step
     or a time [s], whose maps are drawn."""
 
     format: str = ""

@@ -1,4 +1,4 @@
-"""What a picture of a run is drawn from."""
+"""The results of a run that its picture is drawn from."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -58,7 +58,7 @@ class Run:
 
     @cached_property
     def timeline(self) -> Timeline:
-        """What the job says about each step."""
+        """The stage of the job that each step is in."""
         steps, times = self._all["step"].astype(int).tolist(), self._all["time"].tolist()
         return Timeline.of(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 

@@ -1,4 +1,4 @@
-"""What the cases of a sweep have come to: friction and contact area over the swept key, beside theory if it is there.
+"""Pictures of the results of a sweep: friction and contact area over the swept key, beside theory if it is there.
 
 Points are cases, lines their means over seeds and other keys that do not tell lines apart.
 """

@@ -1,4 +1,4 @@
-"""What run.log and steady.log say of a run and a curve: warnings, estimated errors, counts, and the machine."""
+"""Contents of run.log and steady.log: warnings, estimated errors, counts, and the machine."""
 
 import re
 from collections.abc import Sequence

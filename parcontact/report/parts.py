@@ -1,4 +1,4 @@
-"""What a report consists of: texts, tables, pictures, maps to browse and data, all of it inside the page."""
+"""The parts of a report: texts, tables, pictures, maps to browse and data, all of it inside the page."""
 
 import base64
 import io

@@ -1,4 +1,4 @@
-"""What the cases of a sweep warn of: each kind of warning is shown once, with the cases that it holds for."""
+"""Warnings of the cases of a sweep: each kind is shown once, with the cases that it holds for."""
 
 import re
 import sys

@@ -134,7 +134,7 @@ class Task(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a program took [s] by the loosest tolerance with which its error was small enough; or, if it did not get
+    """The time of a program [s] by the loosest tolerance with which its error was small enough; or, if it did not get
     there, the longest try."""
 
     reached: bool
@@ -194,7 +194,7 @@ def _installed(directory: Path, program: str) -> Path:
 
 
 def _eigen(python: Path, where: Path) -> dict[str, str]:
-    """What aspher is built with from source: headers that another package has."""
+    """Return the environment in which aspher is built from source: headers that another package has."""
     _call(python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS)
     zipfile.ZipFile(next(where.glob("*.whl"))).extractall(where)
     include = where / "cmeel.prefix" / "include" / "eigen3"

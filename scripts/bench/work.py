@@ -1,4 +1,4 @@
-"""What is measured: transforms, cold elastic solves of one surface, and slides over another."""
+"""The work that is measured: transforms, cold elastic solves of one surface, and slides over another."""
 
 from collections.abc import Callable
 

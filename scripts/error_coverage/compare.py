@@ -36,7 +36,7 @@ COLUMNS = {"friction": 3, "area": 4}  # of the rows of a series
 
 @dataclass
 class Series:
-    """What a run has found: a row of time, place among the rows of that time, weight, friction and area for each
+    """Results of a run: a row of time, place among the rows of that time, weight, friction and area for each
     instant; the weight is 0 where nothing touches. And how wrong it says that it is in the mean, by part, in absolute
     terms; `printed` is the relative error in all."""
 

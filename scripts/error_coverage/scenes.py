@@ -232,7 +232,7 @@ class _Draw:
         return dice.uniform(0.5, 1.1) if dice.random() < 0.25 else decades(dice, -3, -0.3)
 
     def _radius(self, area: float) -> float:
-        """Of one contact, in cells."""
+        """The radius of one contact, in cells."""
         count = self.points[0] * self.points[1]
         if self.surface == "cylinder":
             return 0.5 * area * self.points[0]

@@ -222,7 +222,8 @@ OTHERS = {
     ),
     "numerics: {accept_unconverged: 1}": "5:32: numerics.accept_unconverged must be true or false, got 1",
     "output: {fields: [gap, presure]}": (
-        "5:24: output.fields.1 must be pressure | displacement | gap | height, got 'presure'; did you mean pressure?"
+        "5:24: output.fields.1 must be pressure | displacement | gap | height | temperature, got 'presure'; "
+        "did you mean pressure?"
     ),
     "output: {fields: [gap, gap]}": "5:24: output.fields.1 names gap a second time",
     "output: {every: 0}": "5:17: output.every must be a positive whole number of steps, got 0",

@@ -30,6 +30,8 @@ WRONG = {
     "a section that there is not": ("numeric", {}),
     "a word that there is not": ("grid", {"points": 64, "size": 1e-3, "boundary": "open"}),
     "a negative length": ("grid", {"points": 64, "size": -1.0}),
+    "more than double precision can use": ("grid", {"points": 64, "size": 1e61}),
+    "more points than can be counted": ("grid", {"points": 2**31, "size": 1.0}),
     "half a point": ("grid", {"points": 64.5, "size": 1.0}),
     "three sizes": ("grid", {"points": 64, "size": [1.0, 1.0, 1.0]}),
     "a shape that there is not": ("surface", {"shape": "cone"}),

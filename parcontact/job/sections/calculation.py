@@ -112,7 +112,7 @@ class Accuracy(Part):
 
     @property
     def both(self) -> tuple[float, float]:
-        """That of friction and that of the area."""
+        """The accuracies of friction and of the area."""
         return self.friction, self.area
 
     @property
@@ -179,7 +179,7 @@ def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
 
 
 class Output(Part):
-    """What is written, where, and how often. A relative directory starts at the working directory."""
+    """Files of a run: which, where and how often. A relative directory starts at the working directory."""
 
     directory: Annotated[Path, AfterValidator(from_home)] = Field(
         default=Path("out"), description="the path of a directory (text)"
@@ -219,7 +219,7 @@ def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
 
 
 class Study(Part):
-    """What `parcontact study` refines; a ladder that is left out has the job's own value."""
+    """Ladders that `parcontact study` refines; a ladder that is left out has the job's own value."""
 
     mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of positive whole numbers of points along x"

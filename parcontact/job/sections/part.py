@@ -62,7 +62,7 @@ class Rule(NamedTuple):
 
 
 class Instead(NamedTuple):
-    """What to give instead of a word that is no key: advice, and the keys of which one is meant."""
+    """A word that is no key: advice on what to give instead, and the keys of which one is meant."""
 
     advice: str
     keys: tuple[str, ...] = ()

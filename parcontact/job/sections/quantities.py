@@ -50,7 +50,7 @@ def listed(value: Any) -> Any:
     return value if isinstance(value, list | tuple) else (value,)
 
 
-def _countable(value: int) -> int:
+def countable(value: int) -> int:
     if abs(value) > MOST:
         refuse(Fault(f"must be at most {MOST}, got {quote(value)}"))
     return value
@@ -85,21 +85,21 @@ def log_range(text: str) -> tuple[float, ...]:
     return (*(a * (b / a) ** (i / (n - 1)) for i in range(n - 1)), b)
 
 
-def _bounded(value: float) -> float:
+def bounded(value: float) -> float:
     """Refuse what would overflow in a run: squares of slopes and strains, quotients of lengths."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         refuse(Fault(f"must be zero, or from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
     return value
 
 
-NUMBER, BOUNDED = BeforeValidator(_number), AfterValidator(_bounded)
+NUMBER, BOUNDED = BeforeValidator(_number), AfterValidator(bounded)
 Number = Annotated[float, Field(strict=True), NUMBER]
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False), NUMBER, BOUNDED]
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False), NUMBER, BOUNDED]
 NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False), NUMBER, BOUNDED]
 Fraction = Annotated[float, Field(strict=True, gt=0, lt=1), NUMBER]
-Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(_countable)]
-Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(_countable)]
+Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole), AfterValidator(countable)]
+Count = Annotated[int, Field(strict=True, ge=1), BeforeValidator(_whole), AfterValidator(countable)]
 Seed = Annotated[
     int, Field(strict=True, ge=0, lt=2**128, description="a whole number of zero or more"), BeforeValidator(_whole)
 ]

@@ -176,7 +176,7 @@ def _steady_start(state: str, velocity: tuple[float, float], pressure: float | N
 
 
 class Initial(Part):
-    """What the body has felt before: nothing, or steady sliding (at rest: full relaxation) under a pressure."""
+    """The past of the body: nothing, or steady sliding (at rest: full relaxation) under a pressure."""
 
     state: Literal["virgin", "steady"] = "virgin"
     velocity: Velocity = (0.0, 0.0)

@@ -39,7 +39,7 @@ class Included(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What was read: the data of one job, or of one case, the file of its material, and its sweep if that is sound."""
+    """A job as read: the data of one job, or of one case, the file of its material, and its sweep if that is sound."""
 
     source: Source
     included: Included | None

@@ -66,7 +66,7 @@ def put(node: Any, key: str | int, value: Any, key_at: Place, value_at: Place) -
 
 
 class Located(NamedTuple):
-    """What a path leads to: the path as the user wrote it, the value, and the places of key and value.
+    """The end of a path: the path as the user wrote it, the value, and the places of key and value.
 
     Where something is missing, place and value are those of what should hold it.
     """
