@@ -24,7 +24,8 @@ class Step(NamedTuple):
     `dt` = 0 is a jump, at an instant, of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is
     dt over the dt of the step before, 0 where that was a jump: how far to extrapolate what changes smoothly. `passed`
     is the number of steps that this one stands for besides its own. `judge`, of a step that may be too long, is told
-    the error of the step when it has been tried: it returns the shorter one to make instead, or how it is noted.
+    the error of the step when it has been tried, and how far the edge of a contact with adhesion has moved, in half
+    process zones: it returns the shorter one to make instead, or how it is noted.
     """
 
     number: int
@@ -37,7 +38,7 @@ class Step(NamedTuple):
     load: float
     growth: float
     passed: int = 0
-    judge: Callable[[float], "Step | MadeStep"] | None = None
+    judge: Callable[..., "Step | MadeStep"] | None = None
 
     @property
     def jump(self) -> bool:

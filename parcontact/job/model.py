@@ -162,8 +162,9 @@ class Job(Part):
 
     @property
     def remembers(self) -> bool:
-        """Whether the body has a memory, and time steps an error: an elastic one has neither."""
-        return not isinstance(self.material, Elastic) and bool(getattr(self.material, "branches", True))
+        """Whether the body has a memory, and time steps an error: an elastic one has neither, but where it sticks."""
+        branched = not isinstance(self.material, Elastic) and bool(getattr(self.material, "branches", True))
+        return branched or self.section("adhesion") is not None
 
     def resolved(self) -> str:
         """YAML text with every default filled in; it loads back to an equal job, where the files that it names are."""

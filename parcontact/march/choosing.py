@@ -37,6 +37,7 @@ REST_LEVELS = 4  # the same at rest
 BETWEEN = 2.5  # tuning: steps per cell, of those that start no better at whole cells
 LEAST_WAY = 0.35  # tuning: of a step that ends at a multiple of its length
 STRETCH = 1.1  # tuning: of the last step of a stage: no step shorter than a tenth of the one before is left over
+SNAP_SHARE = 1.0 / 64.0  # accuracy: of the longest step of a stage: in a shorter one the edge of contact may snap
 RELAXING = 0.1  # tuning: of the shortest relaxation time: the first step at rest after a jump
 SAME_LEVEL = 1e-6  # rounding: of a level
 
@@ -73,14 +74,19 @@ class StepChooser:
             wanted = self._first(span)
         return self._step(span, number, wanted)
 
-    def judge(self, span: Span, step: Step, end: float, rejected: bool, error: float) -> Step | MadeStep:
+    def judge(
+        self, span: Span, step: Step, end: float, rejected: bool, error: float, front: float = 0.0
+    ) -> Step | MadeStep:
         """Return the shorter step to make instead of one with such an error, or how the step is noted as made.
 
-        It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before.
+        It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before. The `front` of a contact
+        with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps.
         """
         numerics = self.scene.choices.numerics
         order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
         ratio = error / (TIME_SHARE * numerics.asked.of_steps)
+        if step.dt > SNAP_SHARE * self._bounds(span).most:
+            ratio = max(ratio, front**order)
         wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
         if ratio > REJECTED:
             share = max((REJECTED / ratio) ** (1.0 / order), MOST_SHRINK)

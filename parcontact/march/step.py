@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from ..effects.effect import Instant, values_of
+from ..history.chosen import MadeStep
 from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.body import Trial, surface_of
@@ -23,7 +24,7 @@ from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
 from ..storage.row import Row
 from . import failure, sticking, sticking_energies
-from .errors import Solved, estimate_errors
+from .errors import Estimate, Solved, estimate_errors
 from .failure import DetachedError, StepError
 from .starts import Past, cells_moved, make_start
 from .state import State, energies_of
@@ -38,17 +39,13 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     Raises StepError when that cannot be.
     """
     began, calls = time.perf_counter(), scene.slab.tally["operator"]
-    while True:
-        solved = _solve(scene, state, step)
-        errors = estimate_errors(scene, state.observations, solved)
-        verdict = None if step.judge is None else step.judge(scene.slab.agree(errors.step))
-        if not isinstance(verdict, Step):
-            break
-        step = verdict
-    contact, slid = solved.contact, math.dist(step.position, state.position)
+    solved, errors, verdict = _accepted(scene, state, step)
+    step, contact, slid = solved.step, solved.contact, math.dist(solved.step.position, state.position)
     energy = _advance_energy(scene, state, solved)
     if solved.stuck is not None and energy is not None:
         solved = replace(solved, stuck=_count_energies(scene, state, solved, energy, slid))
+    if solved.stuck is not None and (solved.stuck.snapped or _loses(state, solved.stuck)):
+        solved, errors = replace(solved, stuck=solved.stuck.noted()), replace(errors, budget=None)
     _tell_effects(scene, solved, slid)
     if state.chosen is not None and verdict is not None:
         state.chosen.add(verdict)
@@ -89,6 +86,45 @@ def _advance_energy(scene: Scene, state: State, solved: Solved) -> EnergyMemory 
         return None
     now, before = Pressed(solved.contact.p, solved.trial.alpha), Pressed(state.pressure, state.alpha)
     return scene.energy.advance(state.energy, solved.step.dt, now, before, solved.contact.u, solved.body)
+
+
+def _accepted(scene: Scene, state: State, step: Step) -> tuple[Solved, Estimate, MadeStep | None]:
+    """Solve a step, or the shorter one that its judge asks for; returns also its errors, and how it is noted;
+    collective. Raises StepError, and DetachedError where nothing holds the load of the shortest step."""
+    while True:
+        try:
+            solved = _solve(scene, state, step)
+        except (DetachedError, StepError):
+            shorter = None if step.judge is None or state.sticking is None else step.judge(0.0, math.inf)
+            if not isinstance(shorter, Step):
+                raise
+            step = shorter
+            continue
+        errors = estimate_errors(scene, state.observations, solved)
+        if step.judge is None:
+            return solved, errors, None
+        error = scene.slab.agree(errors.step)
+        if solved.stuck is None:
+            verdict = step.judge(error)
+        else:
+            front = _front(scene, state, solved)
+            verdict = step.judge(error, front)
+            solved = replace(solved, stuck=solved.stuck._replace(snapped=front > sticking.SNAP_FRONT))
+        if not isinstance(verdict, Step):
+            return solved, errors, verdict
+        step = verdict
+
+
+def _loses(state: State, stuck: sticking.StuckContact) -> bool:
+    """Return whether a step has lost energy in a snap, as far as energies are counted."""
+    return state.sticking is not None and stuck.memory.energies.lost > state.sticking.energies.lost
+
+
+def _front(scene: Scene, state: State, solved: Solved) -> float:
+    """Return how far the edge of a contact with adhesion has moved in a step, in half process zones."""
+    if solved.stuck is None:
+        return 0.0
+    return sticking.front_of(scene, solved.stuck.flips, state.row.measures, solved.measures)
 
 
 def _count_energies(
@@ -172,8 +208,11 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
 def _path(scene: Scene, state: State, trial: Trial, control: MeanPressure | Approach) -> sticking.Path:
     """Return the way of what is prescribed since the last step, in the run's units."""
     pressure = state.row.measures.pressure / (trial.alpha * scene.units.pressure)
-    before = pressure if isinstance(control, MeanPressure) else state.approach
-    return sticking.Path(before, control, state.approach, pressure)
+    approach = state.approach
+    if isinstance(control, Approach) and state.alpha == 0.0:  # nothing has come nearer than this yet
+        approach = min(approach, control.value)
+    before = pressure if isinstance(control, MeanPressure) else approach
+    return sticking.Path(before, control, approach, pressure)
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:

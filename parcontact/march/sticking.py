@@ -4,17 +4,20 @@ The gap is a part of the state: under the same load there are several equilibria
 starts from the last two gaps, extrapolated in time and moved with the surface by whole cells.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ..effects.adhesion import cell_of, modulus_of
 from ..history.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
 from ..physics.body import Trial
 from ..physics.entries import Entry, MapCount, Saved
+from ..physics.measures import SIDE, Measures
 from ..scene import Scene
 from ..solve.adhesive import kernels
 from ..solve.certificate import Certificate
@@ -28,6 +31,7 @@ JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is 
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
 LOOSE = 3.0  # tuning: times the tolerance of parts
 OPEN = 10.0  # physics: ranges of attraction between surfaces that have come off
+SNAP_FRONT = 2.0  # accuracy: half process zones by which an edge moves in the shortest step of a snap
 LEAST_TENSION = 1e-2  # physics: of the largest attraction: less is not counted as an area under tension
 
 
@@ -48,7 +52,7 @@ class StickingMemory:
 
     `lag` is what a free body lacks (`solve.adhesive.sticking`) per pressure, for the modulus `modulus`, None of a
     periodic one. `energies` are counted where they are asked for. `detached` is when nothing held the surfaces any more
-    [s], under which load; NEVER before.
+    [s], under which load; NEVER before. `snaps` is the number of steps in which the contact snapped.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -58,18 +62,26 @@ class StickingMemory:
     modulus: float = 0.0
     energies: StickingEnergies = NO_ENERGIES
     detached: tuple[float, float] = NEVER
+    snaps: int = 0
 
 
 class StuckContact(NamedTuple):
     """The contact of a step, the memory after it, where the surfaces touch, and its numbers for columns; `pushed`
-    [J] is the work of the load along its path; `detached` says that nothing holds the load any more."""
+    [J] is the work of the load along its path; `flips` is the number of points that came into contact or left it;
+    `snapped` and `detached` say that the contact did, or that nothing holds the load any more."""
 
     contact: Contact
     memory: StickingMemory
     touching: Array
     columns: tuple[float, ...]
     pushed: float
+    flips: float
+    snapped: bool
     detached: bool
+
+    def noted(self) -> "StuckContact":
+        """Return it as one that has snapped."""
+        return self._replace(memory=replace(self.memory, snaps=self.memory.snaps + 1), snapped=True)
 
 
 def count_maps(free: bool) -> MapCount:
@@ -114,8 +126,9 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     if lag is not None and memory.modulus:
         lag *= memory.modulus / trial.alpha
     whole = JUMP_STRIDE if step.jump else 1.0
+    now_known = memory.pasts[0].known
     _start(scene, memory, step, trial, path, gap, still=step.jump)
-    reached, stride, iterations, began = 0.0, whole, 0, memory.held
+    reached, stride, iterations, began, snapped = 0.0, whole, 0, memory.held, False
     work = PathWork(scene, path.approach, path.pressure)
     while True:
         share = min(reached + stride, 1.0)
@@ -131,6 +144,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
             stride *= 0.5
             continue
         work.go_on(contact)
+        snapped |= bool(hard) and now_known
         if detached or contact.failure or share == 1.0:
             break
         easy = contact.iterations <= MANY_ITERATIONS // 3
@@ -138,9 +152,26 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
         began[...] = gap
     contact = replace(contact, iterations=iterations)
     pasts = PastGap(gap, step.position, True), memory.pasts[0]
-    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.energies)
+    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.energies, snaps=memory.snaps)
+    (flips,) = scene.slab.sum(kernels.count_flips(memory.pasts[0].gap, gap)) if now_known else (0.0,)
     columns = _columns(scene, trial, contact.p)
-    return StuckContact(contact, now, gap == 0.0, columns, work.total * trial.alpha, detached)
+    return StuckContact(contact, now, gap == 0.0, columns, work.total * trial.alpha, flips, snapped, detached)
+
+
+def front_of(scene: Scene, flips: float, before: Measures, now: Measures) -> float:
+    """Return by how many half process zones the edge of the contact has moved in a step, in the mean.
+
+    In cells that is the number of points over the length of the edge, which is pi/4 of the sides of cells along it.
+    """
+    law, grid = scene.choices.adhesion, scene.choices.grid
+    assert law is not None
+    excess = max(each.contact_area - each.contact_area_corrected for each in (before, now))
+    sides = excess * scene.slab.points / SIDE
+    if sides <= 0.0:
+        return 0.0
+    moved = flips / (0.25 * math.pi * sides) * cell_of(grid)
+    zone = law.process_zone(modulus_of(scene.job.material))
+    return 2.0 * moved / zone if zone > 0.0 else 0.0
 
 
 def open_up(scene: Scene, stuck: StuckContact, trial: Trial) -> StuckContact:
@@ -216,6 +247,7 @@ def entries(memory: StickingMemory, height: float, modulus: float) -> dict[str, 
         "modulus": Entry(memory.modulus, modulus, "Pa"),
         "energies": Entry(np.array(memory.energies), 1.0, "J"),
         "detached": Entry(np.array(memory.detached)),
+        "snaps": Entry(float(memory.snaps)),
     }
     return found if memory.lag is None else {**found, "lag": Entry(memory.lag, height, "m")}
 
@@ -227,4 +259,5 @@ def restored(memory: StickingMemory, saved: Saved) -> StickingMemory:
     now, before = memory.pasts
     pasts = PastGap(now.gap, (x, y), known[0]), PastGap(before.gap, (x_before, y_before), known[1])
     modulus, maps = float(saved["modulus"]), (memory.spare, memory.held, memory.lag)
-    return StickingMemory(pasts, *maps, modulus, StickingEnergies(*saved["energies"].tolist()))
+    energies, snaps = StickingEnergies(*saved["energies"].tolist()), int(saved["snaps"])
+    return StickingMemory(pasts, *maps, modulus, energies, snaps=snaps)

@@ -207,6 +207,8 @@ class Run:
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
             console.say(text)
+        if (stuck := self.march.state.sticking) is not None and stuck.snaps:
+            console.say(f"the contact snapped in {stuck.snaps} of the steps: no error is stated across them")
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")

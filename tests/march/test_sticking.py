@@ -154,3 +154,23 @@ def test_energies_of_a_reversible_contact() -> None:
         sums.append(steps[:count].sum())
     energy = work[1 + count] - work[1]
     assert_allclose((4.0 * sums[1] - sums[0]) / 3.0, energy, rtol=5e-4)
+
+
+def test_chosen_steps_follow_the_edge() -> None:
+    """A rubber sphere is pressed and pulled off in steps that the run chooses: the edge moves by half a process zone at
+    most, but where the contact snaps, across which no error is stated. In cells that edge is `front_of` of the points
+    that change; steps that are chosen may exceed it by 1.19^(1/1.7), as errors may."""
+    rubber = {**ZENER, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
+    stages = [{"approach": {"from": -1e-6, "to": 1e-6}, "duration": 4.0}]
+    stages.append({"approach": {"from": 1e-6, "to": -2e-6}, "duration": 4.0})
+    grid = {"points": 32, "size": 4e-4, "boundary": "free"}
+    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": rubber, "history": stages}
+    march, found = marched({**job, "adhesion": {"work": 0.05, "range": 6e-7}})
+    assert found[-1].time == 8.0
+    areas = column(found, "contact_area")
+    zone, cell = 4e6 * 6e-7**2 / 0.05, 4e-4 / 32
+    radius = np.sqrt(areas * 32**2 / np.pi) * cell
+    moved = np.abs(np.diff(radius)) / (0.5 * zone)
+    snapped = np.array([row.errors is None for row in found[1:]])
+    assert march.state.sticking is not None
+    assert 0.1 < moved[(areas[:-1] > 0.01) & ~snapped].max() < 1.5
