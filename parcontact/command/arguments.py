@@ -63,12 +63,12 @@ def _steady(add: Add) -> None:
         add(f"--{name}", metavar="A:B:N", type=values.numbers, default=(), help=text)
     text = "temperatures [deg C], T,T,... (negative ones first: --temperatures=-20,0); the material needs a shift"
     add("--temperatures", metavar="T,...", type=values.degrees, default=(), help=text)
-    text = "go on with the points that lack (auto, the default), or start afresh and replace what is there (never)"
+    text = "add the points that are missing (auto, the default), or start afresh and replace what is there (never)"
     add("--restart", metavar="auto|never", choices=("auto", "never"), default="auto", help=text)
 
 
 def _plan(add: Add) -> None:
-    text = "numbers of ranks whose memory is told, N,N,... (default: 1, as many as plan, as many as cores here)"
+    text = "numbers of ranks for which memory is counted, N,N,... (default: 1, those that plan, and the cores here)"
     add("--ranks", metavar="N,...", type=values.counts, default=(), help=text)
     add("--seconds", metavar="T", type=values.seconds, default=10.0, help="for how long the job is tried [s]")
 
@@ -125,7 +125,7 @@ def _info(add: Add) -> None:
 
 def _leak(add: Add) -> None:
     add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run that has saved its gaps")
-    text = "only the gap saved after this step (a whole number), or nearest to this time [s] (default: all)"
+    text = "only the gap after this step (a whole number), or nearest to this time, as 2.5 [s] (default: all)"
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)
 
 
@@ -161,13 +161,28 @@ VERBS = (
     Verb("steady", verbs.steady, (_job, _steady, _quiet), "solve steady sliding directly: a friction curve"),
     Verb("check", verbs.check, (_job,), "list all mistakes of a job, or what it says with every default"),
     Verb("plan", verbs.plan, (_job, _plan), "say what a job will do, and what it costs; writes nothing"),
-    Verb("theory", verbs.theory, (_job, _theory, _quiet), "say what Persson's theory predicts, into theory.csv"),
+    Verb(
+        "theory",
+        verbs.theory,
+        (_job, _theory, _quiet),
+        "predict friction and area by Persson's theory, into theory.csv",
+    ),
     Verb("fit", verbs.fit, (_fit,), "fit a compound to measured moduli: a material file and a picture"),
-    Verb("study", verbs.study, (_job, _quiet), "compare settings of a job: what accuracy costs; goes on after a stop"),
+    Verb(
+        "study",
+        verbs.study,
+        (_job, _quiet),
+        "run a job on finer and finer settings: what accuracy costs; goes on after a stop",
+    ),
     Verb("surface", verbs.surface, (_surface,), "say what the surface of a job, or a measured map, is like; draw it"),
-    Verb("info", verbs.info, (_info,), "say what checkpoints, files of fields and directories hold, and if sound"),
+    Verb(
+        "info",
+        verbs.info,
+        (_info,),
+        "describe checkpoints, files of fields and output directories, and check that they are sound",
+    ),
     Verb("plot", verbs.plot, (_plot,), "draw pictures of runs and friction curves, compare them, make a movie"),
-    Verb("leak", verbs.leak, (_leak,), "say what leaks through the gaps of a run, into leak.csv; draw it"),
+    Verb("leak", verbs.leak, (_leak,), "calculate what leaks through the gaps of a run, into leak.csv; draw it"),
     Verb("report", verbs.report, (_report,), "write one HTML file to send: what was asked, results, data, origin"),
     Verb("doctor", verbs.doctor, (_doctor,), "check this installation: exact cases, ranks, files and times"),
     Verb("manual", verbs.manual, (_manual,), "print a page of the manual, or say which there are"),

@@ -262,7 +262,7 @@ def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
         if error > allowed:
             time = scene.setup.prony.relaxation_times[k]
             raise InputError(
-                f"{contents.path} has no map of the branch of relaxation time {time:g} s: its run had no step so short "
-                f"that it mattered to numerics.branch_error = {allowed:g}, now friction would be wrong by {error:.2g}; "
-                "keep to longer steps, or start afresh (--restart never)"
+                f"{contents.path} does not have the branch of relaxation time {time:g} s, which relaxed within every "
+                f"step of its run. The steps to come are shorter: without it friction would be wrong by {error:.2g}, and "
+                f"numerics.branch_error is {allowed:g}. Take longer steps, or start afresh (--restart never)"
             )

@@ -65,7 +65,7 @@ class Planner:
         times = case_times(cases, {index: costs.case for index, costs in tried.items()})
         whole = tried[0].sample.starting + max(sum(times) / groups.count, *times)
         yield f"sweep of {len(cases)} cases: {', '.join(str(cases[index].number) for index in tried)} were tried"
-        yield f"the others are taken to be like them; the longest takes {max(times) / times[0]:.3g} times the first"
+        yield f"the others are assumed to be like them; the longest takes {max(times) / times[0]:.3g} times the first"
         how = f"{groups.count} cases at a time" if groups.count > 1 else "one case after the other"
         on = report.ranks_text(groups.everyone.size)
         yield f"on {on}: {report.duration_text(whole)}{report.MARK * marked} in all, {how}"

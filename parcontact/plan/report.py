@@ -62,7 +62,7 @@ def steps(costs: Costs) -> Iterator[str]:
     tried = sample.job.grid.points
     grid = "" if tried == job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
     where = f"on {ranks_text(sample.ranks)}{grid}"
-    yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s; the others are taken to be like them"
+    yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s; the others are assumed to be like them"
 
 
 def times(costs: Costs) -> Iterator[str]:

@@ -103,7 +103,7 @@ def _find_origin(
     elif origin and (came_off := restart.detached_at(origin.contents, job)) is not None:
         reason = f"detached before, at t = {came_off:g} s (--restart never: run it afresh)"
     elif origin and until is not None and reached(origin.contents.time, until):
-        reason = f"is at t = {origin.contents.time:g} s, not before --until {until:g}"
+        reason = f"is at t = {origin.contents.time:g} s already, and --until {until:g} is not later"
     return origin, warnings, reason
 
 

@@ -169,7 +169,7 @@ class Choices:
             return False, "contacts with adhesion start from the last gaps"
         return self.timeline.lasts, "stages last" if self.timeline.lasts else "every stage is a single solve"
 
-    @decided("starts from whole cells ago")
+    @decided("starts from a whole cell earlier")
     def further_starts(self) -> Verdict:
         """The two pressures before that: with thirds and quarters of a cell a step starts from a whole cell ago."""
         moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)

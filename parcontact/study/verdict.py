@@ -136,9 +136,11 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
             on = "1 rank" if ranks == 1 else f"{ranks} ranks"
             text += f"{case}; {outcomes[case].cpu_seconds:.3g} s of CPU time on {on}"
         else:
-            text += f"none of these settings; the best, {best}, are at {100 * error[best]:.2g} %"
+            text += (
+                f"none of these settings is good enough; the best, {best}, have an error of {100 * error[best]:.2g} %"
+            )
         if math.isnan(doubt):
-            text += " (nothing is known of the error of the reference)"
+            text += " (compared with the most expensive case, whose own error is not known)"
         elif doubt > target:
             text += f" (the reference itself is only known to {100 * doubt:.2g} %)"
         lines.append(text)

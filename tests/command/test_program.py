@@ -143,7 +143,7 @@ def test_until(main: Main, tmp_path: Path) -> None:
     assert code == 0
     assert "stopped at t = 0.00075 s as asked for" in said
     assert rows(out)[-1]["time"] == "0.00075"
-    assert "is at t = 0.00075 s, not before --until 0.0006" in main(path, "--until", "6e-4")[1]
+    assert "is at t = 0.00075 s already, and --until 0.0006 is not later" in main(path, "--until", "6e-4")[1]
     assert main(path, "--quiet") == (0, "", "")
     assert len(rows(out)) == STEPS + 1
     assert main(path, "--quiet", "--until", "0.005")[0] == 0

@@ -194,7 +194,11 @@ def test_starts_from_whole_cells_ago() -> None:
     chosen = {key: value for key, value in SLIDE.items() if key != "cells_per_step"}
     off, on = (job(history=[stage], material=RUBBER) for stage in (SLIDE, chosen))
     elastic = job(history=[chosen], material=ELASTIC)
-    assert [row(planned, "starts from whole cells ago").on for planned in (off, on, elastic)] == [False, True, False]
+    assert [row(planned, "starts from a whole cell earlier").on for planned in (off, on, elastic)] == [
+        False,
+        True,
+        False,
+    ]
     assert [len(begun(planned).state.pasts) for planned in (off, on, elastic)] == [2, 4, 2]
     assert [NAME in begun(planned).entries() for planned in (off, on, elastic)] == [False, True, False]
 
@@ -266,7 +270,7 @@ TESTED = {
     *(
         "isolated contact",
         "extrapolated starts",
-        "starts from whole cells ago",
+        "starts from a whole cell earlier",
         "chosen time steps",
         "rest cut short",
         "steady start",

@@ -45,9 +45,8 @@ def resolution(
         yield from _steps(index, stage, grid, shortest if numerics.integrator == "backward-euler" else math.inf, short)
     if numerics.tolerance < ROUNDING:
         yield (
-            f"numerics.tolerance: {numerics.tolerance:g} is below {ROUNDING:.1g}, which double precision "
-            "reaches where displacements are as large as the surface is high, in proportion more or less elsewhere; "
-            "use a larger tolerance"
+            f"numerics.tolerance: {numerics.tolerance:g} is below {ROUNDING:.1g}, about the smallest error that double "
+            "precision reaches; use a larger tolerance"
         )
 
 

@@ -232,10 +232,9 @@ def _imprints(
         start = _round_trip(grid, velocity, seconds + near / speed, near) - near
         if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:
             yield (
-                f"history.{index}: after {start:.3g} m of {speed * seconds:.3g} m the surface has come round the "
-                "periodic box to where this slide began, over its own imprint, which the body remembers for "
-                f"{memory:.3g} s: friction is that of the box then, and part of mu_dyn; use a shorter distance or a "
-                "larger grid.size"
+                f"history.{index}: after {start:.3g} m of its {speed * seconds:.3g} m the surface has gone once round "
+                f"the periodic box and slides over its own imprint, which the body remembers for {memory:.3g} s. From "
+                "there on friction depends on the box, and so does mu_dyn; use a shorter distance or a larger grid.size"
             )
 
 
