@@ -1,5 +1,7 @@
 """The relaxation function of a material as its section of a job has it."""
 
+import math
+
 import numpy as np
 
 from .. import job as jobs
@@ -27,3 +29,11 @@ def time_factor_of(material: Material) -> float:
     """Return by what factor relaxation times at a material's temperature are longer than at the reference, a_T [-]."""
     body = material.fitted if isinstance(material, jobs.Dma) else material
     return body.time_factor if isinstance(body, jobs.Zener) else 1.0
+
+
+def temperature_of(material: Material) -> float:
+    """Return the temperature of a material [deg C]: its own, else the reference of its shift; NaN without a shift."""
+    body = material.fitted if isinstance(material, jobs.Dma) else material
+    if not isinstance(body, jobs.Zener) or body.shift is None:
+        return math.nan
+    return body.shift.reference if body.temperature is None else body.temperature

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -13,23 +13,38 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..history.timeline import Timeline
+from ..job import Grid
 from ..job.checks import limits
-from ..job.sections.part import Part
+from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
+from ..job.text.fault import Fault
 from ..parallel import spectra
 from ..parallel.fft import Spectrum
 from ..parallel.slab import Array
 from ..physics.entries import Entry, Saved
 from ..physics.exponentials import Exponentials, fit
-from ..physics.flash import Flash, flash_of
-from ..physics.heat import Conductor, depths_of
+from ..physics.heat import Conductor, Depths, depths_of
 from ..physics.heat_memory import Heating, HeatMemory
 from ..physics.units import Units
 from .effect import Decision, Effect, Instant
 from .folded_branches import phases
+from .relaxation import temperature_of
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: of the memory of heat: a share of the job's accuracy, this at most
 DECAYED = 10.0  # accuracy: heat of the longest wave of the box is forgotten when so many times its diffusion is over
+
+
+def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
+    if thermal is not None and thermal.feedback != "none" and math.isnan(temperature_of(material)):
+        yield Fault(
+            "needs a material whose relaxation times depend on temperature: give material a shift, or feedback: none",
+            ("thermal", "feedback"),
+        )
+
+
+def _no_march(thermal: Thermal | None, history: Any) -> Iterator[Fault]:
+    if thermal is not None and thermal.feedback != "none" and history:
+        yield Fault("is for steady sliding: leave out the history, or give feedback: none", ("thermal", "feedback"))
 
 
 class Thermal(Part):
@@ -38,12 +53,19 @@ class Thermal(Part):
     label: ClassVar[str] = "thermal"
     conductivity: Positive = Field(description="a positive conductivity of the rubber [W/(m K)]")
     diffusivity: Positive = Field(description="a positive thermal diffusivity of the rubber [m^2/s]")
-    feedback: Literal["none"] = "none"
+    feedback: Literal["none", "mean"] = "none"
+    distance: Positive | None = Field(default=None, description="a positive distance [m]")
 
     @property
     def conductor(self) -> Conductor:
         """The rubber."""
         return Conductor(self.conductivity, self.diffusivity)
+
+    def sliding_time(self, grid: Grid, speed: float) -> float:
+        """Return for how long steady sliding has warmed the rubber [s]: over the distance, or else through a periodic
+        box once; for ever in a free one."""
+        free = grid.boundary == "free"
+        return (self.distance or (math.inf if free else max(grid.size))) / speed
 
 
 def exponentials_of(job: Any) -> Exponentials:
@@ -61,12 +83,15 @@ def exponentials_of(job: Any) -> Exponentials:
 class ThermalColumns:
     """The mean temperature rise of the contact, weighted by heat, and the highest one of the surface [K].
 
-    Under a surface at rest the mean is weighted by the pressure. `rise` is the map [K], `flash` what it is like over
-    the contact.
+    Under a surface at rest the weights are as in the last sliding. `rise` is the map of the surface [K].
     """
 
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(("thermal", "material"), _shifts),
+        Rule(("thermal", "history"), _no_march),
+    )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 
     @staticmethod
@@ -88,9 +113,10 @@ class ThermalColumns:
         self._rubs, self._pulled = scene.choices.interface is not None, job.section("adhesion") is not None
         body = job.section("thermal").conductor
         self.memory = HeatMemory(scene.setup.fft, job.grid.size, body, exponentials_of(job), self._rubs)
-        self.rise, self.flash = self._slab.zeros(), Flash()
+        self.rise, self._flash, self._highest = self._slab.zeros(), 0.0, 0.0
         self._force, self._area = np.zeros(2), 0.0  # of the body [N], and in contact, at the end of the last step
-        self._warmed = self._current = False  # whether there was any heat, and whether the memory knows what is pressed
+        self._warmed = False  # whether there was any heat
+        self._depths, self._share = Depths(np.zeros(0), np.zeros(0)), 0.0  # of the last heat, and that in the body
 
     def follow(self, instant: Instant) -> None:
         step, pressure = instant.step, instant.pressure
@@ -100,24 +126,22 @@ class ThermalColumns:
         sums = float(np.count_nonzero(pressure)), float(pressure.sum(dtype=np.float64))
         area, mean = (value / self._slab.points for value in self._slab.sum(*sums))
         scales = 1.0 / area if area > 0.0 else 0.0, 1.0 / mean if mean > 0.0 else 0.0
-        heating, weights = self._heat(instant), pressure
-        if any(step.velocity):
-            if not self._current or not step.dt:
-                self.memory.take(rubbed, pressure, scales)
-            if step.dt:
-                pressed = self._setup.fft.forward(pressure)
+        heating = self._heat(instant)
+        begins = any(step.velocity) and not self._warmed
+        self._warmed |= begins
+        if begins or (self._warmed and not step.dt):
+            self.memory.take(rubbed, pressure, scales)
+        if self._warmed and step.dt:
+            pressed = self._setup.fft.forward(pressure)
+            if any(step.velocity):
                 at = self._setup.half_space, self._setup.units.length, step.velocity, self._setup.prony
-                heating = replace(heating, depths=depths_of(pressed, self._setup.fft, *at))
-                self.memory.advance(step.dt, heating, rubbed, pressed, scales, self.rise)
-            self._warmed = self._current = True
-            if heating.whole[1] > 0.0:
-                weights = pressure * (scales[1] * heating.pressed[1])
-                weights += 0.0 if rubbed is None else rubbed * (scales[0] * heating.rubbed[1])
-        elif self._warmed and step.dt:
-            self.memory.rest(step.dt, self.rise)
-            self._current = False
-        if self._warmed:
-            self.flash = flash_of(self._slab, self.rise, weights)
+                self._depths = depths_of(pressed, self._setup.fft, *at)
+                self._share = heating.pressed[1] / (heating.whole[1] or 1.0)
+            heating = replace(heating, depths=self._depths)
+            inside = self.memory.advance(step.dt, heating, rubbed, pressed, scales, self.rise)
+            outside = 0.0 if rubbed is None else float((self.rise * rubbed).sum()) * scales[0] / self._slab.points
+            outside, self._highest = self._slab.reduce([outside], [float(self.rise.max(initial=-math.inf))])
+            self._flash = self._share * inside + (1.0 - self._share) * outside
 
     def _heat(self, instant: Instant) -> Heating:
         """Return the heat of a step, by the forces at both of its ends, and remember those of its end."""
@@ -128,22 +152,23 @@ class ThermalColumns:
         pressed = tuple(max(0.0, -float(each @ velocity)) / box for each in (self._force, force))
         share = self._area / measures.contact_area if measures.contact_area > 0.0 else 0.0
         self._force, self._area = force, measures.contact_area
-        return Heating((own * speed / box * (share if self._current else 1.0), own * speed / box), pressed)
+        return Heating((own * speed / box * (share if self._warmed else 1.0), own * speed / box), pressed)
 
     def values(self) -> Sequence[float]:
-        return self.flash.mean, self.flash.highest
+        return self._flash, self._highest
 
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, units: Units) -> dict[str, Entry]:
         """Return the map, all spectra as maps, and what has no room in these; collective."""
-        known, flags = self.memory.sum, np.array([self._area, self._warmed, self._current])
+        known, depths = self.memory.sum, self._depths
         found = {
             "rise": Entry(self.rise, 1.0, "K"),
             "mean": Entry(self.memory.mean.waves, 1.0, "J/m^2"),
-            "flash": Entry(np.array(astuple(self.flash)), 1.0, "K"),
+            "temperatures": Entry(np.array([self._flash, self._highest]), 1.0, "K"),
             "force": Entry(self._force.copy(), 1.0, "N"),
-            "state": Entry(flags),
+            "state": Entry(np.array([self._warmed, self._area, self._share])),
+            "depths": Entry(np.concatenate([depths.wavenumbers, depths.shares])),
             "grid": Entry(np.array([known.first, known.spacing]), given=True),
         }
         per = spectra.per_map(self._slab.nx)
@@ -170,12 +195,12 @@ class ThermalColumns:
                 rest, where = saved[f"edges {number // per}"], columns * (number % per)
                 spectra.from_map(self._setup.fft, saved[name], rest[:, where : where + columns], spectrum)
         self.memory.mean.waves[...] = saved["mean"]
-        self.flash = Flash(*map(float, saved["flash"]))
-        self._force, self._area = np.array(saved["force"]), float(saved["state"][0])
-        self._warmed, self._current = bool(saved["state"][1]), bool(saved["state"][2])
+        self._flash, self._highest = map(float, saved["temperatures"])
+        self._force, (warmed, self._area, self._share) = np.array(saved["force"]), map(float, saved["state"])
+        self._warmed, self._depths = bool(warmed), Depths(*np.split(np.array(saved["depths"]), 2))
 
 
-def temperature_of(effects: Mapping[str, Effect]) -> Array:
+def rise_of(effects: Mapping[str, Effect]) -> Array:
     """Return this rank's rows of the temperature rise [K]; raises InputError without the effect that has it."""
     thermal = effects.get("thermal")
     if not isinstance(thermal, ThermalColumns):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..effects.thermal import temperature_of
+from ..effects.thermal import rise_of
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.budget import ErrorSums
@@ -101,7 +101,7 @@ class March:
         """
         scene, state, units = self.scene, self.state, self.scene.units
         if name == "temperature":
-            return temperature_of(scene.followers)
+            return rise_of(scene.followers)
         if name == "gap" and state.sticking is not None and state.sticking.pasts[0].known:
             return state.sticking.pasts[0].gap * units.height
         if name == "pressure":

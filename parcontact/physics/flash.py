@@ -4,6 +4,8 @@ The heat of the interface is its shear stress times the sliding speed, on all th
 is what its branches dissipate. It is deposited where the contact works: in proportion to the pressure.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +17,8 @@ BINS = 512  # accuracy: of the histogram from which the quartiles are taken, wit
 
 @dataclass(frozen=True)
 class Flash:
-    """Temperature rises [K] of a contact, weighted by the heat that goes into the rubber: their mean (the flash
-    temperature), the highest one of the whole surface, and the lower and upper quartile."""
+    """Temperature rises [K] of a contact, weighted by heat where it is made, on the surface and in the body: their mean
+    (the flash temperature), the highest one of the surface, and the lower and upper quartile."""
 
     mean: float = 0.0
     highest: float = 0.0
@@ -30,17 +32,18 @@ def spread_over(slab: Slab, weights: Array, total: float) -> Array:
     return weights * (total * slab.points / whole if whole > 0.0 else 0.0)
 
 
-def flash_of(slab: Slab, rise: Array, heat: Array) -> Flash:
-    """Return the temperatures of a map of rises [K] under a map of heat; collective."""
-    warmed, whole = slab.sum(float((rise * heat).sum()), float(heat.sum()))
+def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
+    """Return the temperatures of a contact, whose surface has these rises [K], from pairs of maps: a rise [K] and the
+    heat that is made there; collective."""
+    sums = [(float((rise * heat).sum()), float(heat.sum())) for rise, heat in pairs]
+    warmed, whole = slab.sum(*(math.fsum(each) for each in zip(*sums, strict=True))) if sums else (0.0, 0.0)
+    highest = float(surface.max(initial=-math.inf))
     if not whole > 0.0:
         return Flash()
-    inside = heat > 0.0
-    values, weights = rise[inside], heat[inside]
-    largest = -np.inf
-    highest, top, bottom = slab.reduce(
-        (), [float(rise.max(initial=largest)), float(values.max(initial=largest)), -float(values.min(initial=np.inf))]
-    )
+    values = np.concatenate([rise[heat > 0.0] for rise, heat in pairs])
+    weights = np.concatenate([heat[heat > 0.0] for _, heat in pairs])
+    ends = float(values.max(initial=-math.inf)), -float(values.min(initial=math.inf))
+    highest, top, bottom = slab.reduce((), [highest, *ends])
     low, span = -bottom, max(top + bottom, np.finfo(float).tiny)
     counts = np.histogram((values - low) / span, BINS, (0.0, 1.0), weights=weights)[0]
     shares = np.concatenate([[0.0], np.cumsum(slab.sum(*counts))]) / whole

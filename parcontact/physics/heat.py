@@ -12,7 +12,16 @@ troughs, so that its heat, `4 q (q z)^2 exp(-2 q z) dz` of the whole, lies `3/(2
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
-A uniform heat has no steady state in a periodic box: temperatures are relative to the mean of the box there.
+The rubber that dissipates lies there too, and feels the mean temperature over these depths. With waves cos(m z) along
+the depth, of which this distribution has the share
+
+    g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3,                                         (3)
+
+heat of the body warms the depths where it is made by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` in place of (1).
+
+A uniform heat has no steady state: after a sliding time t it has warmed a body that was cold by `2 q sqrt(t/pi)/e`,
+with the effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). Without an end of time,
+temperatures in a periodic box are relative to its mean.
 """
 
 from dataclasses import dataclass
@@ -26,6 +35,7 @@ from .halfspace import HalfSpace
 from .prony import Prony, complex_modulus
 
 Vector = tuple[float, float]
+SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: of waves along the depth, in ln m, and over wavenumbers
 LAYER_DEPTH = 3.0  # wavenumber times thickness from which on heat lies half a thickness deep
 
 
@@ -44,31 +54,82 @@ class Conductor:
 
 @dataclass(frozen=True)
 class Depths:
-    """How deep the heat of the body lies: the share that waves of each of the wavenumbers [1/m] dissipate."""
+    """How deep the heat of the body lies: the share that waves of each of the wavenumbers [1/m] dissipate.
+
+    Integrals over waves along the depth stand for (2): they go with a finite time and with both depths alike.
+    """
 
     wavenumbers: Array
     shares: Array
 
-    def arriving(self, beta: Spectrum) -> Spectrum:
-        """Return the factor (2), of any shape, in the mean over the waves."""
-        total = np.zeros_like(beta)
+    def cosines(self, m: Array) -> Array:
+        """Return the shares (3) of waves [1/m] along the depth, in the mean over the waves."""
+        total = np.zeros_like(m)
         for q, share in zip(self.wavenumbers, self.shares, strict=True):
-            total += share * (1.0 + beta / (2.0 * q)) ** -3
+            total += share * np.real((1.0 - 0.5j * m / q) ** -3)
         return total
+
+    def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
+        """Return the temperature over heat and 1/kappa [m] after diffusion over `reach = D t` [m^2]: that of the
+        surface or, if `felt`, that in the depths where heat is made; to 1e-5."""
+        total = np.zeros_like(beta)
+        for m, weight in zip(*self._waves(felt), strict=True):
+            square = beta**2 + m**2
+            total += weight * (-np.expm1(-square * reach) if reach < np.inf else 1.0) / square
+        return total
+
+    def staying(self, tau: Array) -> Array:
+        """Return what is left after diffusion over `tau = D t` [m^2], `2/pi int g^2 exp(-m^2 tau) dm` [1/m]."""
+        total = np.zeros_like(tau)
+        for m, weight in zip(*self._waves(True), strict=True):
+            total += weight * np.exp(-(m**2) * tau)
+        return total
+
+    def _waves(self, felt: bool) -> tuple[Array, Array]:
+        """Return waves m [1/m] and their weights in integrals of g or g^2 over m, by the trapezoidal rule in ln m."""
+        if not self.wavenumbers.size:
+            return np.zeros(0), np.zeros(0)
+        low, high = np.log(LOWEST * self.wavenumbers.min()), np.log(HIGHEST * self.wavenumbers.max())
+        m = np.exp(np.linspace(low, high, 1 + int((high - low) / SPACING)))
+        weights = 2.0 / np.pi * np.log(m[1] / m[0]) * m * self.cosines(m) ** (2 if felt else 1)
+        weights[0] /= -np.expm1(-np.log(m[1] / m[0]))  # with all below
+        m[0] = 0.0
+        return m, weights
 
 
 def sliding_heat(
-    fft: FFT, size: Vector, body: Conductor, velocity: Vector, depths: Depths | None = None
+    fft: FFT,
+    size: Vector,
+    body: Conductor,
+    velocity: Vector,
+    depths: Depths | None = None,
+    felt: bool = False,
+    time: float = np.inf,
 ) -> Convolution:
-    """Return heat [W/m^2] -> temperature rise [K] in a periodic box of `size` [m] below a contact that slides steadily
-    at `velocity` [m/s], with the heat on the surface or at `depths`; exact for each wave but those of Nyquist."""
+    """Return heat [W/m^2] -> temperature rise [K] in a periodic box of `size` [m] below a contact that has slid
+    steadily at `velocity` [m/s] for a `time` [s], with the heat on the surface or at `depths`; exact for each wave but
+    those of Nyquist.
+
+    The temperature is that of the surface, or, if `felt`, that in the depths where the heat is made.
+    """
+    reach = body.diffusivity * time
 
     def part(rows: slice) -> Spectrum:
         beta = _beta(fft, size, body, velocity, rows)
-        symbol = np.divide(1.0 / body.conductivity, beta, out=np.zeros_like(beta), where=beta != 0.0)
-        return symbol if depths is None else symbol * depths.arriving(beta)
+        mean = beta == 0.0
+        beta[mean] = 1e-9 / max(size)
+        symbol = _on_surface(beta, reach) if depths is None else depths.warmed(beta, felt, reach)
+        if time == np.inf:
+            symbol[mean] = 0.0
+        return symbol / body.conductivity
 
     return Convolution(fft, part, fft.complex, even=not velocity[1])
+
+
+def _on_surface(beta: Spectrum, reach: float) -> Spectrum:
+    from scipy.special import erf
+
+    return (erf(beta * np.sqrt(reach)) if reach < np.inf else 1.0) / beta
 
 
 def _beta(fft: FFT, size: Vector, body: Conductor, velocity: Vector, rows: slice = ALL) -> Spectrum:

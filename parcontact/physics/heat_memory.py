@@ -5,9 +5,8 @@ Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the 
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
 
 with the effusivity e; q changes linearly with time in a step, over which (1) is solved exactly. For heat on the surface
-g = 1; for heat that waves of the wavenumber q dissipate (`physics.heat`) it is their cosine transform along the depth,
-
-    g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z/sqrt(D)) dz = Re (1 - i m/(2 q sqrt(D)))^-3.                         (2)
+g = 1; for heat of the body it is the share of the wave m_j/sqrt(D) along the depth in the distribution of heat over
+depth (`physics.heat`, (3)). The temperature in the depths where this heat is made is `sum_j w_j g_j c_j/e`.
 
 The mean of the box (k = 0) has a sum of its own, of numbers, exact to 1e-9 at any time: so all heat is accounted for.
 """
@@ -42,13 +41,8 @@ class Heating:
 
 
 def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
-    """Return g of (2) for waves along the depth, in the mean over the waves that dissipate; 1 without."""
-    if depths is None:
-        return np.ones_like(rates)
-    total = np.zeros_like(rates)
-    for q, share in zip(depths.wavenumbers, depths.shares, strict=True):
-        total += share * np.real((1.0 - 1j * np.sqrt(rates / body.diffusivity) / (2.0 * q)) ** -3)
-    return total
+    """Return g of (1) for waves along the depth, in the mean over the waves that dissipate; 1 without."""
+    return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
 
 
 class MeanMemory:
@@ -63,14 +57,15 @@ class MeanMemory:
         """The heat in the body [J/m^2], mean over the box: the longest wave along the depth, which never decays."""
         return float(self.waves[0])
 
-    def advance(self, dt: float, heating: Heating) -> float:
-        """Go on by a step [s]; returns the mean temperature rise [K]."""
+    def advance(self, dt: float, heating: Heating) -> tuple[float, float]:
+        """Go on by a step [s]; returns the mean temperature rise [K], of the surface and where the body makes heat."""
         known, deep = self.sum, along_depth(self.sum.rates, self.body, heating.depths)
         before, after = shares_of_step(known.rates * dt)
         start, end = (one + deep * other for one, other in zip(heating.rubbed, heating.pressed, strict=True))
         self.waves = np.exp(-known.rates * dt) * self.waves + dt * (before * start + after * end)
         fast = 2.0 / (np.pi * known.end) * heating.rubbed[1]
-        return float(known.weights @ self.waves + fast) / self.body.effusivity
+        weights = known.weights / self.body.effusivity
+        return float(weights @ self.waves + fast / self.body.effusivity), float((weights * deep) @ self.waves)
 
 
 class HeatMemory:
@@ -99,25 +94,23 @@ class HeatMemory:
 
     def advance(
         self, dt: float, heating: Heating, rubbed: Array | None, pressed: Spectrum, scales: Vector, out: Array
-    ) -> Array:
-        """Go on by a step [s] at whose end these are rubbed and pressed; returns the temperature rise [K] in `out`.
+    ) -> float:
+        """Go on by a step [s] at whose end these are rubbed and pressed; the temperature rise of the surface [K] is
+        then in `out`. Returns the mean rise [K] in the depths where the body makes heat, weighted by this heat.
 
         `pressed` is a spectrum, that of the transform itself or a copy; `scales` make both maps of the mean 1.
         """
         known, fft = self.sum, self.fft
-        now = pressed
+        now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)
         if rubbed is not None:
             now = pressed.copy() if pressed is fft.spectrum else pressed
             fresh = fft.forward(rubbed)
-        else:
-            fresh = np.zeros((0, fft.shape[1]), fft.complex)
-        deep = along_depth(known.rates, self.body, heating.depths)
+        deep, result = along_depth(known.rates, self.body, heating.depths), fft.spectrum
         fall = np.exp(-known.rates[: known.kept] * dt)
-        result = fft.spectrum
-        loops.conduct(
+        felt = loops.conduct(
             self.waves,
             (known.rates, known.weights / self.body.effusivity, deep, fall, known.end),
-            self._spread,
+            (*self._spread, fft.multiplicity[0]),
             dt,
             (self.rubbed, fresh, self.pressed, now),
             np.array([heating.rubbed, heating.pressed]),
@@ -125,12 +118,8 @@ class HeatMemory:
             self.body.effusivity,
             result,
         )
-        mean = self.mean.advance(dt, heating)
+        mean, mean_felt = self.mean.advance(dt, heating)
         if fft.shape[1] and fft.columns.start == 0:
             result[0, 0] = mean * fft.mx * fft.my
-        return fft.backward(result, out)
-
-    def rest(self, dt: float, out: Array) -> Array:
-        """Go on by a step [s] without heat."""
-        nothing, zeros = Heating(), (0.0, 0.0)
-        return self.advance(dt, nothing, None, self.pressed, zeros, out)
+        fft.backward(result, out)
+        return mean_felt + fft.slab.sum(felt)[0] / (fft.mx * fft.my) ** 2

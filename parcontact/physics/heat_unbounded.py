@@ -11,8 +11,8 @@ on the surface; for heat that waves of the wavenumber q dissipate it is, with ta
 
     W(t) = sqrt(pi) s^3 erfcx''(s)/2,     erfcx''(s) = (2 + 4 s^2) erfcx(s) - 4 s/sqrt(pi),                  (2)
 
-which tends to 1 - 3/s^2. The integral is over panels that resolve how long a cell takes to pass, and how the heat
-spreads.
+which tends to 1 - 3/s^2. For the temperature in the depths where heat is made it is `sqrt(pi tau)` times
+`Depths.staying`. The integral is over panels that resolve how long a cell takes to pass, and how the heat spreads.
 """
 
 import numpy as np
@@ -31,17 +31,25 @@ ASYMPTOTIC = 100.0  # accuracy: s beyond which W is 1 - 3/s^2 to 1e-7
 
 
 def sliding_heat_unbounded(
-    fft: FFT, size: Vector, body: Conductor, velocity: Vector, depths: Depths | None = None
+    fft: FFT,
+    size: Vector,
+    body: Conductor,
+    velocity: Vector,
+    depths: Depths | None = None,
+    felt: bool = False,
+    time: float = np.inf,
 ) -> Convolution:
-    """Return heat [W/m^2] -> temperature rise [K] below a contact that slides steadily at `velocity` [m/s] and fits
-    into a box of `size` [m], with the heat on the surface or at `depths`; collective."""
+    """Return heat [W/m^2] -> temperature rise [K] below a contact that has slid steadily at `velocity` [m/s] for a
+    `time` [s] and fits into a box of `size` [m], with the heat on the surface or at `depths`; of the surface or, if
+    `felt`, in the depths where the heat is made; collective."""
     slab = fft.slab
     padded = FFT(slab, padded_lengths(slab.nx, slab.ny), np.float64, measured=False)
 
     def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:
-        times, shares = _times(size, (dx, dy), body, velocity)
+        times, shares = _times(size, (dx, dy), body, velocity, time)
         if depths is not None:
-            shares = shares * _reaching(times, body, depths)
+            tau = body.diffusivity * times
+            shares = shares * (np.sqrt(np.pi * tau) * depths.staying(tau) if felt else _reaching(times, body, depths))
         along_x = _covered(x[0] + velocity[0] * times[:, None], dx, times, body)
         along_y = _covered(y[:, 0] + velocity[1] * times[:, None], dy, times, body)
         return np.asarray((along_y * shares[:, None]).T @ along_x) / body.effusivity
@@ -58,18 +66,19 @@ def _covered(x: Array, dx: float, times: Array, body: Conductor) -> Array:
     return np.asarray(0.5 * (erf((x + 0.5 * dx) / reach) - erf((x - 0.5 * dx) / reach)))
 
 
-def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector) -> tuple[Array, Array]:
-    """Return times t [s] and their shares of `dt/sqrt(pi t)`, by Gauss panels in sqrt(t)."""
+def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector, time: float) -> tuple[Array, Array]:
+    """Return times t [s], up to `time`, and their shares of `dt/sqrt(pi t)`, by Gauss panels in sqrt(t)."""
     speed, smallest, longest = float(np.hypot(*velocity)), min(cell), 2.0 * float(np.hypot(*size))
     start = FIRST * smallest / max(speed, body.diffusivity / smallest)
     end = LAST * longest**2 / body.diffusivity
     if speed:  # the body that was warmed has left when v t > longest + SPREAD sqrt(2 D t)
         wide = SPREAD * np.sqrt(2.0 * body.diffusivity) / speed
         end = min(end, ((wide + np.sqrt(wide**2 + 4.0 * longest / speed)) / 2.0) ** 2)
-    edges = [0.0, start]
+    end = min(end, time)
+    edges = [0.0, min(start, end)]
     while edges[-1] < end:
         passing = max(smallest, np.sqrt(4.0 * body.diffusivity * edges[-1])) / speed if speed else np.inf
-        edges.append(min(edges[-1] * GROWTH, edges[-1] + PASSING * passing))
+        edges.append(min(edges[-1] * GROWTH, edges[-1] + PASSING * passing, end))
     roots = np.sqrt(edges)
     half = 0.5 * np.diff(roots)[:, None]
     nodes = (roots[:-1, None] + half * (1.0 + GAUSS[0])).ravel()

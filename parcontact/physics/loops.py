@@ -238,18 +238,21 @@ def displace(h, rows, along_x, along_y, out):
 
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
-    """Advance all waves of heat, form the spectrum of the temperature in `out`, and keep the present sources
-    (`physics.heat_memory`).
+    """Advance all waves of heat, form the spectrum of the temperature in `out`, and keep the present sources; return
+    the sum of the temperature at depth times what is pressed (`physics.heat_memory`).
 
-    `known` are rates, weights, shares of heat at depth, decays and the end of the sum; `sources` the spectra of what is
-    rubbed and pressed, each before the step and after. `out` may be one of the latter; without any rubbing these
-    spectra have no row. `heats` has the heat of both at the two ends of the step.
+    `known` are rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squares of the
+    wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of what is rubbed and
+    pressed, each before the step and after. `out` may be one of the latter; without any rubbing these spectra have no
+    row. `heats` has the heat of both at the two ends of the step. The mean is left out of the sum.
     """
     rates, weights, deep, fall, end = known
-    spread_x, spread_y = spread
+    spread_x, spread_y, multiplicity = spread
     rubbed, fresh, pressed, now = sources
     rubs = fresh.shape[0] > 0
+    felt = 0.0
     for j in range(out.shape[0]):
+        row = 0.0
         for i in range(out.shape[1]):
             k2 = spread_x[i] + spread_y[j]
             slows = np.exp(-k2 * dt)
@@ -258,10 +261,9 @@ def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
             now_here = scales[1] * now[j, i]
             on_before, on_after = heats[0, 0] * old_here, heats[0, 1] * fresh_here
             in_before, in_after = heats[1, 0] * pressed[j, i], heats[1, 1] * now_here
-            total = 0.0j
+            total, within = 0.0j, 0.0j
             for n in range(rates.size):
-                rate = rates[n] + k2
-                x = rate * dt
+                x = (rates[n] + k2) * dt
                 e = fall[n] * slows if n < waves.shape[0] else 0.0
                 if x < 1e-3:
                     mean = 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))
@@ -274,10 +276,14 @@ def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
                     c += e * waves[n, j, i]
                     waves[n, j, i] = c
                 total += weights[n] * c
+                within += weights[n] * deep[n] * c
             if k2 > 0.0:
                 root = np.sqrt(k2)
                 total += 2.0 / np.pi * np.arctan(root / end) / root * on_after / effusivity
+                row += multiplicity[i] * (within.real * now_here.real + within.imag * now_here.imag)
             if rubs:
                 rubbed[j, i] = fresh_here
             pressed[j, i] = now_here
             out[j, i] = total
+        felt += row
+    return felt

@@ -22,7 +22,8 @@ from ..parallel.slab import Slab
 from ..physics.budget import ErrorBudget, weight_of
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
-from ..steady_sliding.sliding import Point, SteadySliding
+from ..steady_sliding.point import Point
+from ..steady_sliding.sliding import SteadySliding
 from .trial import make_tiny
 
 T = TypeVar("T")

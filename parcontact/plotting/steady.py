@@ -16,6 +16,8 @@ from .run import find_free_area, read_table, to_contact_area, to_load
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
+THIN = 1.0  # tuning: width of lines beside those of the simulation
+COLD = "friction_cold"  # friction without feedback from heat
 DIGITS = 6  # in which values agree that are the same but for rounding
 
 
@@ -30,6 +32,7 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
         "temperature": Axis("temperature", "°C"),
         "reduced": Axis("shift factor × velocity", "m/s"),
         "friction": Axis("friction coefficient"),
+        "flash_temperature": Axis("flash temperature", "K"),
         "area": to_contact_area(columns["contact_area"], area)[0],
     }
     _add_derived(columns, area)
@@ -41,14 +44,18 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
     panels = [("steady friction", x, "friction", "steady, at"), ("steady area", x, "area", "")]
     if warm and x == "velocity":
         panels.append(("steady master", "reduced", "friction", ""))
+    if "flash_temperature" in columns:
+        panels.append(("steady flash", x, "flash_temperature", ""))
     theory = {}
-    if x == "velocity" and (directory / THEORY).is_file():
+    if x == "velocity" and COLD not in columns and (directory / THEORY).is_file():  # the theory knows of no feedback
         theory = read_table(directory / THEORY, (*NEEDED, "shift_factor"))
         _add_derived(theory, area)
     found = []
     for key, along, name, title in panels:
         series = list(_make_lines(columns, along, name, by, axes[by].unit))
-        series += _make_theory(theory, along, name, by) if theory else ()
+        if name == "friction" and along == x and COLD in columns:
+            series += _make_thin(columns | {name: columns[COLD]}, along, name, by, "without feedback", "--")
+        series += _make_theory(theory, along, name, by) if theory and name in theory else ()
         found.append(Chart(key, axes[along], axes[name], series, log_x=True, legend_title=title))
     return found
 
@@ -83,9 +90,16 @@ def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -
 def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[Series]:
     """Yield thin lines of Persson's theory: as many as there are of the simulation, one over a_T v."""
     one = {"one": np.zeros_like(columns[x])} if x == "reduced" else {}
-    for number, line in enumerate(_make_lines(columns | one, x, y, "one" if one else by, "")):
-        color = style.GREY if one else style.line(number)["color"]
-        yield Series("" if number else "theory", line.x, line.y, {"color": color, "linestyle": ":"})
+    yield from _make_thin(columns | one, x, y, "one" if one else by, "theory", ":", style.GREY if one else "")
+
+
+def _make_thin(
+    columns: dict[str, Array], x: str, y: str, by: str, label: str, dashes: str, color: str = ""
+) -> Iterator[Series]:
+    """Yield thin lines beside those of the simulation, of the same or of another color; the first has the label."""
+    for number, line in enumerate(_make_lines(columns, x, y, by, "")):
+        own = {"color": color or style.line(number)["color"], "linestyle": dashes, "linewidth": THIN}
+        yield Series("" if number else label, line.x, line.y, own)
 
 
 def _round(values: Array) -> Array:

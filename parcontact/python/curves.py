@@ -17,7 +17,8 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene import set_up
 from ..steady_sliding import curve
-from ..steady_sliding.sliding import Point, SteadySliding
+from ..steady_sliding.point import Point
+from ..steady_sliding.sliding import SteadySliding
 from ..steady_sliding.table import describe_missed
 from ..storage.curve_points import Wanted
 from .given_jobs import Given, all_ranks, read, warn_of

@@ -1,17 +1,29 @@
-"""Temperatures of steady sliding: the map below the contact, exact for its heat (`physics.heat`, `physics.flash`)."""
+"""Temperatures of steady sliding: the map below the contact, and the one temperature of the rubber that it makes.
+
+The map is exact for its heat (`physics.heat`, `physics.flash`). With feedback all of the rubber relaxes as at the flash
+temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket. Each round is a steady state.
+"""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..effects.thermal import Thermal
+from ..errors import RunError
 from ..parallel.slab import Array
 from ..physics.flash import Flash, flash_of, spread_over
 from ..physics.heat import depths_of, sliding_heat
 from ..physics.heat_unbounded import sliding_heat_unbounded
 from ..physics.measures import Measures
 from ..scene import Setup
+from .point import Point
 
+MOST_ROUNDS = 10  # tuning: of the fixed point, more than any case has needed
+LEAST_ERROR = 0.02  # accuracy: of the flash temperature [K], 0.1 % of friction at most
+FINEST, COARSEST = 1e-3, 3e-2  # accuracy: of the same, relative
 Vector = tuple[float, float]
 
 
@@ -23,15 +35,58 @@ def warm(
     `pressure` is its map in the run's units, `friction` that of the body without the interface.
     """
     slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
-    body, rise, heat = section.conductor, slab.zeros(), slab.zeros()
-    operator = sliding_heat_unbounded if setup.half_space.free else sliding_heat
+    place = fft, size, section.conductor, velocity
+    made = sliding_heat_unbounded if setup.half_space.free else sliding_heat
+    operator = partial(made, *place, time=section.sliding_time(setup.grid, speed))
+    surface, inside, pairs = slab.zeros(), slab.zeros(), list[tuple[Array, Array]]()
+    at = setup.half_space, setup.units.length, velocity, setup.prony
+    depths = depths_of(fft.forward(pressure), fft, *at)
     if (power := friction * measures.pressure * speed) > 0.0:  # [W/m^2], mean over the box
-        heat += spread_over(slab, pressure, power)
-        half_space = setup.half_space
-        depths = depths_of(fft.forward(pressure), fft, half_space, setup.units.length, velocity, setup.prony)
-        rise += operator(fft, size, body, velocity, depths).apply(heat, slab.empty())
+        heat = spread_over(slab, pressure, power)
+        surface += operator(depths).apply(heat, slab.empty())
+        inside += operator(depths, felt=True).apply(heat, slab.empty())
+        pairs.append((inside, heat))
     if (power := measures.friction_interface * measures.pressure * speed) > 0.0:
         rubbed = spread_over(slab, np.where(pressure > 0.0, 1.0, 0.0), power)
-        heat += rubbed
-        rise += operator(fft, size, body, velocity).apply(rubbed, slab.empty())
-    return flash_of(slab, rise, heat), rise
+        surface += operator().apply(rubbed, slab.empty())
+        inside += operator(depths).apply(rubbed, slab.empty())
+        pairs.append((surface, rubbed))
+    return flash_of(slab, surface, pairs), surface
+
+
+class Feedback:
+    """The fixed point: the first round is that of the cold body, the second starts from the last fixed point where only
+    the velocity differs."""
+
+    def __init__(self) -> None:
+        self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
+
+    def settle(self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float) -> Point:
+        """Return the point whose flash temperature is the rise [K] at which it was solved, `warmed(rise)`, to the
+        `tolerance`, within 0.1 and 3 %. `place` is pressure and temperature of the body.
+
+        Raises RunError where there is none in MOST_ROUNDS rounds, or where the material's shift ends.
+        """
+        relative = min(max(tolerance, FINEST), COARSEST)
+        guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
+        low, high, rise, last, cold, calls, seconds = 0.0, math.inf, 0.0, (math.nan, math.nan), 0.0, 0.0, 0.0
+        for rounds in range(1, MOST_ROUNDS + 1):
+            point = warmed(rise)
+            assert point.flash is not None
+            calls, seconds, over = calls + point.operator_calls, seconds + point.seconds, point.flash.mean - rise
+            cold = point.friction if rounds == 1 else cold
+            if abs(over) <= max(LEAST_ERROR, relative * rise):
+                self._speed, self._rise, self._place = speed, rise, place
+                return replace(point, operator_calls=calls, seconds=seconds, rounds=rounds, friction_cold=cold)
+            if rounds == 1 and guess:  # of the cold body, which may be far from the fixed point that is followed
+                rise = guess
+                continue
+            low, high = (rise, high) if over > 0.0 else (low, rise)
+            slope = (over - last[1]) / (rise - last[0])
+            last, found = (rise, over), rise - over / slope if slope < 0.0 else rise + over
+            middle = 0.5 * (low + high) if high < math.inf else 2.0 * max(found, rise)
+            rise = found if low < found < high else middle
+        raise RunError(
+            f"steady sliding at {speed:g} m/s under {place[0]:g} Pa: no flash temperature settles in {MOST_ROUNDS} "
+            f"rounds; the last one is {last[0] + last[1]:.4g} K at {last[0]:.4g} K. Try feedback: none"
+        )

@@ -8,7 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import RunError
+from ..effects.relaxation import temperature_of
+from ..errors import InputError, RunError
 from ..march.errors import properties_of
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
@@ -20,54 +21,17 @@ from ..physics.measures import Measures
 from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
-from ..solve.certificate import Certificate
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
-from .heating import warm
+from .heating import Feedback, warm
 from .losses import branch_powers
+from .point import Point
 
 COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
 LOOSE, SHARE = 1e-3, 0.6  # so much of a tolerance above LOOSE leaves the contact area as right as in a march
 NEAR = 1.1  # a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Point:
-    """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN where none was asked for), by what factor
-    relaxation times are longer than at the reference, what it measures, its certificate, and what it took.
-
-    `friction` is the power that the body dissipates, over load and velocity, and what an interface adds; that of
-    `measures` is by the slopes of the rigid surface. They differ by the mesh, and `errors` is the budget of the former.
-    `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did.
-    `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box). `flash`
-    has the temperatures of the contact, None where the job has no `thermal`.
-    """
-
-    velocity: Vector
-    pressure: float
-    temperature: float
-    shift_factor: float
-    measures: Measures
-    friction: float
-    errors: ErrorBudget
-    certificate: Certificate
-    operator_calls: float
-    sets: int
-    seconds: float
-    dissipated: tuple[float, ...]
-    flash: Flash | None = None
-
-    @property
-    def speed(self) -> float:
-        """The size of the velocity [m/s]."""
-        return math.hypot(*self.velocity)
-
-    @property
-    def error_friction(self) -> float:
-        """The relative error of friction; NaN where there is none."""
-        return self.errors.friction.total if self.errors.friction else math.nan
 
 
 @dataclass(frozen=True)
@@ -99,19 +63,44 @@ class SteadySliding:
         self.contact: SteadyContact | None = None
         self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
-        self.temperature = math.nan
+        self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
+        self._feedback = Feedback()
 
     def heat(self, temperature: float) -> None:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
         if temperature != self.temperature:
-            self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
-            self.probe, self.temperature = self.setup.probe(), temperature
+            self._take(temperature)
+            self.temperature = temperature
+
+    def _take(self, temperature: float) -> None:
+        """Take the material at this temperature [deg C] for the next solve."""
+        self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
+        self.probe = self.setup.probe()
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
         """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
 
-        Raises RunError, with the certificate reached, when none of the starts leads to one.
+        With feedback from heat the rubber has its flash temperature everywhere. Raises RunError, with the certificate
+        reached, when none of the starts leads to one, or when no temperature is found that makes itself.
         """
+        section = self.setup.job.section("thermal")
+        if section is None or section.feedback == "none":
+            return self._solve(velocity, pressure)
+
+        cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
+
+        def warmed(rise: float) -> Point:
+            try:
+                self._take(cold + rise)
+            except InputError as error:
+                raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
+            return self._solve(velocity, pressure)
+
+        tolerance = self.setup.choices.numerics.tolerance
+        return self._feedback.settle(warmed, math.hypot(*velocity), (pressure, cold), tolerance)
+
+    def _solve(self, velocity: Vector, pressure: float) -> Point:
+        """Solve at the temperature that was taken."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
         what, factor = f"steady sliding at {speed:g} m/s under {pressure:g} Pa", self.setup.choices.time_factor
         for start, solver in self._starts(factor * speed, pressure):

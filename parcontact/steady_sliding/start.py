@@ -11,7 +11,8 @@ from ..scene import Setup, build_on, set_up
 from ..solve.nonsymmetric.steady import SteadyContact
 from ..storage.checkpoint import Contents
 from .losses import branch_maps
-from .sliding import Point, SteadySliding
+from .point import Point
+from .sliding import SteadySliding
 
 
 def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:

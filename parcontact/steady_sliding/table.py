@@ -15,7 +15,8 @@ from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
 from ..storage.tables import GrowingTable
-from .sliding import Point, SteadySliding
+from .point import Point
+from .sliding import SteadySliding
 
 COLUMNS = (
     *("velocity", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure"),
@@ -25,6 +26,7 @@ LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the 
 ERRORS = ("error_friction", "error_area", "friction_slopes")
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 QUARTILES = ("lower_temperature", "upper_temperature")  # of the rise over the contact, with `thermal`
+FEEDBACK = ("friction_cold", "flash_shift", "rounds")  # with the feedback of `thermal`
 WAVES = ("velocity", "pressure", "wavelength", "share")
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # the area as corrected
 
@@ -37,7 +39,9 @@ class CurveTable:
         self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
         branches = sliding.setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
         self.interface = InterfaceColumns.columns if sliding.setup.choices.interface else ()
-        self.thermal = (*ThermalColumns.columns, *QUARTILES) if self._job.section("thermal") else ()
+        thermal = self._job.section("thermal")
+        self.thermal = (*ThermalColumns.columns, *QUARTILES) if thermal else ()
+        self.thermal += FEEDBACK if thermal and thermal.feedback != "none" else ()
         added = (*(HEATED if heated else ()), *self.interface, *self.thermal)
         self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
         self.known = self._read()
@@ -92,7 +96,8 @@ class CurveTable:
         last = [point.friction * (point.velocity[0] / speed), m.contact_area_corrected]
         last += (point.temperature, point.shift_factor) if self.heated else ()
         last += (point.friction - m.friction_interface, m.friction_interface) if self.interface else ()
-        last += astuple(point.flash) if point.flash else ()
+        warm = astuple(point.flash) if point.flash else ()
+        last += (*warm, point.friction_cold, point.shift_factor, point.rounds)[: len(self.thermal)]
         last += point.error_friction, point.errors.area.total, m.friction
         if self._waves:
             for wavelength, share in zip(*waves, strict=True):

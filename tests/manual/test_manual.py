@@ -149,7 +149,7 @@ COLUMNS = {
     "steady.csv": [
         *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
         *(*steady_table.HEATED, *InterfaceColumns.columns, *ThermalColumns.columns),
-        *(*steady_table.QUARTILES, *steady_table.ERRORS),
+        *(*steady_table.QUARTILES, *steady_table.FEEDBACK, *steady_table.ERRORS),
     ],
     "steady_waves.csv": steady_table.WAVES,
     "theory.csv": prediction.Instant._fields,

@@ -16,7 +16,8 @@ from parcontact.physics.heat_unbounded import _reaching, sliding_heat_unbounded
 from parcontact.physics.prony import Prony
 
 RUBBER = Conductor(0.2, 1e-7)
-SIZE = 1e-3, 0.7e-3
+LENGTH = 1e-3
+SIZE = LENGTH, 0.7 * LENGTH
 RADIUS = 1e-4
 
 
@@ -33,7 +34,8 @@ def positions(fft: FFT, size: tuple[float, float]) -> tuple[np.ndarray, np.ndarr
 @pytest.mark.mpi
 @pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.3, 0.0), (-2.0, 0.4)])
 def test_a_wave_of_heat(velocity: tuple[float, float]) -> None:
-    """cos(k x) becomes Re(exp(i k x)/(kappa beta)), at depth times the mean of (1 + beta/(2 q))^-3; to rounding."""
+    """cos(k x) becomes Re(exp(i k x)/(kappa beta)), to rounding; at depth times the mean of (1 + beta/(2 q))^-3, to
+    1e-5."""
     fft = transform(16, 12)
     x, y = positions(fft, SIZE)
     kx, ky = 2 * math.pi * 3 / SIZE[0], 2 * math.pi * 2 / SIZE[1]
@@ -41,10 +43,32 @@ def test_a_wave_of_heat(velocity: tuple[float, float]) -> None:
     beta = np.sqrt(kx**2 + ky**2 - 1j * (kx * velocity[0] + ky * velocity[1]) / RUBBER.diffusivity)
     depths = Depths(np.array([2e4, 1e5]), np.array([0.3, 0.7]))
     arriving = 0.3 * (1 + beta / 4e4) ** -3 + 0.7 * (1 + beta / 2e5) ** -3
-    for given, factor in ((None, 1.0), (depths, arriving)):
+    for given, factor, error in ((None, 1.0, 1e-12), (depths, arriving, 1e-5)):
         found = sliding_heat(fft, SIZE, RUBBER, velocity, given).apply(wave.real.copy(), fft.slab.empty())
         exact = (wave * factor / (RUBBER.conductivity * beta)).real
-        assert np.abs(found - exact).max(initial=0.0) < 1e-12 / (RUBBER.conductivity * abs(beta))
+        assert np.abs(found - exact).max(initial=0.0) < error / (RUBBER.conductivity * abs(beta))
+
+
+def test_after_a_time() -> None:
+    """At rest erf(sqrt(D k^2 t))/(kappa k), and 2 sqrt(t/pi)/e of a uniform heat, to rounding; at depth by quadrature
+    over waves along it, on the surface and where the heat is made, to 1e-5."""
+    fft, time, q = transform(8, 1), 3e-3, 2e4
+    heat, k, reach = 1.0 + np.cos(2 * math.pi * np.arange(8) / 8)[None], 2 * math.pi / LENGTH, RUBBER.diffusivity * 3e-3
+    size, depths = (LENGTH, LENGTH), Depths(np.array([q]), np.ones(1))
+    uniform = 2 * math.sqrt(reach / math.pi)
+    wave = math.erf(math.sqrt(reach) * k) / k
+    rise = sliding_heat(fft, size, RUBBER, (0.0, 0.0), time=time).apply(heat, fft.slab.empty()) * RUBBER.conductivity
+    assert np.abs(rise - uniform - wave * (heat - 1.0)).max() < 1e-12 * uniform
+    for power, felt in ((1, False), (2, True)):
+
+        def left(m: float, k: float, power: int = power) -> float:
+            square = m**2 + k**2
+            return 2 / math.pi * ((1 - 0.5j * m / q) ** -3).real ** power * -math.expm1(-square * reach) / square
+
+        exact = [quad(left, 0, 50 * q, args=(each,), limit=1000, points=[each, q])[0] for each in (1e-3, k)]
+        made = sliding_heat(fft, size, RUBBER, (0.0, 0.0), depths, felt, time)
+        rise = made.apply(heat, fft.slab.empty()) * RUBBER.conductivity
+        assert np.abs(rise - exact[0] - exact[1] * (heat - 1.0)).max() < 2e-5 * uniform
 
 
 def test_heat_from_the_depths_of_a_wave() -> None:
@@ -55,13 +79,34 @@ def test_heat_from_the_depths_of_a_wave() -> None:
     depths = Depths(np.array([q]), np.ones(1))
     for beta in (1e3, 1e5):
         exact = quad(lambda z, b=beta: density(z) * math.exp(-b * z), 0, 1e-3)[0]
-        assert depths.arriving(np.array([beta + 0j]))[0] == pytest.approx(exact, rel=1e-8)
+        assert (1 + beta / (2 * q)) ** -3 == pytest.approx(exact, rel=1e-8)
+        assert depths.warmed(np.array([beta + 0j]), False)[0] == pytest.approx(exact / beta, rel=1e-5)
     found = _reaching(np.array(tau), RUBBER, depths)
     for time, reaching in zip(tau, found, strict=True):
         exact = quad(lambda z, t=time: density(z) * math.exp(-(z**2) / (4e-7 * t)), 0, 1e-3)[0]
         assert reaching == pytest.approx(exact, rel=1e-6)
     late = (np.array([99.999, 100.001]) / (2 * q)) ** 2 / RUBBER.diffusivity  # on both sides of where the series begins
     assert np.ptp(_reaching(late, RUBBER, depths)) < 1e-6
+
+
+def test_the_temperature_where_heat_is_made() -> None:
+    """The mean over both depths of (exp(-beta |z - z'|) + exp(-beta (z + z')))/(2 beta), by Gauss-Laguerre on either
+    side of z = z'; and of the heat kernel after a time, which is the same in the Laplace domain; to 2e-6."""
+    q = 3e4
+    depths = Depths(np.array([q]), np.ones(1))
+    nodes, shares = np.polynomial.laguerre.laggauss(60)
+    z = nodes / (2 * q)
+    density = 0.5 * nodes**2 * shares
+    for beta in (1e3, 3e4, 2e5):
+        total = 0.0
+        for z1, share in zip(z, density, strict=True):  # z' above z: z + s, with its own Laguerre nodes
+            beyond = 0.5 * (2 * q * (z1 + z)) ** 2 * shares * math.exp(-2 * q * z1) * np.exp(-beta * z)
+            total += 2 * share * float(beyond.sum()) / (2 * beta)
+        total += float(density @ np.exp(-beta * z)) ** 2 / (2 * beta)
+        assert depths.warmed(np.array([beta + 0j]), True)[0] == pytest.approx(total, rel=2e-6)
+        left = lambda r, b=beta: 2 * r * math.exp(-((b * r) ** 2)) * depths.staying(np.array([r * r]))[0]  # noqa: E731
+        laplace = quad(left, 0, 8 / beta)
+        assert laplace[0] == pytest.approx(total, rel=2e-6)
 
 
 def disc(fft: FFT, side: float) -> np.ndarray:
@@ -83,7 +128,7 @@ def test_a_disc_of_heat(peclet: float, highest: float, mean: float) -> None:
     velocity = (2 * RUBBER.diffusivity * peclet / RADIUS, 0.0)
     heat = disc(fft, side)
     rise = sliding_heat_unbounded(fft, (side, side), RUBBER, velocity).apply(heat, fft.slab.empty())
-    found, unit = flash_of(fft.slab, rise, heat), RADIUS / RUBBER.conductivity
+    found, unit = flash_of(fft.slab, rise, [(rise, heat)]), RADIUS / RUBBER.conductivity
     assert found.highest / unit == pytest.approx(highest, rel=5e-4)
     assert found.mean / unit == pytest.approx(mean, rel=5e-4)
     assert 0.0 < found.lower < found.mean < found.upper + 0.1 * unit < found.highest + 0.1 * unit

@@ -108,7 +108,9 @@ def test_the_depth_of_the_mean() -> None:
         return quad(lambda z: density(z) * math.exp(-(z**2) / reach), 0, 6e-4)[0] if root else 0.0
 
     exact = 4 / math.sqrt(math.pi) * quad(after, 0, math.sqrt(time))[0] / RUBBER.effusivity
-    assert found == pytest.approx(exact, rel=1e-6)
+    assert found[0] == pytest.approx(exact, rel=1e-6)
+    inside = quad(lambda r: 2 * r * depths.staying(np.array([r * r * RUBBER.diffusivity]))[0], 0, math.sqrt(time))
+    assert found[1] == pytest.approx(2 * inside[0] * RUBBER.diffusivity / RUBBER.conductivity, rel=1e-5)
     assert made.stored == pytest.approx(2 * time, rel=1e-12)
 
 

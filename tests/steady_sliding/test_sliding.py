@@ -18,7 +18,8 @@ from parcontact.solve.nonsymmetric import projected, steady
 from parcontact.solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from parcontact.steady_sliding import sliding as steady_sliding
 from parcontact.steady_sliding.losses import branch_maps
-from parcontact.steady_sliding.sliding import Point, SteadySliding
+from parcontact.steady_sliding.point import Point
+from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.theory import full_contact
 
 FORCE = 0.15  # N
