@@ -244,7 +244,7 @@ def test_a_smaller_error_wakes_all_and_a_larger_one_folds(place: Place) -> None:
 def test_steps_too_short_for_a_branch_without_memory_are_refused(place: Place) -> None:
     """A stage to come with shorter steps would need what the branch remembered; a fresh start does it."""
     place.run(data(SLIDE))
-    with pytest.raises(InputError, match=r"has no map of the branch of relaxation time 1e-06 s: .*never"):
+    with pytest.raises(InputError, match=r"does not have the branch of relaxation time 1e-06 s, .*never"):
         place.run(data(SLIDE, SHORT))
     place.run(data(SLIDE, SHORT), restart="never", until=2e-4)
 
