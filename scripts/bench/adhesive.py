@@ -18,7 +18,7 @@ from .work import Cold, distance
 ERROR = 1e-5  # of pressures
 SIZE, SLOPE, MODULUS = 1e-3, 0.1, 4e6  # of the box [m], rms, E* [Pa]
 STRENGTH = 0.05  # work of adhesion over E* slope^2 and the shortest wave: about a quarter is in contact, without load
-EXACT = 1e-9  # a tolerance whose pressures others are compared with
+EXACT = 1e-8  # a tolerance whose pressures others are compared with
 TOLERANCES = [10.0**-exponent for exponent in np.arange(1.5, 9.0, 0.25)]
 PEERS = (Task("tamaas", TAMAAS_ADHESIVE, -4.0), Task("Adhesion", ADHESION_COLD, -4.0))
 

@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from numpy.testing import assert_allclose
+from scipy.integrate import simpson
 from sticking import (
     ELASTIC,
     FORCE,
@@ -14,6 +16,7 @@ from sticking import (
     UNLOADED,
     WORK,
     cells_per_zone,
+    gathered,
     last_row,
     nominal_area,
     pull_off,
@@ -23,6 +26,7 @@ from sticking import (
     zone,
 )
 
+import parcontact as pc
 from parcontact.theory import adhesion
 
 ALPHA, AMPLITUDE, WAVELENGTH = 0.3, 5e-6, 1e-3  # of Johnson's wave
@@ -138,3 +142,61 @@ def test_pull_off_of_a_punch() -> None:
         forces.append(pull_off(job))
     _, _, limit = np.polyfit(ranges, forces, 2)
     assert_allclose(limit, adhesion.punch_pull_off(radius, WORK, MODULUS), rtol=0.01)
+
+
+SCALE = WORK * UNLOADED**2  # of energies [J]
+
+# -- energies --------------------------------------------------------------------------------------------------------
+
+
+def test_a_loop_of_a_reversible_contact_loses_nothing() -> None:
+    """There and back without a snap: less than 0.1 % of w a^2."""
+    ramps = ramp(0.0, 4 * LENGTH, 40), ramp(4 * LENGTH, 0.0, 40)
+    job = sphere(48, 6, 1, {"approach": 0.0}, *ramps, output={"energy": True})
+    first, *_, last = (row for row in steps(job) if row.pressure != 0)
+    assert abs(last.work - first.work) < 1e-3 * SCALE
+    assert last.contact_area == first.contact_area
+
+
+def test_work_is_what_is_stored_gained_and_lost() -> None:
+    """Work = stored + dissipated + surface + snaps, in a whole loop from out of contact, to 1e-6 of the largest."""
+    ramps = ramp(-4 * LENGTH, 2 * LENGTH, 30), ramp(2 * LENGTH, -4 * LENGTH, 30)
+    job = sphere(32, 4, 1, *ramps, output={"energy": True})
+    _, *rows = steps(job)
+    largest = max(row.stored for row in rows)
+    for row in rows:
+        parts = row.stored + row.dissipated + row.surface_energy + row.snap_loss
+        assert_allclose(row.work, parts, atol=1e-6 * largest)
+
+
+def test_work_is_force_times_path() -> None:
+    """The work of the rows, which is found from energies, against quadratures of the force over the approach: before
+    contact Simpson's rule, to 1e-6 of w a^2; in contact the trapezoidal rule, of second order in the steps."""
+    job = sphere(32, 4, 1, ramp(-4 * LENGTH, -2 * LENGTH, 80), output={"energy": True}, numerics={"tolerance": 1e-7})
+    _, first, *rows = steps(job)
+    force = np.array([row.pressure for row in (first, *rows)]) * nominal_area(job)
+    assert_allclose(rows[-2].work - first.work, simpson(force[:-1], dx=0.025 * LENGTH), atol=1e-6 * SCALE)
+
+    errors = []
+    for count in (10, 20, 40):
+        job = sphere(32, 4, 1, {"approach": 0.0}, ramp(0.0, 2 * LENGTH, count), output={"energy": True})
+        rows = [row for row in steps(job) if row.pressure != 0]
+        force = np.array([row.pressure for row in rows]) * nominal_area(job)
+        errors.append(abs(rows[-1].work - rows[0].work - np.trapezoid(force, [row.approach for row in rows])))
+    print(errors, SCALE)
+    assert errors[1] < 0.35 * errors[0]
+    assert errors[2] < 3e-4 * SCALE
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_the_gap_is_between_body_and_surface(boundary: str) -> None:
+    """Everywhere, to 1e-5 of the unit of length at a tolerance of 1e-5; and open points are pulled by the law."""
+    job = sphere(32, 4, 1, {"approach": -0.5 * LENGTH}, numerics={"tolerance": 1e-5})
+    job["grid"]["boundary"] = boundary
+    run = pc.Simulation(job, comm=MPI.COMM_SELF)
+    *_, row = run.steps()
+    p, u, gap, heights = (gathered(run, name) for name in ("pressure", "displacement", "gap", "height"))
+    assert_allclose(u - heights - row.approach, gap, atol=1e-5 * LENGTH)
+    attraction = WORK / job["adhesion"]["range"] * np.exp(-gap / job["adhesion"]["range"])
+    assert_allclose(p[gap > 0], -attraction[gap > 0], atol=1e-4 * attraction.max())
+    assert (p + attraction)[gap == 0].min() > 0

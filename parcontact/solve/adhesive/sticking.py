@@ -59,7 +59,7 @@ class StickingSolver:
             iterations, passes = iterations + found.iterations, passes + 1
             out[...] = found.p
             change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
-            change -= lag + found.d
+            change -= found.d
             found, worst = self._judge(control, found, out, change)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
             last = change
