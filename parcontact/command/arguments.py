@@ -140,7 +140,6 @@ def _doctor(add: Add) -> None:
 
 def _manual(add: Add) -> None:
     add("page", nargs="?", default="", help="the name of a page (default: list them)")
-    add("--open", action="store_true", help="open the page in a browser, where scripts/manual has run")
 
 
 def _cite(add: Add) -> None:

@@ -248,14 +248,7 @@ def doctor(options: argparse.Namespace) -> int:
 def manual(options: argparse.Namespace) -> int:
     from ..manual import texts
 
-    if options.open:
-        import webbrowser
-
-        webbrowser.open(texts.built(options.page or "index").as_uri())
-    elif options.page:
-        print(texts.plain(options.page, {"verbs": options.describe_verbs}))
-    else:
-        print(texts.contents())
+    print(texts.plain(options.page, {"verbs": options.describe_verbs}) if options.page else texts.contents())
     return DONE
 
 

@@ -15,7 +15,6 @@ from ..errors import InputError
 from . import docstrings, reference
 
 PAGES = Path(__file__).parent / "pages"
-SITE = Path(__file__).parents[2] / "out" / "manual" / "html"  # of a clone, by scripts/manual
 MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
 FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
 Writers = Mapping[str, Callable[[], str]]
@@ -56,16 +55,6 @@ def plain(name: str, writers: Writers | None = None) -> str:
 def _reference(found: re.Match[str]) -> str:
     words, target, alone = found.groups()
     return f"{words} (parcontact manual {target})" if target else f"`parcontact manual {alone}`"
-
-
-def built(name: str) -> Path:
-    """Return the path of a page of the web site. Raises InputError where scripts/manual has not made it."""
-    page = SITE / f"{name}.html"
-    if not page.is_file():
-        raise InputError(
-            f"there is no {page}: scripts/manual of a clone makes it; parcontact manual {name} prints the page"
-        )
-    return page
 
 
 def contents() -> str:

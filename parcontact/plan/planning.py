@@ -61,14 +61,13 @@ class Planner:
             job = cases[index].job
             if costs := self.try_job(job, slab.resized(*job.grid.points)):
                 tried[index] = costs
-        marked = any(costs.sample.disturbed for costs in tried.values())
         times = case_times(cases, {index: costs.case for index, costs in tried.items()})
         whole = tried[0].sample.starting + max(sum(times) / groups.count, *times)
         yield f"sweep of {len(cases)} cases: {', '.join(str(cases[index].number) for index in tried)} were tried"
         yield f"the others are assumed to be like them; the longest takes {max(times) / times[0]:.3g} times the first"
         how = f"{groups.count} cases at a time" if groups.count > 1 else "one case after the other"
         on = report.ranks_text(groups.everyone.size)
-        yield f"on {on}: {report.duration_text(whole)}{report.MARK * marked} in all, {how}"
+        yield f"on {on}: {report.duration_text(whole)} in all, {how}"
 
     def try_job(self, job: Job, slab: Slab) -> Costs | None:
         """Try a job, or the same on a grid that is coarse enough, with the transforms its run will have; collective."""

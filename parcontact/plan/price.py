@@ -28,7 +28,7 @@ from ..physics.budget import per_cent
 from ..physics.mesh_error import SPOTS_ORDER
 from ..physics.time_error import TIME_ORDER
 from .costs import Costs
-from .report import MARK, duration_text, ranks_text, unit_of
+from .report import duration_text, ranks_text, unit_of
 from .sample import Sample, StageCost
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
@@ -165,14 +165,14 @@ def table(costs: Costs) -> Iterator[str]:
     """Mesh, steps, precision, memory and time of each accuracy on these ranks, and how far to trust them."""
     rows = [("this job", costs), *((per_cent(accuracy), offer(costs, accuracy)) for accuracy in ACCURACIES)]
     unit, size = unit_of(max(each.held for _, each in rows))
-    sample, mark = costs.sample, MARK * costs.sample.disturbed
+    sample = costs.sample
     slides = sample.total("friction weight") > 0.0
     yield f"what accuracy costs, in {'friction; the contact area is then within' if slides else 'contact area'}"
     heads = (("area", 9), ("mesh", 14), ("steps" if costs.job.history else "states", 9))
     head = "".join(f"{text:>{width}}" for text, width in heads if slides or text != "area")
     yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11} {ranks_text(sample.ranks):>11}"
     for name, each in rows:
-        grid, whole = each.job.grid, duration_text(each.whole) + mark
+        grid, whole = each.job.grid, duration_text(each.whole)
         area = f"{per_cent(area_error(sample, each.job)):>9}" if slides else ""
         numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.sample.steps:9d}  {each.job.numerics.precision:9}"
         yield f"  {name:9}{area}{numbers}{each.held / size:11.4g} {whole:>11}"

@@ -13,7 +13,6 @@ SUMS_PER_STEP = 1  # that a run makes besides those of its march: whether to sto
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
 LARGE = 1e10  # bytes from which on GB are the unit
 STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
-MARK = "*"  # on figures that were taken while other programs were at work
 
 
 def effects(job: Job) -> Iterator[str]:
@@ -66,20 +65,20 @@ def steps(costs: Costs) -> Iterator[str]:
 
 
 def times(costs: Costs) -> Iterator[str]:
-    """Seconds and memory on the ranks of this trial; what other programs have disturbed is marked."""
-    sample, mark = costs.sample, MARK * costs.sample.disturbed
+    """Seconds and memory on the ranks of this trial; a warning where other programs have disturbed it."""
+    sample = costs.sample
     if sample.disturbed:
         load = f"load {os.getloadavg()[0]:.2g} on {len(os.sched_getaffinity(0))} cores"
         yield (
             f"warning: this machine is busy with other programs ({load}), and the trial had only {sample.share:.0%} of "
-            f"a core for each rank; times marked {MARK} are too long"
+            "a core for each rank; the times below are too long"
         )
     word = "step" if costs.job.history else "state"
     parts = (("to start", sample.starting), ("for the scene", costs.building), ("to write files", costs.writing))
     shares = ", ".join(f"{seconds:.2g} s {what}" for what, seconds in parts)
     yield (
-        f"time on {ranks_text(sample.ranks)}: {costs.step:.3g} s{mark} a {word}, "
-        f"{duration_text(costs.whole)}{mark} in all, with {shares}"
+        f"time on {ranks_text(sample.ranks)}: {costs.step:.3g} s a {word}, "
+        f"{duration_text(costs.whole)} in all, with {shares}"
     )
     yield f"memory of a rank: {_bytes(costs.held)} in maps at most, {_bytes(costs.resident)} resident"
 

@@ -5,12 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from ..parallel.slab import Array
@@ -22,8 +20,6 @@ INTEGRATORS = {"exponential": style.BLUE, "backward-euler": style.RED}
 COSTS = {"work": "transforms × N log₂ N", "seconds": "CPU time"}
 BAND = 5.0  # times the upper edge of the grey band over its lower one
 LEAST = 1e-7  # smaller errors are drawn here
-FALL = 0.7  # of the error from one corner of the front to the next that is numbered
-KEY = "mesh, cells per step, tolerance, precision"
 
 
 @dataclass(frozen=True)
@@ -39,13 +35,12 @@ class Curve:
 
 @dataclass(frozen=True)
 class Point:
-    """One case: what it cost, its error, its settings, and whether it is on the front."""
+    """One case: its work, its time [s], its relative error, and whether none is both cheaper and more accurate."""
 
     work: float
     seconds: float
     error: float
     integrator: str
-    settings: str
     best: bool
 
 
@@ -91,52 +86,29 @@ def _draw_ladders(axes: Axes, name: str, curves: Sequence[Curve], doubt: float) 
 
 
 def _work_precision(points: Mapping[str, Sequence[Point]]) -> Figure:
-    """Draw a row for each quantity that is known, over both costs; the settings behind numbers are named below."""
+    """Draw a row for each quantity that is known, over both costs; study.csv has the settings of the points."""
     known = {name: [one for one in found if math.isfinite(one.error)] for name, found in points.items()}
-    known = {name: found for name, found in known.items() if found}
-    settings = dict.fromkeys(one.settings for found in known.values() for one in _corners(found))
-    numbers = {text: number for number, text in enumerate(settings, 1)}
     groups = [
-        [partial(_draw_points, name=name, points=found, cost=cost, numbers=numbers) for cost in COSTS]
+        [partial(_draw_points, name=name, points=found, cost=cost) for cost in COSTS]
         for name, found in known.items()
+        if found
     ]
-    figure = style.figure_of("", groups, legend=True)
-    figure.set_figheight(figure.get_figheight() + style.LEGEND_LINE * (2 + (len(numbers) + 1) // 2))
-    named = [f"{number}: {text}" for text, number in numbers.items()]
-    blank = [Rectangle((0, 0), 0, 0, alpha=0.0) for _ in named]
-    figure.legend(blank, named, loc="outside lower center", ncols=2, title=KEY, handlelength=0, handletextpad=0)
-    return figure
+    return style.figure_of("", groups, legend=True)
 
 
-def _draw_points(axes: Axes, name: str, points: Sequence[Point], cost: str, numbers: Mapping[str, int]) -> None:
-    """Draw errors of a quantity over one cost; over the work with the front and its numbers."""
+def _draw_points(axes: Axes, name: str, points: Sequence[Point], cost: str) -> None:
+    """Draw errors of a quantity over one cost; over the work with a line through the best points."""
     for integrator, color in INTEGRATORS.items():
         mine = [one for one in points if one.integrator == integrator]
         if mine:
             axes.plot(*_places(mine, cost), "o", color=color, label=integrator)
     if cost == "work":
-        axes.plot(*_places(_front(points), cost), "-", color=style.GREY, lw=1.0, zorder=0)
-        corners = _corners(points)
-        look: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 9}
-        for one, x, y in zip(corners, *_places(corners, cost), strict=True):
-            axes.annotate(str(numbers[one.settings]), (x, y), xytext=(-2, -2), **look)
+        front = sorted((one for one in points if one.best), key=lambda one: one.work)
+        axes.plot(*_places(front, cost), "-", color=style.GREY, lw=1.0, zorder=0)
         axes.set_ylabel(f"{NAMES[name]}:\nerror [%]")
     axes.margins(x=0.1)
     charts.set_scale(axes, "x", COSTS[cost], "s" if cost == "seconds" else "", log=True)
     _scale_errors(axes, [one.error for one in points])
-
-
-def _front(points: Sequence[Point]) -> list[Point]:
-    return sorted((one for one in points if one.best), key=lambda one: one.work)
-
-
-def _corners(points: Sequence[Point]) -> list[Point]:
-    """Return those of the front whose error has fallen to FALL of that of the corner before."""
-    corners: list[Point] = []
-    for one in _front(points):
-        if not corners or max(one.error, LEAST) <= FALL * corners[-1].error:
-            corners.append(one)
-    return corners
 
 
 def _scale_errors(axes: Axes, errors: Sequence[float]) -> None:

@@ -118,21 +118,13 @@ class _Study:
 def _points(
     outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]], quantity: str
 ) -> list[study_plots.Point]:
-    """Error and cost of every case; those on the front with their settings."""
+    """Error and cost of every case, and whether it is on the front."""
     error = {case: errors[case][quantity] for case in outcomes}
     best = verdict.front(outcomes, error)
     return [
-        study_plots.Point(
-            found.transform_work, found.cpu_seconds, error[case], case.integrator, _short(case), case in best
-        )
+        study_plots.Point(found.transform_work, found.cpu_seconds, error[case], case.integrator, case in best)
         for case, found in outcomes.items()
     ]
-
-
-def _short(case: Settings) -> str:
-    """Return the settings of a case in the order of the key of a picture."""
-    steps = "auto" if case.cells_per_step is None else f"{case.cells_per_step:.3g}"
-    return f"{case.mesh}, {steps}, {case.tolerance:g}, {case.precision}"
 
 
 def _fingerprint(job: Job) -> str:

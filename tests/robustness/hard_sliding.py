@@ -1,5 +1,6 @@
 """Hard cases of sliding: waves of two cells, a long box, one point, reversal, stop, no velocity and far too much."""
 
+import jgh
 import numpy as np
 
 from parcontact.doctor.bench import Bench
@@ -21,7 +22,7 @@ from parcontact.doctor.small_jobs import (
     zener,
 )
 from parcontact.physics import prony as viscoelastic
-from parcontact.theory import full_contact, jgh, westergaard
+from parcontact.theory import full_contact, westergaard
 
 STIFF = 2 * HEIGHT  # pressure amplitude of a wave in full contact over modulus and wavenumber
 CELLS = 6

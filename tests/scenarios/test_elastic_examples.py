@@ -9,6 +9,7 @@ import itertools
 import math
 from typing import Any
 
+import jgh
 import numpy as np
 import pytest
 from marching import JOBS, example, marched
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from static_jobs import run
 
 from parcontact.storage.row import Row
-from parcontact.theory import hertz, jgh, westergaard
+from parcontact.theory import hertz, westergaard
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
 WAVE = (5e-7, 2.5e-4, 1e6)  # amplitude [m], wavelength [m], shear modulus [Pa] of jobs/westergaard.yaml and waves.yaml

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, Values
+from parcontact.theory.arrays import Array, Values
 
 
 class Reference(NamedTuple):
@@ -43,7 +43,6 @@ REFERENCE = (
     Reference(0.9, 0.9505, 0.0006, 0.00065146, 1.8997),
     Reference(0.95, 0.9756, 0.0008, 0.000113, 1.95),
 )
-REFERENCE_ERROR = 1e-4  # of `mean_gap` and `peak_pressure`, absolute
 
 
 def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
