@@ -50,8 +50,9 @@ class Instant:
 class Effect(Protocol):
     """The class of an effect that is told of every step made; made with a `Scene`, only where the job asks for it.
 
-    It may have `rules` for the whole job, as sections have them, and `lifts`: checks of other jobs that do not hold
-    with it. Methods are collective, unless they say otherwise.
+    It may have `rules` for the whole job, as sections have them, `lifts`: checks of other jobs that do not hold with
+    it, and `doubts` and `facts`: functions of a job that give warnings, and what the section means in it. Methods are
+    collective, unless they say otherwise.
     """
 
     section: ClassVar[type[Part]]  # what it adds to a job

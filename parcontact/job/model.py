@@ -7,7 +7,7 @@ everywhere. No MPI and no maps here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -139,7 +139,19 @@ class Job(Part):
             *advice.resolution(*scene, self.numerics, self.directions),
             *meaning.warnings(*scene, self.initial, self.steady),
             *size.warnings(self.grid, limits.count_steps(self.grid, self.history), self.output),
+            *self._told("doubts"),
         )
+
+    @property
+    def facts(self) -> tuple[str, ...]:
+        """Sentences of effects about what their sections mean in this job."""
+        return tuple(self._told("facts"))
+
+    def _told(self, what: str) -> Iterator[str]:
+        """Yield the `doubts` or `facts` of the effects whose sections are given."""
+        sections = [name for name in type(self).model_fields if name not in Job.model_fields and self.section(name)]
+        for effect in added_sections.effects_of(sections).values():
+            yield from getattr(effect, what, lambda job: ())(self)
 
     @property
     def directions(self) -> list[tuple[float, float]]:

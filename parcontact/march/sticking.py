@@ -29,7 +29,7 @@ from .sticking_energies import NO_ENERGIES, PathWork, StickingEnergies
 MANY_ITERATIONS = 15  # tuning: of a solve that is near a snap, or starts far away
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
-LOOSE = 3.0  # tuning: times the tolerance of parts
+PART_TOLERANCE = 0.05  # tuning: of the parts of a step but for the last
 OPEN = 10.0  # physics: ranges of attraction between surfaces that have come off
 SNAP_FRONT = 2.0  # accuracy: half process zones by which an edge moves in the shortest step of a snap
 LEAST_TENSION = 1e-2  # physics: of the largest attraction: less is not counted as an area under tension
@@ -126,16 +126,16 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     if lag is not None and memory.modulus:
         lag *= memory.modulus / trial.alpha
     whole = JUMP_STRIDE if step.jump else 1.0
-    now_known = memory.pasts[0].known
+    now_known, pulls = memory.pasts[0].known, isinstance(path.control, MeanPressure)
     _start(scene, memory, step, trial, path, gap, still=step.jump)
     reached, stride, iterations, began, snapped = 0.0, whole, 0, memory.held, False
     work = PathWork(scene, path.approach, path.pressure)
     while True:
         share = min(reached + stride, 1.0)
-        loose = 1.0 if share == 1.0 else LOOSE
+        loose = 1.0 if share == 1.0 else max(1.0, PART_TOLERANCE / scene.choices.numerics.tolerance)
         contact, detached = scene.sticking.solve(law, trial.effective, path.at(share), gap, lag, pressure, loose)
         iterations += contact.iterations
-        hard = detached or contact.failure or contact.iterations > MANY_ITERATIONS
+        hard = detached or (pulls and contact.iterations > MANY_ITERATIONS) or (bool(contact.failure) and share == 1.0)
         if hard and stride > LEAST_STRIDE * whole:
             if reached == 0.0:
                 _start(scene, memory, step, trial, path, gap, still=True)
@@ -144,8 +144,8 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
             stride *= 0.5
             continue
         work.go_on(contact)
-        snapped |= bool(hard) and now_known
-        if detached or contact.failure or share == 1.0:
+        snapped |= hard and now_known
+        if detached or share == 1.0:
             break
         easy = contact.iterations <= MANY_ITERATIONS // 3
         reached, stride = share, min((1.0 + easy) * stride, whole)

@@ -201,6 +201,7 @@ def describe_scene(scene: Scene) -> Iterator[str]:
     """Yield what a user should know: how maps were prepared, branches folded, steps chosen; the surface's moments."""
     yield from scene.setup.preparation_notes
     yield from describe_folded_branches(scene.folded, scene.choices.prony)
+    yield from scene.job.facts
     if steps := describe_steps(scene.job):
         yield f"stages that choose their time steps: {steps}"
     if found := scene.setup.roughness:

@@ -1,0 +1,74 @@
+"""The section `adhesion`: what goes with it, what it warns of, what `check` tells."""
+
+import math
+from typing import Any
+
+import pytest
+
+from parcontact.effects.adhesion import law_of
+from parcontact.errors import InputError
+from parcontact.job import Job, load
+
+E = 4e6  # E* of an incompressible body of 1 MPa [Pa]
+RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
+
+
+def job(**changes: Any) -> Job:
+    return load(
+        {
+            "grid": {"points": 64, "size": 4e-4},
+            "surface": {"shape": "sphere", "radius": 1e-3},
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "adhesion": {"work": 0.05, "range": 4e-7},
+            "history": [{"approach": 0.0}],
+            **changes,
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"adhesion": {"work": 0.0}}, "adhesion.work must be a positive work of adhesion"),
+        ({"adhesion": {"work": 0.05, "range": "short"}}, "adhesion.range must be a positive range"),
+        ({"adhesion": {"work": 0.05, "range": 1e-7}, "material": RUBBER}, "adhesion.range must be at least 1.98e-07 m"),
+        ({"adhesion": {"work": 0.05}, "material": {**RUBBER, "modulus_inf": 0.0}}, "without long-term modulus"),
+        ({"material": {"model": "elastic", "shear_modulus": 1e6, "hardness": 1e9}}, "does not go with adhesion"),
+        ({"steady": {"velocities": [1.0], "pressures": [1e3]}}, "steady does not go with adhesion"),
+        ({"adhesion": None, "history": [{"pressure": -1e3}]}, "must be a pressure [Pa] of zero or more"),
+    ],
+)
+def test_mistakes(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(InputError) as failure:
+        job(**changes)
+    assert sentence in str(failure.value)
+
+
+def test_loads_may_pull() -> None:
+    assert job(history=[{"pressure": {"from": 0.0, "to": -1e3}, "duration": 1.0}]).history[0].load.end == -1e3
+
+
+def test_the_range_that_the_mesh_resolves() -> None:
+    """Two cells are one process zone, `l = E* rho^2/w`."""
+    auto = job(adhesion={"work": 0.05})
+    law = law_of(auto.section("adhesion"), auto.grid, auto.material)
+    assert law is not None
+    assert law.process_zone(E) == pytest.approx(2 * 4e-4 / 64, rel=1e-12)
+
+
+@pytest.mark.parametrize(("reach", "warned"), [(4e-7, False), (2.7e-7, True)])
+def test_a_mesh_that_is_too_coarse(reach: float, warned: bool) -> None:
+    """A cell is 6.25e-6 m, the process zone 12.8e-6 and 5.8e-6 m."""
+    texts = [text for text in job(adhesion={"work": 0.05, "range": reach}).warnings if text.startswith("adhesion")]
+    assert bool(texts) == warned
+    assert all("a range of 2.8e-07 m" in text for text in texts)
+
+
+def test_what_check_tells() -> None:
+    """Process zone, Tabor's parameter of a sphere and Johnson's of a wave, from their definitions."""
+    zone, sphere = job().facts
+    assert "process zone l = 1.28e-05 m, cell h = 0.488 l" in zone
+    assert f"Tabor's parameter {(1e-3 * 0.05**2 / (E**2 * 4e-7**3)) ** (1 / 3):.3g}: between" in sphere
+    _, wave = job(surface={"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]}).facts
+    alpha = math.sqrt(2 * 0.05 * 2e-4 / (math.pi**2 * E)) / 1e-6
+    assert f"Johnson's parameter {alpha:.3g}: full contact without load" in wave
