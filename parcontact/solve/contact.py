@@ -44,7 +44,7 @@ from . import kernels
 from .certificate import Certificate
 from .iterate import Iterate, certify, weigh
 from .local_load import LEAST_CUT, LocalLoad
-from .preconditioner.extension import ExtendedPreconditioner
+from .preconditioner.extension import ALL, ExtendedPreconditioner, Grids
 from .preconditioner.long_waves import LongWavePreconditioner
 from .problem import Problem
 from .workspace import Workspace
@@ -101,16 +101,17 @@ class ContactSolver:
         height: float,
         tolerance: float,
         max_iterations: int,
-        grids: int | None = None,
+        grids: Grids = ALL,
         free: bool = False,
         long_waves: LongWaves | None = None,
     ) -> None:
         self.workspace, self.slab = workspace, workspace.slab
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
-        self._extended: ExtendedPreconditioner | LongWavePreconditioner = ExtendedPreconditioner(self.slab, most=grids)
-        self._rough_inverse = grids == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is only roughly the inverse
+        extended = ExtendedPreconditioner(self.slab, larger=grids)
+        self._extended: ExtendedPreconditioner | LongWavePreconditioner = extended
+        self._rough_inverse = grids.most == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is only roughly the inverse
         if long_waves is not None and not self._rough_inverse:
-            self._extended = LongWavePreconditioner(self.slab, long_waves, self._extended)
+            self._extended = LongWavePreconditioner(self.slab, long_waves, extended)
         self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
         self._local_load = LocalLoad(self.slab)
 
@@ -121,13 +122,13 @@ class ContactSolver:
         tolerance: float,
         ranks: int,
         rank: int,
-        grids: int | None = None,
+        grids: Grids = ALL,
         kept: type[np.floating] = np.float64,
         long_waves: LongWaves | None = None,
     ) -> int:
         """Bytes that it holds on a rank, with its workspace."""
         cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, grids)
-        if long_waves is not None and grids != 0 and min(nx, ny) > 1:
+        if long_waves is not None and grids.most != 0 and min(nx, ny) > 1:
             cells += LongWavePreconditioner.footprint(nx, ny, ranks, rank, long_waves)
         return Workspace.footprint(nx, ny, tolerance, ranks, rank, kept) + cells
 

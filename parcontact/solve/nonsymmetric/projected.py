@@ -16,18 +16,18 @@ from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..constraint import Constraint
 from ..local_load import LEAST_CUT, LocalLoad
-from ..preconditioner.extension import ExtendedPreconditioner
+from ..preconditioner.extension import ExtendedPreconditioner, Grids
 from ..problem import Operator
 from .gcr import gaps_on, residual, sum_on
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
-WIDE, NARROW = (5, 0.5), (4, 1.0)  # tuning: grids and floor of `ExtendedPreconditioner`; the latter take a fifth more
-# calls, but where a body is far stiffer at once, as on a line of points, larger cells or a smaller floor may make sets
-# of points come and go
+WIDE, NARROW = (Grids(5), 0.5), (Grids(4), 1.0)  # tuning: grids and floor of `ExtendedPreconditioner`; the latter take
+# a fifth more calls, but where a body is far stiffer at once, as on a line of points, larger cells or a smaller floor
+# may make sets of points come and go; so may pairs of long cells
 
 
-def extension_on(nx: int, ny: int, narrow: bool = False) -> tuple[int, float]:
+def extension_on(nx: int, ny: int, narrow: bool = False) -> tuple[Grids, float]:
     """The grids and the floor of `ExtendedPreconditioner` on so many points."""
     return NARROW if narrow or 1 in (nx, ny) else WIDE
 

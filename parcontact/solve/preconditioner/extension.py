@@ -15,30 +15,43 @@ ever, which does no harm where it does not. Maps of cells are in single precisio
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import loop
-from ...parallel import pyramid
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
+from .levels import count_cells, levels_of
 
 FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
 LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none
 Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 
 
-def grids_for(dx: float, dy: float, reach: float = math.inf) -> int | None:
-    """Return the most grids of larger cells to use with distances dx and dy of points; None for all that there are.
+class Grids(NamedTuple):
+    """Grids of larger cells: how many at most, None for all that there are, of which the first are of so many `pairs`
+    along x."""
 
-    Points further apart than the `reach` do not act on each other: no cell is longer than about that, if it is not the
-    first.
+    most: int | None = None
+    pairs: int = 0
+
+
+ALL = Grids()
+
+
+def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
+    """Return the grids of larger cells to use with distances dx and dy of points.
+
+    Where points are nearer along x than along y, pairs along x are made first, until cells are about square: a step of
+    a slide takes as many iterations as on squares then, and up to a half more without. Points further apart than the
+    `reach` do not act on each other: no square cell is longer than about that, if it is not the first.
     """
     if max(dx, dy) > LONG * min(dx, dy):
-        return 0
-    return None if reach == math.inf else max(round(math.log2(reach / max(dx, dy))), 1)
+        return Grids(0)
+    pairs = max(round(math.log2(dy / dx)), 0)
+    return Grids(None if reach == math.inf else pairs + max(round(math.log2(reach / max(dx, dy))), 1), pairs)
 
 
 class ExtendedPreconditioner:
@@ -47,20 +60,21 @@ class ExtendedPreconditioner:
     `known` is `w/(w + f)` of each cell, for points the set itself.
     """
 
-    def __init__(self, slab: Slab, floor: float = FLOOR, most: int | None = None) -> None:
-        """With another floor, and `most` grids of larger cells."""
-        self._steps = pyramid.steps_of(slab)[:most]
-        grids = [step.coarse for step in self._steps]
+    def __init__(self, slab: Slab, floor: float = FLOOR, larger: Grids = ALL) -> None:
+        """With another floor, or other grids of `larger` cells than all."""
+        most, pairs = larger
+        self._levels = levels_of(slab, pairs)[:most]
+        grids = [level.coarse for level in self._levels]
         self._floors = [
-            (np.float32(floor) * lengths(slab.ny, level)[grid.rows], lengths(slab.nx, level))
+            (np.float32(floor) * lengths(slab.ny, max(level - pairs, 0))[grid.rows], lengths(slab.nx, level))
             for level, grid in enumerate(grids, 1)
         ]
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     @staticmethod
-    def footprint(nx: int, ny: int, ranks: int, rank: int, most: int | None = None) -> int:
+    def footprint(nx: int, ny: int, ranks: int, rank: int, larger: Grids = ALL) -> int:
         """Bytes that it holds on a rank."""
-        return 2 * 4 * pyramid.count_cells(nx, ny, ranks, rank, most)
+        return 2 * 4 * count_cells(nx, ny, ranks, rank, *larger)
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
@@ -86,27 +100,20 @@ class ExtendedPreconditioner:
     # -- between each grid and the next, and the transposes of that ----------------------------------------------------
 
     def _add_up(self, maps: Maps) -> None:
-        for k, step in enumerate(self._steps):
-            points, cells = maps[k : k + 2]
-            add_up(points, step.points_beside(points, 0, -1), step.above, cells[step.own])
-            step.complete(cells)
+        for k, level in enumerate(self._levels):
+            level.add_up(maps[k], maps[k + 1])
 
     def _add_up_back(self, maps: Maps) -> None:
-        for k, step in reversed(list(enumerate(self._steps))):
-            points, cells = maps[k : k + 2]
-            add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
+        for k, level in reversed(list(enumerate(self._levels))):
+            level.add_up_back(maps[k + 1], maps[k])
 
     def _interpolate(self, known: Maps, maps: Maps) -> None:
-        for k, step in reversed(list(enumerate(self._steps))):
-            points, cells = maps[k : k + 2]
-            _interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, known[k], points)
+        for k, level in reversed(list(enumerate(self._levels))):
+            level.interpolate(maps[k + 1], known[k], maps[k])
 
     def _interpolate_back(self, known: Maps, maps: Maps) -> None:
-        for k, step in enumerate(self._steps):
-            weights, points, cells = known[k], maps[k], maps[k + 1]
-            around = [step.points_beside(field, 0, 1, -2, -1) for field in (weights, points)]
-            _interpolate_back(weights, around[0], points, around[1], step.above, cells[step.own])
-            step.complete(cells)
+        for k, level in enumerate(self._levels):
+            level.interpolate_back(known[k], maps[k], maps[k + 1])
 
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
@@ -128,80 +135,3 @@ def _weigh(known, floors, lengths, cells):
     for j in range(cells.shape[0]):
         for i in range(cells.shape[1]):
             cells[j, i] *= (1.0 - known[j, i]) / (floors[j] * lengths[i])
-
-
-@loop
-def _row(own, beside, j):
-    """Row j, counted from the first of `own`; of those beside, the ones above are the last."""
-    if j < 0:
-        return beside[beside.shape[0] + j]
-    return own[j] if j < own.shape[0] else beside[j - own.shape[0]]
-
-
-@loop
-def add_up(points, beside, above, cells):
-    """The sums over cells."""
-    pairs = points.shape[1] // 2
-    for j in range(cells.shape[0]):
-        a, b = _row(points, beside, 2 * j - above), _row(points, beside, 2 * j - above + 1)
-        out = cells[j]
-        for i in range(pairs):
-            out[i] = (a[2 * i] + b[2 * i]) + (a[2 * i + 1] + b[2 * i + 1])
-        for i in range(pairs, out.size):
-            out[i] = a[2 * i] + b[2 * i]
-
-
-@loop
-def add_up_back(cells, beside, above, points):
-    """Add the value of each cell to its points."""
-    pairs = points.shape[1] // 2
-    for j in range(points.shape[0]):
-        cell, out = _row(cells, beside, (j + above) // 2), points[j]
-        for i in range(pairs):
-            out[2 * i] += cell[i]
-            out[2 * i + 1] += cell[i]
-        for i in range(2 * pairs, out.size):
-            out[i] += cell[i // 2]
-
-
-@loop
-def _interpolate(cells, beside, above, known, points):
-    """Add `1 - known` times what is interpolated between cells."""
-    pairs, columns = points.shape[1] // 2, cells.shape[1]
-    line = np.empty(columns + 2, cells.dtype)
-    for j in range(points.shape[0]):
-        near = (j + above) // 2
-        other = near + 1 if (j + above) % 2 else near - 1
-        a, b = _row(cells, beside, near), _row(cells, beside, other)
-        for i in range(columns):
-            line[i + 1] = np.float32(0.75) * a[i] + np.float32(0.25) * b[i]
-        line[0], line[columns + 1] = line[columns], line[1]
-        out, weight = points[j], known[j]
-        for i in range(pairs):
-            middle = np.float32(0.75) * line[i + 1]
-            out[2 * i] += (1.0 - weight[2 * i]) * (middle + np.float32(0.25) * line[i])
-            out[2 * i + 1] += (1.0 - weight[2 * i + 1]) * (middle + np.float32(0.25) * line[i + 2])
-        for i in range(2 * pairs, out.size):
-            out[i] += (1.0 - weight[i]) * (np.float32(0.75) * line[i // 2 + 1] + np.float32(0.25) * line[i // 2])
-
-
-@loop
-def _interpolate_back(known, known_beside, points, beside, above, cells):
-    """Add points to cells: `1 - known` times their values, by the weights of the interpolation."""
-    count, columns = points.shape[1], cells.shape[1]
-    line = np.zeros(2 * columns + 2, cells.dtype)
-    for j in range(cells.shape[0]):
-        first = 2 * j - above - 1
-        a, b = _row(points, beside, first), _row(points, beside, first + 1)
-        c, d = _row(points, beside, first + 2), _row(points, beside, first + 3)
-        w_a, w_b = _row(known, known_beside, first), _row(known, known_beside, first + 1)
-        w_c, w_d = _row(known, known_beside, first + 2), _row(known, known_beside, first + 3)
-        for i in range(count):
-            outer = (1.0 - w_a[i]) * a[i] + (1.0 - w_d[i]) * d[i]
-            inner = (1.0 - w_b[i]) * b[i] + (1.0 - w_c[i]) * c[i]
-            line[i + 1] = 0.25 * outer + 0.75 * inner
-        line[0], line[2 * columns + 1] = line[2 * columns], line[1]
-        out = cells[j]
-        for i in range(columns):
-            outer, inner = line[2 * i] + line[2 * i + 3], line[2 * i + 1] + line[2 * i + 2]
-            out[i] = np.float32(0.25) * outer + np.float32(0.75) * inner

@@ -25,7 +25,8 @@ from ...parallel import pyramid
 from ...parallel.slab import Array, Slab, dealt_to
 from ...physics.layer import LongWaves
 from ..problem import Operator
-from .extension import ExtendedPreconditioner, add_up, add_up_back, lengths
+from .extension import ExtendedPreconditioner, lengths
+from .squares import add_up, add_up_back
 
 DAMPING = np.float32(0.8)  # tuning: of the Jacobi steps
 DECAY = 2.0  # tuning: thicknesses over which z decays outside contact

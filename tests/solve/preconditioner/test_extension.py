@@ -8,7 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.preconditioner.extension import FLOOR, ExtendedPreconditioner
+from parcontact.solve.preconditioner.extension import FLOOR, ExtendedPreconditioner, Grids, grids_for
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
@@ -38,14 +38,15 @@ def interpolating(count: int) -> Map:
     return weights
 
 
-def extended(s: Map, w: Map, points: Map) -> Map:
-    """The sums s and w over cells of so many points, extended: `(s + f I e)/(w + f)`."""
+def extended(s: Map, w: Map, points: Map, pairs: int = 0) -> Map:
+    """The sums s and w over cells of so many points, extended: `(s + f I e)/(w + f)`; first over so many `pairs`."""
     ny, nx = s.shape
-    if s.size == 1:
+    if s.size == 1 and not pairs:
         return np.asarray(s / (w + FLOOR * points))
-    down, across = adding(ny), adding(nx)
-    above = extended(*(down @ field @ across.T for field in (s, w, points)))
-    told = interpolating(ny) @ above @ interpolating(nx).T
+    down, told_down = (np.eye(ny), np.eye(ny)) if pairs else (adding(ny), interpolating(ny))
+    s_above, w_above, points_above = (down @ field @ adding(nx).T for field in (s, w, points))
+    above = extended(s_above, w_above, points_above, max(pairs - 1, 0))
+    told = told_down @ above @ interpolating(nx).T
     if points.max() == 1.0:
         return np.where(w > 0.0, s, told)
     return np.asarray((s + FLOOR * points * told) / (w + FLOOR * points))
@@ -57,9 +58,10 @@ def extended(s: Map, w: Map, points: Map) -> Map:
     ny=st.integers(1, 34),
     nx=st.sampled_from([1, 7, 14, 200]),
     filled=st.sampled_from([0.003, 0.4]),
+    pairs=st.integers(0, 2),
     seed=st.integers(0, 99),
 )
-def test_extends_by_means_over_cells_of_all_sizes(ny: int, nx: int, filled: float, seed: int) -> None:
+def test_extends_by_means_over_cells_of_all_sizes(ny: int, nx: int, filled: float, pairs: int, seed: int) -> None:
     """What K is given is that of products of matrices, to single precision."""
     random = np.random.default_rng([ny, nx, seed])
     slab, inverse = Slab(MPI.COMM_WORLD, nx, ny), Doubling()
@@ -67,20 +69,20 @@ def test_extends_by_means_over_cells_of_all_sizes(ny: int, nx: int, filled: floa
     r = np.where(c, random.normal(size=(ny, nx)), 0.0)
     z = slab.empty()
     z[...] = r[slab.rows]
-    ExtendedPreconditioner(slab).apply(inverse, c[slab.rows].copy(), z)
+    ExtendedPreconditioner(slab, larger=Grids(None, pairs)).apply(inverse, c[slab.rows].copy(), z)
     if c.size > 1:
-        expected = extended(r, c.astype(float), np.ones(c.shape))
+        expected = extended(r, c.astype(float), np.ones(c.shape), pairs)
         np.testing.assert_allclose(inverse.given, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
 
 
 @pytest.mark.mpi
 @settings(max_examples=30)
-@given(ny=st.integers(1, 34), nx=st.sampled_from([1, 7, 14, 200]), seed=st.integers(0, 99))
-def test_brings_back_by_the_transpose(ny: int, nx: int, seed: int) -> None:
+@given(ny=st.integers(1, 34), nx=st.sampled_from([1, 7, 14, 200]), pairs=st.integers(0, 2), seed=st.integers(0, 99))
+def test_brings_back_by_the_transpose(ny: int, nx: int, pairs: int, seed: int) -> None:
     """`<r, E' K E s> = <E r, K E s>` for any residuals r and s on the set, to single precision."""
     random = np.random.default_rng([ny, nx, seed])
     slab, inverse = Slab(MPI.COMM_WORLD, nx, ny), Doubling()
-    extended = ExtendedPreconditioner(slab)
+    extended = ExtendedPreconditioner(slab, larger=Grids(None, pairs))
     c = (random.random((ny, nx)) < 0.2)[slab.rows].copy()
     r, s = (np.where(c, random.normal(size=(ny, nx))[slab.rows], 0.0) for _ in range(2))
     z = r.copy()
@@ -97,10 +99,21 @@ def test_brings_back_by_the_transpose(ny: int, nx: int, seed: int) -> None:
 
 
 @pytest.mark.mpi
+@pytest.mark.parametrize("larger", [Grids(), Grids(3), Grids(None, 2), Grids(4, 1), Grids(1, 2), Grids(0)])
 @pytest.mark.parametrize("shape", [(1, 1), (5, 300), (64, 64), (33, 18)])
-def test_holds_what_it_says(shape: tuple[int, int]) -> None:
+def test_holds_what_it_says(shape: tuple[int, int], larger: Grids) -> None:
     """To the byte, on every rank."""
     comm = MPI.COMM_WORLD
     slab = Slab(comm, shape[1], shape[0])
-    _held = ExtendedPreconditioner(slab)
-    assert slab.tally["map bytes"] == ExtendedPreconditioner.footprint(shape[1], shape[0], comm.size, comm.rank)
+    _held = ExtendedPreconditioner(slab, larger=larger)
+    expected = ExtendedPreconditioner.footprint(shape[1], shape[0], comm.size, comm.rank, larger)
+    assert slab.tally["map bytes"] == expected
+
+
+def test_pairs_along_x_until_cells_are_square() -> None:
+    """Where points are further apart along x there are none; up to a reach of eight of the longer distances."""
+    found = [grids_for(dx, dy).pairs for dx, dy in ((1.0, 1.0), (1.0, 1.4), (1.0, 1.5), (1.0, 4.0), (4.0, 1.0))]
+    assert found == [0, 0, 1, 2, 0]
+    assert grids_for(1.0, 4.0, reach=32.0) == (5, 2)
+    assert grids_for(4.0, 1.0, reach=32.0) == (3, 0)
+    assert grids_for(1.0, 17.0).most == grids_for(17.0, 1.0).most == 0
