@@ -16,10 +16,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from ..errors import InputError
+from .elimination import Balance
 from .paths import connected_from_end_to_end, critical_constriction
 
 Map = NDArray[np.float64]
@@ -63,12 +62,14 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
     cubes = np.where(wet, np.minimum(gap, MOST_OF_CONSTRICTION * constriction) / constriction, 0.0) ** 3
     length, width = size[1], size[0]
     aspect = (width / gap.shape[1]) / (length / gap.shape[0])  # of a cell: across over along the flow
-    matrix, first, last = _balance(cubes, wet, aspect, periodic_sides)
+    balance = Balance(cubes, aspect, periodic_sides)
     # The drop from the first end and the pressure above the last end: each is exact where it is small.
-    drop, above = _solve(matrix, _checkerboard(wet), np.stack([last, first], axis=1)).T
-    inflow, outflow = float(first @ drop), float(last @ above)
+    drop, above = (
+        balance.solve(given) for given in (_at_row(wet.shape, -1, balance.last), _at_row(wet.shape, 0, balance.first))
+    )
+    inflow, outflow = float(balance.first @ drop[0]), float(balance.last @ above[-1])
     flow = 0.5 * (inflow + outflow)
-    pressure[wet] = above
+    pressure[wet] = above[wet]
     conductivity = constriction**3 * flow * length / width
     return Flow(conductivity, constriction, position, abs(inflow - outflow) / flow, pressure)
 
@@ -126,65 +127,8 @@ def _lengths(size: Sequence[float]) -> tuple[float, float]:
     return width, height
 
 
-def _balance(cubes: Map, wet: NDArray[np.bool_], aspect: float, periodic: bool) -> tuple[sparse.csc_matrix, Map, Map]:
-    """Return the matrix of the flows between wet cells, and the conductances to the first and to the last end."""
-    number = np.full(wet.shape, -1, dtype=np.int32)
-    number[wet] = np.arange(np.count_nonzero(wet), dtype=np.int32)
-    beside = slice(None) if periodic else slice(None, -1)
-    pairs = [
-        (number[:-1], number[1:], aspect * _harmonic(cubes[:-1], cubes[1:])),
-        (
-            number[:, beside],
-            np.roll(number, -1, axis=1)[:, beside],
-            _harmonic(cubes, np.roll(cubes, -1, axis=1))[:, beside] / aspect,
-        ),
-    ]
-    faces = [_faces(*pair) for pair in pairs]
-    a, b, c = (np.concatenate(parts) for parts in zip(*faces, strict=True))
-    first, last = np.zeros_like(cubes), np.zeros_like(cubes)
-    first[0], last[-1] = 2.0 * aspect * cubes[0], 2.0 * aspect * cubes[-1]  # half a cell to the end
-    count = int(number.max()) + 1
-    diagonal = first[wet] + last[wet] + np.bincount(a, c, count) + np.bincount(b, c, count)
-    every = np.arange(count, dtype=np.int32)
-    rows, columns = np.concatenate([a, b, every]), np.concatenate([b, a, every])
-    matrix = sparse.csc_matrix((np.concatenate([-c, -c, diagonal]), (rows, columns)), shape=(count, count))
-    return matrix, first[wet], last[wet]
-
-
-def _checkerboard(wet: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which wet cells are on the white fields of a checkerboard, where none touches another.
-
-    Across periodic sides two would touch where the number of columns is odd: its last column has none.
-    """
-    white = np.add.outer(np.arange(wet.shape[0]), np.arange(wet.shape[1])) % 2 == 0
-    white[:, -1] &= wet.shape[1] % 2 == 0
-    return np.asarray(white[wet])
-
-
-def _solve(matrix: sparse.csc_matrix, white: NDArray[np.bool_], given: Map) -> Map:
-    """Return the solution of a symmetric system, shape (cells, sides).
-
-    White cells are eliminated at once, as they touch black ones only. That leaves half of the cells to the direct
-    solver, in four fifths of its time.
-    """
-    white_cells, black_cells = np.flatnonzero(white), np.flatnonzero(~white)
-    rows = matrix.tocsr()
-    coupling, inverse = rows[black_cells][:, white_cells], 1.0 / matrix.diagonal()[white_cells]
-    eliminated = coupling @ sparse.diags(inverse)
-    reduced = (rows[black_cells][:, black_cells] - eliminated @ coupling.T).tocsc()
-    solution = np.empty_like(given)
-    if black_cells.size:
-        factors = splu(reduced, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        solution[black_cells] = factors.solve(given[black_cells] - eliminated @ given[white_cells])
-    solution[white_cells] = inverse[:, None] * (given[white_cells] - coupling.T @ solution[black_cells])
-    return solution
-
-
-def _faces(a: NDArray[np.int32], b: NDArray[np.int32], c: Map) -> tuple[NDArray[np.int32], NDArray[np.int32], Map]:
-    """Return the faces between two wet cells: their numbers and the conductance."""
-    open_ = (a >= 0) & (b >= 0)
-    return a[open_], b[open_], c[open_]
-
-
-def _harmonic(a: Map, b: Map) -> Map:
-    return 2.0 * a * b / np.maximum(a + b, np.finfo(float).tiny)
+def _at_row(shape: tuple[int, ...], row: int, values: Map) -> Map:
+    """Return a map that is 0 but in one row."""
+    field = np.zeros(shape)
+    field[row] = values
+    return field

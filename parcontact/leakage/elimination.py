@@ -1,0 +1,166 @@
+"""Direct solution of the flow between cells: half of the cells are eliminated at once, the rest by sparse factors.
+
+The flows that leave each wet cell balance: with the conductances c of its faces, `sum c (p - p_neighbour) = given`.
+Cells on the white fields of a checkerboard touch black ones only, so that each of them is eliminated on its own:
+
+    p_white = (given + sum c p_black)/sum c,
+
+which leaves a symmetric matrix of the black cells, with up to eight neighbours each. It is factorized directly.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from ..compiled import loop
+
+Map = NDArray[np.float64]
+DRY, WHITE = -1, -2  # numbers of cells that are no black ones
+MOST_NEIGHBOURS = 17  # of a black cell, itself included: three beyond each of four white ones, and four black ones
+
+
+class Balance:
+    """Balance of the flows in a map: `cubes` g^3, 0 in dry cells; `aspect`, across over along the flow, of a cell.
+
+    Flow is along y, from the first to the last row, at half a cell from which the pressure is given; the other sides
+    are `periodic` or closed. `first` and `last` are the conductances from the rows there to the ends, shape (nx,).
+    """
+
+    def __init__(self, cubes: Map, aspect: float, periodic: bool) -> None:
+        self.cubes, self._places = np.ascontiguousarray(cubes), (aspect, periodic)
+        self.first, self.last = 2.0 * aspect * cubes[0], 2.0 * aspect * cubes[-1]
+        self._number = _number_black_cells(cubes > 0.0)
+        self._sum = np.zeros_like(self.cubes)
+        _add_faces(self.cubes, *self._places, self.first, self.last, self._sum)
+        self._factors = self._factorize()
+
+    def _factorize(self) -> Any:
+        """Return the factors of the matrix of the black cells; None if there are none."""
+        count = int(self._number.max(initial=DRY)) + 1
+        if not count:
+            return None
+        starts = np.zeros(count + 1, dtype=np.int32)
+        columns = np.empty(MOST_NEIGHBOURS * count, dtype=np.int32)
+        values = np.empty(MOST_NEIGHBOURS * count)
+        _eliminate(self.cubes, *self._places, self._number, self._sum, starts, columns, values)
+        matrix = sparse.csc_matrix((values[: starts[-1]], columns[: starts[-1]], starts), shape=(count, count))
+        del columns, values
+        options = {"SymmetricMode": True, "Equil": False}
+        # Panels of one column take two thirds of the time of SuperLU's usual ones: columns here are short.
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, options=options)
+
+    def solve(self, given: Map) -> Map:
+        """Return the pressures for what is `given` to each cell, both of the shape of the map; 0 in dry cells."""
+        black, pressure = self._number >= 0, np.zeros_like(self.cubes)
+        total = given.copy()
+        _gather(self.cubes, *self._places, self._number, self._sum, given, True, total)
+        if self._factors is not None:
+            pressure[black] = self._factors.solve(total[black])
+        total[...] = given
+        _gather(self.cubes, *self._places, self._number, self._sum, pressure, False, total)
+        white = self._number == WHITE
+        pressure[white] = total[white] / self._sum[white]
+        return pressure
+
+
+def _number_black_cells(wet: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return the numbers of black wet cells, WHITE and DRY elsewhere.
+
+    Two white cells would touch across periodic sides where the number of columns is odd: its last column has none.
+    """
+    white = np.add.outer(np.arange(wet.shape[0]), np.arange(wet.shape[1])) % 2 == 0
+    white[:, -1] &= wet.shape[1] % 2 == 0
+    number = np.where(wet, np.int32(WHITE), np.int32(DRY))
+    black = wet & ~white
+    number[black] = np.arange(np.count_nonzero(black), dtype=np.int32)
+    return number
+
+
+@loop
+def _neighbour(cubes, aspect, periodic, row, column, side):
+    """Row, column and conductance of the face of a neighbour, 0 where there is none."""
+    i, j, width = row, column, cubes.shape[1]
+    if side < 2:
+        i = row - 1 if side == 0 else row + 1
+        if i < 0 or i == cubes.shape[0]:
+            return row, column, 0.0
+    else:
+        j = column - 1 if side == 2 else column + 1
+        if periodic and (j < 0 or j == width):
+            j = width - 1 if j < 0 else 0
+        if j < 0 or j in (width, column):
+            return row, column, 0.0
+    a, b = cubes[row, column], cubes[i, j]
+    if a == 0.0 or b == 0.0:
+        return row, column, 0.0
+    return i, j, 2.0 * a * b / (a + b) * (aspect if side < 2 else 1.0 / aspect)
+
+
+@loop
+def _add_faces(cubes, aspect, periodic, first, last, out):
+    """Sum the conductances of the faces of each cell, those of the ends included."""
+    for row in range(cubes.shape[0]):
+        for column in range(cubes.shape[1]):
+            total = 0.0
+            for side in range(4):
+                total += _neighbour(cubes, aspect, periodic, row, column, side)[2]
+            if row == 0:
+                total += first[column]
+            if row == cubes.shape[0] - 1:
+                total += last[column]
+            out[row, column] = total
+
+
+@loop
+def _eliminate(cubes, aspect, periodic, number, total, starts, columns, values):
+    """Write the matrix of the black cells, row by row."""
+    end = 0
+    for row in range(cubes.shape[0]):
+        for column in range(cubes.shape[1]):
+            own = number[row, column]
+            if own < 0:
+                continue
+            begin = end
+            columns[end], values[end] = own, total[row, column]
+            end += 1
+            for side in range(4):
+                i, j, c = _neighbour(cubes, aspect, periodic, row, column, side)
+                if c == 0.0:
+                    continue
+                if number[i, j] >= 0:
+                    end = _add(number[i, j], -c, begin, end, columns, values)
+                    continue
+                for further in range(4):
+                    k, m, d = _neighbour(cubes, aspect, periodic, i, j, further)
+                    if d > 0.0:
+                        end = _add(number[k, m], -c * d / total[i, j], begin, end, columns, values)
+            starts[own + 1] = end
+
+
+@loop
+def _add(other, value, begin, end, columns, values):
+    """Add a value to an entry of the row that began there; returns where the row ends."""
+    for k in range(begin, end):
+        if columns[k] == other:
+            values[k] += value
+            return end
+    columns[end], values[end] = other, value
+    return end + 1
+
+
+@loop
+def _gather(cubes, aspect, periodic, number, total, field, black, out):
+    """Add to black cells what their white neighbours pass on of a field, or to white cells `c` times that of black
+    ones."""
+    for row in range(cubes.shape[0]):
+        for column in range(cubes.shape[1]):
+            own = number[row, column]
+            if own == DRY or (own >= 0) != black:
+                continue
+            for side in range(4):
+                i, j, c = _neighbour(cubes, aspect, periodic, row, column, side)
+                if c > 0.0 and (number[i, j] < 0) == black:
+                    out[row, column] += c * field[i, j] / (total[i, j] if black else 1.0)
