@@ -105,8 +105,8 @@ class Compound:
         noise = "" if math.isnan(series.scatter) else f"; neighbours of one sweep scatter by {series.scatter:.2%}"
         lines = [
             f"{TITLE} {self.measured.path.name}: {kind}, {self.measured.kind} domain.",
-            f"# {len(series.moduli)} branches; rms error of the {self._weighed} {series.error:.2%}; the best that "
-            f"any relaxation spectrum does is {series.best:.2%}{noise}.",
+            f"# {len(series.moduli)} branches; rms error of the {self._weighed} {series.error:.2%}; no "
+            f"relaxation spectrum does better than {series.best:.2%}{noise}.",
             f"# Measured band, reduced{at}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",
             *([f"# Measured at {', '.join(f'{t:.4g}' for t in temperatures)} C."] if temperatures else []),
             "# All moduli are of shear [Pa], times in s"

@@ -38,6 +38,9 @@ class WLF:
     C2: float
     reference: float
 
+    def __str__(self) -> str:
+        return f"WLF with C1 = {self.C1:.4g}, C2 = {self.C2:.4g} K, reference {self.reference:g} C"
+
     def log_factor(self, temperature: float) -> float:
         """log10 of a_T; raises InputError where the law has no meaning, at or below T_ref - C2."""
         above = temperature - self.reference
@@ -54,6 +57,9 @@ class Arrhenius:
     energy: float
     reference: float
 
+    def __str__(self) -> str:
+        return f"Arrhenius with {self.energy:.4g} J/mol, reference {self.reference:g} C"
+
     def log_factor(self, temperature: float) -> float:
         """log10 of a_T; raises InputError at or below absolute zero."""
         if temperature <= -ZERO:
@@ -69,6 +75,10 @@ class Factors:
     temperatures: tuple[float, ...]
     logs: tuple[float, ...]
     reference: float
+
+    def __str__(self) -> str:
+        pairs = ", ".join(f"{log:.3g} at {t:g} C" for t, log in zip(self.temperatures, self.logs, strict=True))
+        return f"factors with log10 a_T = {pairs}, reference {self.reference:g} C"
 
     def log_factor(self, temperature: float) -> float:
         """log10 of a_T; raises InputError beyond the temperatures given."""
