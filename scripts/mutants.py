@@ -26,10 +26,11 @@ ROOMS = ("physics", "parallel", "solve", "march", "scene", "storage", "plan", "e
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
 FEWEST = 8  # places to break in a part
-SCENARIOS = {  # whole scenes that answer for a part, too
-    "march/step.py": "test_viscoelastic.py test_viscoelastic_scales.py test_sliding_waves.py test_sliding_runs.py",
-    "march/errors.py": "test_sliding_waves.py",
-    "physics/body.py": "test_viscoelastic.py",
+SLIDING = "scenarios/test_sliding_waves.py"
+OTHERS = {  # further tests that answer for a part
+    "march/step.py": f"march/test_sticking.py scenarios/test_viscoelastic.py {SLIDING} scenarios/test_sliding_runs.py",
+    "march/errors.py": SLIDING,
+    "physics/body.py": "scenarios/test_viscoelastic.py",
 }
 PAIRS = ((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE), (ast.Eq, ast.NotEq))
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}
@@ -39,9 +40,9 @@ Change = tuple[str, Callable[[], None]]  # what is done, and doing it to the tre
 
 
 def tests_of(part: str) -> tuple[str, ...]:
-    """The tests that answer for a file of the program: `tests/ROOM/test_NAME*.py`, and some scenarios."""
+    """The tests that answer for a file of the program: `tests/ROOM/test_NAME*.py`, and some others."""
     own = sorted((TESTS / part).parent.glob(f"test_{Path(part).stem}*.py"))
-    own += [TESTS / "scenarios" / name for name in SCENARIOS.get(part, "").split()]
+    own += [TESTS / name for name in OTHERS.get(part, "").split()]
     return tuple(str(path.relative_to(ROOT)) for path in own)
 
 

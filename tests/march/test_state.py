@@ -1,5 +1,6 @@
 """The state of a run: a checkpoint restores all of it, and a step that fails leaves it alone."""
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -7,10 +8,12 @@ import numpy as np
 import pytest
 from marching import begun, marched
 
+from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
+from parcontact.march.state import State
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
 from parcontact.storage.provenance import Link, Provenance
@@ -61,11 +64,31 @@ def test_all_of_it_is_there_right_after_it_is_restored(tmp_path: Path, data: dic
     assert all(np.array_equal(entries[name].value, entry.value) for name, entry in old.entries().items())
 
 
+@pytest.mark.parametrize(("off", "refused"), [(1e-9, True), (1e-14, False)])
+def test_a_checkpoint_of_another_material_is_refused(tmp_path: Path, off: float, refused: bool) -> None:
+    """A modulus that differs by more than its rounding is another one."""
+    old, _ = marched(job(RUBBER, SLIDES))
+    contents = checkpoint.inspect(written(old, tmp_path / "step.h5"))
+    branch = RUBBER["branches"][0]  # type: ignore[index]
+    new = begun(job({**RUBBER, "branches": [{**branch, "modulus": branch["modulus"] * (1.0 + off)}]}, SLIDES))
+    with pytest.raises(InputError, match="is of another job: material/moduli was") if refused else nullcontext():
+        new.restore(contents)
+
+
 def test_further_pressures_are_named_by_their_age() -> None:
     """As the manual has them, of slides that choose their steps."""
     march = begun(job(RUBBER, CHOSEN))
     further = [name for name in march.entries() if name.endswith("steps ago")]
     assert further == ["contact/pressure 3 steps ago", "contact/pressure 4 steps ago"]
+
+
+@pytest.mark.parametrize("data", CASES)
+def test_pressures_of_a_checkpoint_are_counted(data: dict[str, Any]) -> None:
+    """As many maps as are planned for."""
+    march = begun(data)
+    chosen = march.scene.choices
+    counted = State.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on).saved
+    assert sum(entry.is_map for name, entry in march.entries().items() if name.startswith("contact/")) == counted
 
 
 @pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])

@@ -109,6 +109,7 @@ def test_open_after_detachment() -> None:
     assert len(found) == 1 + 10 + 1 + 2
     assert pressures[10] == areas[10] == 0.0
     assert areas[-1] > 0.0
+    assert ["any more" in row.remark for row in found].count(True) == 1  # when they come off, not while they are apart
 
 
 def test_no_adhesion_remembers_nothing() -> None:
