@@ -35,6 +35,8 @@ def take_grid(source: Source, origin: Origin) -> None:
             raise InputError("a measured map is needed; an array has points, but no size")
         found = {"points": points, "size": size}
         grid.update({key: list(found[key] or ()) for key in wanted})
+    except ValidationError:  # mistakes of the surface, which are told where it is read
+        grid.update(dict.fromkeys(wanted, UNREADABLE))
     except MapError as error:
         source.note(source.locate(("surface",)).place, f"surface: {error}")
         grid.update(dict.fromkeys(wanted, UNREADABLE))
@@ -56,10 +58,7 @@ def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
         if arrays[0].ndim != 2:
             raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
         return tuple(arrays[0].shape[::-1]), None
-    try:
-        part = Topography.model_validate(maps[0], context=origin)
-    except ValidationError:
-        raise InputError("the surface has mistakes") from None
+    part = Topography.model_validate(maps[0], context=origin)
     try:
         found: Extent = READER.load()(part, box)
     except InputError as error:

@@ -61,7 +61,7 @@ class _Study:
 
     def run(self, stopped: Callable[[], bool]) -> bool:
         """Run the cases that lack; whether all are there in the end."""
-        self.say(f"{len(self.jobs)} cases, {len(self.outcomes)} of them are there already")
+        self.say(f"{len(self.jobs)} cases" + f", {len(self.outcomes)} of them finished before" * bool(self.outcomes))
         self.say(HEAD)
         for case, job in self.jobs.items():
             if case not in self.outcomes:

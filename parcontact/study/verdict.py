@@ -127,10 +127,9 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
     doubts = [reference[name].doubt for name in NEEDED if name in reference and reference[name].value]
     doubt = max((doubt for doubt in doubts if not math.isnan(doubt)), default=math.nan)
-    lines = []
+    lines: list[str] = []
     for target in TARGETS:
-        enough = [case for case in outcomes if error[case] <= target]
-        text = f"for {100 * target:g} %: "
+        enough, text = [case for case in outcomes if error[case] <= target], ""
         if enough:
             case = min(enough, key=lambda case: outcomes[case].transform_work)
             on = "1 rank" if ranks == 1 else f"{ranks} ranks"
@@ -143,5 +142,8 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
             text += " (compared with the most expensive case, whose own error is not known)"
         elif doubt > target:
             text += f" (the reference itself is only known to {100 * doubt:.2g} %)"
-        lines.append(text)
+        if lines and not enough and lines[-1].endswith(f"%: {text}"):  # the same is said of both
+            lines[-1] = lines[-1].replace(" %: none", f" %, {100 * target:g} %: none")
+        else:
+            lines.append(f"for {100 * target:g} %: {text}")
     return lines
