@@ -13,7 +13,7 @@ from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
-from parcontact.march.state import State
+from parcontact.march.state import POSITIONS, State
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
 from parcontact.storage.provenance import Link, Provenance
@@ -80,6 +80,18 @@ def test_further_pressures_are_named_by_their_age() -> None:
     march = begun(job(RUBBER, CHOSEN))
     further = [name for name in march.entries() if name.endswith("steps ago")]
     assert further == ["contact/pressure 3 steps ago", "contact/pressure 4 steps ago"]
+
+
+def test_ways_in_a_checkpoint_are_in_metres(tmp_path: Path) -> None:
+    """Where the surface was after the last steps of a slide along x, the latest first."""
+    march, rows = marched(job(RUBBER, CHOSEN))
+    contents = checkpoint.inspect(written(march, tmp_path / "step.h5"))
+    names = ("clock/position", "clock/earlier position", POSITIONS)
+    found = np.concatenate([contents.numbers[name] * contents.units[name] for name in names]).reshape(-1, 2)
+    expected = [row.distance for row in rows[: -len(found) - 1 : -1]]
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12)
+    assert not found[:, 1].any()
+    assert contents.numbers["clock/distance"] * contents.units["clock/distance"] == expected[0]
 
 
 @pytest.mark.parametrize("data", CASES)
