@@ -1,10 +1,12 @@
 """The relaxation function of a material as its section of a job has it."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from .. import job as jobs
+from ..job.sections.materials import heated
 from ..physics.prony import Prony, normal_form, zener_to_prony
 
 Material = jobs.Elastic | jobs.Zener | jobs.Dma
@@ -37,3 +39,17 @@ def temperature_of(material: Material) -> float:
     if not isinstance(body, jobs.Zener) or body.shift is None:
         return math.nan
     return body.shift.reference if body.temperature is None else body.temperature
+
+
+def factor_at(material: Material, rise: float) -> float:
+    """Return relaxation times of a material that is warmer by a rise [K] over those at its own temperature [-].
+
+    Raises InputError where its shift does not reach.
+    """
+    return time_factor_of(heated(material, temperature_of(material) + rise)) / time_factor_of(material)
+
+
+def feeds_back(job: Any) -> bool:
+    """Return whether the heat of sliding changes the relaxation times of a job's material (`effects.thermal`)."""
+    section = job.section("thermal")
+    return section is not None and section.feedback != "none"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 from pydantic import Field
 
-from ..errors import InputError
+from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Grid
 from ..job.checks import limits
@@ -25,10 +25,11 @@ from ..physics.entries import Entry, Saved
 from ..physics.exponentials import Exponentials, fit
 from ..physics.heat import Conductor, Depths, depths_of
 from ..physics.heat_memory import Heating, HeatMemory
+from ..physics.prony import Prony
 from ..physics.units import Units
 from .effect import Decision, Effect, Instant
 from .folded_branches import phases
-from .relaxation import temperature_of
+from .relaxation import factor_at, feeds_back, temperature_of
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: of the memory of heat: a share of the job's accuracy, this at most
 DECAYED = 10.0  # accuracy: heat of the longest wave of the box is forgotten when so many times its diffusion is over
@@ -40,11 +41,6 @@ def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
             "needs a material whose relaxation times depend on temperature: give material a shift, or feedback: none",
             ("thermal", "feedback"),
         )
-
-
-def _no_march(thermal: Thermal | None, history: Any) -> Iterator[Fault]:
-    if thermal is not None and thermal.feedback != "none" and history:
-        yield Fault("is for steady sliding: leave out the history, or give feedback: none", ("thermal", "feedback"))
 
 
 class Thermal(Part):
@@ -88,10 +84,7 @@ class ThermalColumns:
 
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(("thermal", "material"), _shifts),
-        Rule(("thermal", "history"), _no_march),
-    )
+    rules: ClassVar[tuple[Rule, ...]] = (Rule(("thermal", "material"), _shifts),)
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 
     @staticmethod
@@ -109,7 +102,8 @@ class ThermalColumns:
         return [np.float64] * (count + rubs + math.ceil(count / spectra.per_map(job.grid.nx)))
 
     def __init__(self, scene: Any) -> None:
-        self._setup, self._slab, job = scene.setup, scene.slab, scene.job
+        self._scene, self._setup, self._slab, job = scene, scene.setup, scene.slab, scene.job
+        self._feeds_back, self._factor = feeds_back(job), 1.0  # of relaxation times over those of the job's temperature
         self._rubs, self._pulled = scene.choices.interface is not None, job.section("adhesion") is not None
         body = job.section("thermal").conductor
         self.memory = HeatMemory(scene.setup.fft, job.grid.size, body, exponentials_of(job), self._rubs)
@@ -134,7 +128,7 @@ class ThermalColumns:
         if self._warmed and step.dt:
             pressed = self._setup.fft.forward(pressure)
             if any(step.velocity):
-                at = self._setup.half_space, self._setup.units.length, step.velocity, self._setup.prony
+                at = self._setup.half_space, self._setup.units.length, step.velocity, self._prony
                 self._depths = depths_of(pressed, self._setup.fft, *at)
                 self._share = heating.pressed[1] / (heating.whole[1] or 1.0)
             heating = replace(heating, depths=self._depths)
@@ -142,6 +136,22 @@ class ThermalColumns:
             outside = 0.0 if rubbed is None else float((self.rise * rubbed).sum()) * scales[0] / self._slab.points
             outside, self._highest = self._slab.reduce([outside], [float(self.rise.max(initial=-math.inf))])
             self._flash = self._share * inside + (1.0 - self._share) * outside
+            self._feed_back()
+
+    @property
+    def _prony(self) -> Prony:
+        """The relaxation function as it is now, in the run's units."""
+        cold = self._setup.prony
+        return cold._replace(relaxation_times=cold.relaxation_times * self._factor)
+
+    def _feed_back(self) -> None:
+        """Let the rubber relax as at the flash temperature, if the job asks for that. Raises RunError."""
+        if self._feeds_back:
+            try:
+                self._factor = factor_at(self._scene.job.material, self._flash)
+            except InputError as error:
+                raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
+            self._scene.warm(self._factor)
 
     def _heat(self, instant: Instant) -> Heating:
         """Return the heat of a step, by the forces at both of its ends, and remember those of its end."""
@@ -198,6 +208,7 @@ class ThermalColumns:
         self._flash, self._highest = map(float, saved["temperatures"])
         self._force, (warmed, self._area, self._share) = np.array(saved["force"]), map(float, saved["state"])
         self._warmed, self._depths = bool(warmed), Depths(*np.split(np.array(saved["depths"]), 2))
+        self._feed_back()
 
 
 def rise_of(effects: Mapping[str, Effect]) -> Array:

@@ -29,7 +29,7 @@ import numpy as np
 from ..parallel.slab import Array, Slab, allocate
 from . import loops
 from .entries import Entry, MapCount, Saved
-from .prony import Prony
+from .prony import Prony, coefficients, elapsed
 from .units import Units
 
 
@@ -43,20 +43,6 @@ class Heights:
     @property
     def parts(self) -> tuple[Array, int]:
         return self.base, self.offset
-
-
-def elapsed(prony: Prony, dt: float) -> Array:
-    """`z = dt/tau` of each branch, at most 1e100 so that nothing overflows."""
-    return np.asarray(dt / np.maximum(prony.relaxation_times, 1e-100 * dt))
-
-
-def coefficients(prony: Prony, integrator: str, dt: float) -> tuple[Array, Array]:
-    """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
-    z = elapsed(prony, dt)
-    if integrator == "backward-euler":
-        return 1.0 / (1.0 + z), prony.moduli / (1.0 + z)
-    phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)
-    return np.exp(-z), prony.moduli * phi
 
 
 Advance = tuple[Array, Array]  # decay and gain of the branches that have a map
@@ -179,6 +165,7 @@ class ZenerBody:
         frozen: Collection[int] = (),
     ) -> None:
         self.slab, self.prony, self.integrator = slab, prony, integrator
+        self._cold = prony.relaxation_times
         numbers = range(len(prony.moduli))
         self.kept = [k for k in numbers if k not in memoryless and k not in frozen]
         self.moving = [k for k in numbers if k not in frozen]
@@ -196,6 +183,11 @@ class ZenerBody:
     def branched(self) -> "ZenerBody":
         """The body as one that has branches."""
         return self
+
+    def warm(self, factor: float) -> None:
+        """Relax from now on with so many times the relaxation times that it was made with."""
+        self.prony = self.prony._replace(relaxation_times=self._cold * factor)
+        self._coefficients = None
 
     def elapsed(self, dt: float) -> Array:
         """Return `z = dt/tau` of each branch."""
@@ -264,7 +256,7 @@ class ZenerBody:
         return {
             **self.memory_entries(memory, units.height, "m", units.modulus * units.height, "Pa m"),
             "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),
-            "relaxation times": Entry(self.prony.relaxation_times, 1.0, "s", given=True),
+            "relaxation times": Entry(self._cold, 1.0, "s", given=True),
         }
 
     def memory_entries(

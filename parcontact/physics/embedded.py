@@ -18,7 +18,8 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .body import BodyMemory, Trial, ZenerBody, coefficients, surface_of
+from .body import BodyMemory, Trial, ZenerBody, surface_of
+from .prony import coefficients
 
 SAMPLED_ROWS = 8  # accuracy: at least, if a map has as many: the difference is then within 5 % of that on all rows
 LEAST_VARIANCE = 1e-6  # accuracy: of heights, over their mean square: less is rounding

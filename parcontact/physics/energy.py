@@ -85,6 +85,8 @@ def bend_weights(z: Array) -> tuple[Array, Array]:
 class ElasticEnergy:
     """Energies of a body without memory: all work is stored. `unit` [J] is that of all energies here."""
 
+    bodies: tuple[ZenerBody, ...] = ()  # that relax
+
     def __init__(self, slab: Slab, unit: float = 1.0) -> None:
         self.slab, self.unit = slab, unit
 
@@ -180,6 +182,7 @@ class ZenerEnergy:
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
     ) -> None:
         self.slab, self.material, self.inverse, self.unit = slab, material, inverse, unit
+        self.bodies = (inverse.body,) if isinstance(inverse, ElasticPressure) else ()
 
     def at_rest(self) -> EnergyMemory:
         """Return the energies of a body into which nothing has been pressed."""

@@ -47,8 +47,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..parallel.slab import Array
-from .body import coefficients
-from .prony import Integrator, Prony, complex_modulus, relaxation
+from .prony import Integrator, Prony, coefficients, complex_modulus, relaxation
 
 LENGTHS, DIRECTIONS = 13, 64  # accuracy: of a band that are looked at
 PER_DECADE = 4  # accuracy: lengths of growing steps that are looked at

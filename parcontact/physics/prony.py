@@ -147,6 +147,20 @@ def discrete_modulus(
     return np.asarray(spring + gains @ terms)
 
 
+def elapsed(prony: Prony, dt: float) -> Array:
+    """`z = dt/tau` of each branch, at most 1e100 so that nothing overflows."""
+    return np.asarray(dt / np.maximum(prony.relaxation_times, 1e-100 * dt))
+
+
+def coefficients(prony: Prony, integrator: str, dt: float) -> tuple[Array, Array]:
+    """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
+    z = elapsed(prony, dt)
+    if integrator == "backward-euler":
+        return 1.0 / (1.0 + z), prony.moduli / (1.0 + z)
+    phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)
+    return np.exp(-z), prony.moduli * phi
+
+
 def creep_spectrum(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> CreepSpectrum:
     """The creep compliance that belongs to a relaxation function, by partial fractions of 1/Gbar.
 

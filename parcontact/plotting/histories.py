@@ -16,6 +16,7 @@ from .run import Run
 
 EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
 FEW_ROWS = 8
+FLASH = "flash_temperature"
 VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
@@ -91,6 +92,12 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
         ("gap", Axis("mean gap", UNITS["mean_gap"]), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
         ("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": columns["max_pressure"]}, True),
         ("load", load_axis, {"": load}, run.lasts and np.ptp(load) > 1e-9 * np.abs(load).max()),
+        (
+            "temperature",
+            Axis("temperature rise", "K"),
+            {"flash": columns.get(FLASH, np.zeros(1)), "highest": columns.get("max_temperature", np.zeros(1))},
+            FLASH in columns,
+        ),
         (
             "energy",
             Axis("energy", UNITS["work"]),

@@ -34,6 +34,7 @@ LOOKS = {
     "gap": Look("m", "Blues_r", "k", " (contact black)"),
     "displacement": Look("m", "viridis"),
     "height": Look("m", "cividis", note=" (up is into the body)"),
+    "temperature": Look("K", "hot", note=" rise"),
 }
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
@@ -157,6 +158,11 @@ def _draw_line(
     return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
 
 
+def where(file: h5py.File, name: str) -> str:
+    """Return the data set of a map in a file, '' if there is none: temperatures of states are there under two names."""
+    return next((key for key in (f"{name}_map", name) if key in file and file[key].ndim > 1), "")
+
+
 def draw_frames(
     file: h5py.File, name: str, labels: Mapping[int, str], size: tuple[float, float] = (4.5, 4.0), dpi: int = 110
 ) -> Iterator[Image.Image]:
@@ -164,7 +170,7 @@ def draw_frames(
 
     def read(index: int) -> Array:
         pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
-        return mask(name, file[name][index], pressure)
+        return mask(name, file[where(file, name)][index], pressure)
 
     ranges = [find_range(read(index)) for index in labels]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)

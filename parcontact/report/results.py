@@ -148,7 +148,7 @@ def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> li
     try:
         with h5py.File(path, "r", locking=False) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
-            return [_browse_map(file, name, labels) for name in maps.LOOKS if name in file and labels]
+            return [_browse_map(file, name, labels) for name in maps.LOOKS if maps.where(file, name) and labels]
     except hdf5.FAILURES:
         return []
 

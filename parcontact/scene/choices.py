@@ -14,7 +14,7 @@ from ..effects.adhesion import law_of
 from ..effects.effect import Decision, Effect
 from ..effects.folded_branches import bands, phases
 from ..effects.interface import interface_of
-from ..effects.relaxation import relaxation_of, time_factor_of
+from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
@@ -86,13 +86,13 @@ class Choices:
     @cached_property
     def folded(self) -> FoldedBranches:
         """The branches of the material that need a map, and those that do not (`physics.folding`)."""
-        if self.prony.moduli.size == 0:
-            return keep_all(self.prony, "the body has no branch")
+        if self.prony.moduli.size == 0 or feeds_back(self.job):
+            return keep_all(self.prony, "heat changes them" if self.prony.moduli.size else "the body has no branch")
         reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
-        allowed = 0.0 if reason else self.numerics.branch_error
         passing = list(phases(Timeline.of(self.job, self.until))), list(bands(self.grid, self.job.surface))
         start = self.job.initial.velocity if self.steady_start.on else None
+        allowed = 0.0 if reason else self.numerics.branch_error
         return replace(fold_branches(self.prony, *passing, self.numerics.integrator, allowed, start), reason=reason)
 
     @decided("viscoelasticity")

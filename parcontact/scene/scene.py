@@ -131,6 +131,15 @@ class Scene:
     def units(self) -> Units:
         return self.setup.units
 
+    def warm(self, factor: float) -> None:
+        """Let the body, its energies and its interface relax from now on with so many times the relaxation times of the
+        job's temperature, as an effect has found it."""
+        for body in (self.material.branched, *(() if self.energy is None else self.energy.bodies)):
+            if body is not None:
+                body.warm(factor)
+        if (own := self.choices.interface) is not None:
+            self.probe = replace(self.probe, interface=replace(own, shift=own.shift * factor))
+
     def constraint(self, alpha: float) -> Constraint:
         """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
         hardness = self.choices.hardness

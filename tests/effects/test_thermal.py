@@ -195,7 +195,8 @@ def test_a_restart_goes_on_bit_for_bit(shared_path: Path, comm: MPI.Intracomm) -
     grid = {"points": [16, 6], "size": [LENGTH, LENGTH / 2]}
     rest = {"pressure": PRESSURE, "duration": 1e-3, "time_step": 2e-4}
     history = [{**SLIDE, "distance": LENGTH / 4}, rest, {**SLIDE, "velocity": [0.1, 0.05], "distance": LENGTH / 4}]
-    made = march_data(grid=grid, interface=RUBS, surface=PARTIAL, history=history)
+    thermal = {**MEAN, "conductivity": 0.02}
+    made = march_data(grid=grid, interface=RUBS, surface=PARTIAL, history=history, material=WARMED, thermal=thermal)
     whole = Simulation(made, comm=comm)
     saved = []
     for row in whole.steps():
@@ -208,10 +209,25 @@ def test_a_restart_goes_on_bit_for_bit(shared_path: Path, comm: MPI.Intracomm) -
         again.run()
         assert np.array_equal(again.field("temperature"), whole.field("temperature"))
         assert again.row.flash_temperature == whole.row.flash_temperature
+        assert again.row.friction == whole.row.friction
     alone = Simulation.restore(shared_path / "7.h5", comm=MPI.COMM_SELF)
     alone.run()
     rows = alone.field("temperature")[whole.rows]
     assert np.abs(rows - whole.field("temperature")).max(initial=0.0) < 1e-9 * whole.row.max_temperature
+
+
+def test_a_march_of_rubber_that_warms_itself() -> None:
+    """After many steps its friction is that of rubber that had this temperature from the start, to the 1e-3 by which
+    the temperature still changes in the meantime; energies balance as without heat."""
+    thermal = {"conductivity": 0.02, "diffusivity": 1e-8, "feedback": "mean"}
+    own = {"surface": PARTIAL, "output": {"energy": True}, "history": [{**SLIDE, "velocity": 0.5}]}
+    warm = marched(march_data(material=WARMED, thermal=thermal, **own))[1][-1]
+    cold = marched(march_data(material=WARMED, **own))[1][-1]
+    hot = {**WARMED, "temperature": 20.0 + warm.added[0]}
+    found, anew = warm.measures.friction, marched(march_data(material=hot, **own))[1][-1].measures.friction
+    assert found == pytest.approx(anew, rel=1e-3)
+    assert abs(found / cold.measures.friction - 1.0) > 0.004
+    assert warm.work == pytest.approx(warm.stored + warm.dissipated, rel=1e-9)
 
 
 def test_a_step_costs_two_transforms_more() -> None:

@@ -6,9 +6,8 @@ import numba
 import numpy as np
 import pytest
 
-from parcontact.physics.body import coefficients
 from parcontact.physics.loops import begin, commit
-from parcontact.physics.prony import Integrator, Prony
+from parcontact.physics.prony import Integrator, Prony, coefficients
 
 from .histories import drift, drifts
 
