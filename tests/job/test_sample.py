@@ -47,8 +47,8 @@ def test_waves_have_no_seed() -> None:
 @pytest.mark.parametrize(
     ("changes", "start"),
     [
-        ({}, "0.0009 m of 0.00095 m"),  # 0.4 of the longest wave before the box is round
-        ({"velocity": [0.06, 0.08], "distance": 5.5e-3}, "0.0049 m of 0.0055 m"),  # 3 boxes along x, 4 along y
+        ({}, "0.0009 m of its 0.00095 m"),  # 0.4 of the longest wave before the box is round
+        ({"velocity": [0.06, 0.08], "distance": 5.5e-3}, "0.0049 m of its 0.0055 m"),  # 3 boxes along x, 4 along y
         ({"velocity": [0.06, 0.0799], "distance": 5.5e-3}, "0.0049 m"),
     ],
 )
@@ -78,4 +78,4 @@ def test_a_slide_that_meets_no_imprint(changes: dict[str, Any]) -> None:
 def test_stages_of_one_slide_count_together() -> None:
     half = ROUND | {"distance": 4.75e-4}
     (text,) = (text for text in job(history=[half, half | {"pressure": 2e4}]).warnings if "imprint" in text)
-    assert text.startswith("history.0: after 0.0009 m of 0.00095 m")
+    assert text.startswith("history.0: after 0.0009 m of its 0.00095 m")
