@@ -26,6 +26,7 @@ from . import sticking
 from .errors import Observations
 from .starts import Past, StartStatistics
 from .sticking import StickingMemory
+from .tolerance import StepTolerance, follows
 
 FURTHER = 2  # pressures before the earlier one that are kept for starts, of three and of four steps ago
 MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these
@@ -38,9 +39,9 @@ class State:
     `row` is what the step is recorded as. `pasts` are the last pressures, the newest first: a history of single solves
     keeps one, others two or more. `approach` is the d of the body, `body` and `energy` are their memories; `starts` and
     `looks` are what was learnt of starts and of the embedded pair, `errors` the sums of the error budget, `chosen` the
-    record of the steps that stages have chosen, which grows; `sticking` is the memory of a contact with adhesion. The
-    next pressure will be in the map `spare`. Effects that follow the steps keep what they remember themselves, as they
-    are told only of steps that were made.
+    record of the steps that stages have chosen, which grows; `sticking` is the memory of a contact with adhesion,
+    `tolerance` that of the tolerance of solves. The next pressure will be in the map `spare`. Effects that follow the
+    steps keep what they remember themselves, as they are told only of steps that were made.
 
     Two states share most maps, and the oldest ones of a state are spare in the next: a state can be used until a step
     begins from the one after it. Maps are in the run's units.
@@ -57,6 +58,7 @@ class State:
     errors: ErrorSums = field(default_factory=ErrorSums)
     chosen: ChosenSteps | None = None
     sticking: StickingMemory | None = None
+    tolerance: StepTolerance = field(default_factory=StepTolerance)
 
     @staticmethod
     def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
@@ -149,6 +151,8 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
         found |= state.observations.entries()
     if scene.choices.further_starts.on:
         found |= state.starts.entries()
+    if follows(scene):
+        found |= state.tolerance.entries()
     if state.sticking is not None:
         found |= prefixed("sticking", sticking.entries(state.sticking, scene.units.height, scene.units.modulus))
     return found | state.errors.entries()
@@ -188,6 +192,7 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         ErrorSums.restored(saved),
         None if state.chosen is None else ChosenSteps.of(scene.job, saved),
         None if state.sticking is None else sticking.restored(state.sticking, part_of("sticking", saved)),
+        StepTolerance.restored(saved),
     )
     return completed(scene, found)
 

@@ -77,6 +77,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         state.errors,
         state.chosen,
         None if solved.stuck is None else solved.stuck.memory,
+        state.tolerance.after(scene, contact, errors.budget),
     )
 
 
@@ -168,7 +169,7 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     if state.alpha == 0.0:  # nothing has been solved before
         on = partial(solver_on, scene.setup)
         cold_start.prepare(scene.solver, problem, state.spare, on)
-    contact, remark = scene.solver.solve(problem, state.spare), ""
+    contact, remark = scene.solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
     if contact.failure:
         contact, remark = _retry(scene, state, step, problem, contact)
     if step.passed:

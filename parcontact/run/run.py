@@ -11,7 +11,7 @@ from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
-from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
+from ..job.sections.calculation import BRANCH_SHARE
 from ..job.sections.listing import plain
 from ..march import loop
 from ..march.failure import StepError
@@ -237,7 +237,7 @@ def chosen_by_accuracy(job: Job) -> set[str]:
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
     stages = [stage for stage in lasting if stage.speed > 0.0] or lasting
     chosen = {
-        "solver": numerics.tolerance == TOLERANCE_SHARE * numerics.asked.strictest,
+        "solver": numerics.tolerance_is_chosen,
         "time": bool(stages) and all(stage.chooses for stage in stages),
         "folded": numerics.branch_error == BRANCH_SHARE * numerics.asked.strictest,
     }

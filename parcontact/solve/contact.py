@@ -132,16 +132,17 @@ class ContactSolver:
             cells += LongWavePreconditioner.footprint(nx, ny, ranks, rank, long_waves)
         return Workspace.footprint(nx, ny, tolerance, ranks, rank, kept) + cells
 
-    def solve(self, problem: Problem, start: Array, length: float = 1.0) -> Contact:
+    def solve(self, problem: Problem, start: Array, length: float = 1.0, tolerance: float | None = None) -> Contact:
         """Solve from the pressure `start`, which is admissible and in whose place the solution will be; collective.
 
         Under load control the start is scaled to the load, or uniform where it is zero everywhere. `length` is that of
-        a step over the usual one. A solve that does not reach the tolerance says why in `failure`; its maps are then
-        the last iterate, not a solution.
+        a step over the usual one; the `tolerance` is the solver's own unless it is given. A solve that does not reach
+        it says why in `failure`; its maps are then the last iterate, not a solution.
         """
         mean = problem.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
             return self._separate(problem, start)
+        tolerance = self.tolerance if tolerance is None else tolerance
         p, other = start, self.workspace.pressure
         iterate = self._begin(problem, p)
         best, slope, iteration = (np.inf, 0), 0.0, 0
@@ -149,7 +150,7 @@ class ContactSolver:
         while True:
             members, excess, certificate = self._certify(problem, p, iterate)
             best = min(best, (certificate.worst, iteration))
-            failure = self._verdict(certificate.worst, iteration, *best)
+            failure = self._verdict(certificate.worst, tolerance, iteration, *best)
             if failure is not None:
                 if p is not start:
                     start[...] = p
@@ -199,13 +200,13 @@ class ContactSolver:
         constraint, h, mean = problem.constraint, problem.heights, problem.mean
         return certify(self.slab, constraint, p, u, h, iterate, mean, self.height, working)
 
-    def _verdict(self, worst: float, iteration: int, best: float, best_at: int) -> str | None:
+    def _verdict(self, worst: float, tolerance: float, iteration: int, best: float, best_at: int) -> str | None:
         """None: go on; empty: solved; else what happened instead."""
-        if worst <= self.tolerance:
+        if worst <= tolerance:
             return ""
         if not np.isfinite(worst):
             return NOT_FINITE
-        asked = f"{worst:.3g} where {self.tolerance:.3g} was asked for"
+        asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
         if iteration - best_at >= MAX_STALLED_ITERATIONS:
             return f"stalled: no better certificate than {best:.3g} in {MAX_STALLED_ITERATIONS} iterations, now {asked}"
         if iteration >= self.max_iterations:

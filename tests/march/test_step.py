@@ -33,8 +33,8 @@ def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     """Solves that fail up to twice: how often is a matter of the contact, and so is the same when repeated."""
     solve, refused = ContactSolver.solve, [0]
 
-    def refuse(solver: ContactSolver, problem: Any, start: Any, length: float = 1.0) -> Contact:
-        contact = solve(solver, problem, start, length)
+    def refuse(solver: ContactSolver, problem: Any, start: Any, *more: Any, **named: Any) -> Contact:
+        contact = solve(solver, problem, start, *more, **named)
         if solver.slab.nx < GRID["points"][0]:
             return contact
         if refused[0] < solver.slab.sum(float(np.count_nonzero(contact.p)))[0] % 3:

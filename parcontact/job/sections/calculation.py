@@ -166,6 +166,11 @@ class Numerics(Part):
         return {"tolerance": TOLERANCE_SHARE * least, "branch_error": BRANCH_SHARE * least, **data}
 
     @property
+    def tolerance_is_chosen(self) -> bool:
+        """Whether the tolerance is that which belongs to the accuracy."""
+        return self.tolerance == TOLERANCE_SHARE * self.asked.strictest
+
+    @property
     def asked(self) -> Accuracy:
         """The accuracy of friction and of the area; a number is that of both."""
         if isinstance(self.accuracy, Accuracy):

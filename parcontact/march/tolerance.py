@@ -1,0 +1,81 @@
+"""The tolerance of a step's solve, from what the last steps have shown of the error that solves make.
+
+`numerics.tolerance` is chosen for the worst scene. Where `numerics.accuracy` has chosen it, solves of steps may have a
+larger one, such that the error of friction by the solver is SHARES of the accuracy that is asked for, and no more than
+what time steps, folded branches and mesh leave of it; where these make more than is asked for, SHARES of what they
+make. That of the area likewise. Errors go with the certificate that a solve has reached, and a mean over the last
+steps tells in which proportion. It is a power of the root of two times the job's tolerance, so that rounding has no
+part in it, and part of the state: a run goes on as if it had never stopped.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..history.timeline import Step
+from ..job.sections.calculation import Accuracy
+from ..physics.budget import ErrorBudget, Parts
+from ..physics.entries import Entry, Saved
+from ..scene import Scene
+from ..solve.contact import Contact
+
+SHARES = 0.1, 0.4  # accuracy: of the error of friction and of that of the area, for the solver; the latter is less by
+# half and more than is estimated
+MOST = 8.0  # accuracy: times the job's tolerance, at most
+LOOSEST = 0.05  # accuracy: the largest tolerance, with which single steps may be wrong by a few times the mean
+NEWEST = 0.25  # tuning: weight of the last step in the mean
+NAME = "contact/tolerance over that of the job"  # in a checkpoint
+
+
+@dataclass(frozen=True)
+class StepTolerance:
+    """Memory of the tolerance that steps may have over that of the job, the mean over the last ones of its logarithm
+    to the base 2."""
+
+    mean: float = 0.0
+
+    def of(self, scene: Scene, step: Step) -> float | None:
+        """Return the tolerance of the solve of a step, None where it is that of the job, as it is after a jump."""
+        if not follows(scene) or step.dt == 0.0:
+            return None
+        own = scene.choices.numerics.tolerance
+        return float(min(own * 2.0 ** (0.5 * round(2.0 * self.mean)), max(LOOSEST, own)))
+
+    def after(self, scene: Scene, contact: Contact, budget: ErrorBudget | None) -> "StepTolerance":
+        """Return the memory after a step."""
+        numerics, reached = scene.choices.numerics, contact.certificate.worst
+        if not follows(scene) or budget is None or reached <= 0.0:
+            return self
+        ratio = reached * _room(budget, numerics.asked) / numerics.tolerance
+        now = min(max(math.log2(ratio) if ratio > 0.0 else 0.0, 0.0), math.log2(MOST))
+        return StepTolerance(self.mean + NEWEST * (now - self.mean))
+
+    def entries(self) -> dict[str, Entry]:
+        """Return its entry; a checkpoint may lack it."""
+        return {NAME: Entry(np.array(self.mean), optional=True)}
+
+    @classmethod
+    def restored(cls, saved: Saved) -> "StepTolerance":
+        """Return the memory of a checkpoint; with one that has none all is to be learnt again."""
+        return cls(float(saved[NAME])) if NAME in saved else cls()
+
+
+def follows(scene: Scene) -> bool:
+    """Return whether the tolerance of steps follows the error budget: where `numerics.accuracy` has chosen that of the
+    job, and stages last. Contacts with adhesion are solved to that of the job."""
+    chosen = scene.choices
+    return chosen.numerics.tolerance_is_chosen and chosen.timeline.lasts and chosen.adhesion is None
+
+
+def _room(budget: ErrorBudget, asked: Accuracy) -> float:
+    """Return how many times the error by the solver may be; infinite where it makes none."""
+    parts = (budget.friction, asked.friction), (budget.area, asked.area)
+    both = zip(parts, SHARES, strict=True)
+    return min(_room_of(each, accuracy, share) for (each, accuracy), share in both if each is not None)
+
+
+def _room_of(parts: Parts, accuracy: float, share: float) -> float:
+    rest = parts.total - parts.solver
+    allowed = min(share * accuracy, accuracy - rest) if rest < accuracy else share * rest
+    return allowed / parts.solver if parts.solver > 0.0 else math.inf

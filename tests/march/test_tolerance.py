@@ -1,0 +1,104 @@
+"""The tolerance of steps, from the error budget: what it allows, what it saves, and that a restart changes nothing."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import begun, column, marched
+from mpi4py import MPI
+from sliding import rough, slide
+
+import parcontact as pc
+from parcontact.history.timeline import Step
+from parcontact.march.loop import March
+from parcontact.march.tolerance import MOST, SHARES, StepTolerance
+from parcontact.physics.budget import ErrorBudget, Parts
+from parcontact.solve.certificate import Certificate
+from parcontact.solve.contact import Contact
+
+CERTIFICATE = 1e-3
+STEPS = 40
+
+
+def job(**numerics: Any) -> dict[str, Any]:
+    """A short slide in quarters of a cell, whose starts are not the solution."""
+    return rough(128, [slide(128, STEPS // 4, cells_per_step=0.25)], numerics=numerics)
+
+
+def after(march: March, friction: Parts, area: Parts, so_far: StepTolerance | None = None) -> StepTolerance:
+    """The memory after many steps with such errors."""
+    nothing = np.zeros((0, 0))
+    contact = Contact(nothing, nothing, 0.0, Certificate(CERTIFICATE, 0.0, 0.0), 1, "")
+    memory = so_far or StepTolerance()
+    for _ in range(60):
+        memory = memory.after(march.scene, contact, ErrorBudget(friction, area))
+    return memory
+
+
+def step(march: March, number: int = 5) -> Step:
+    return march.timeline().span(number).step(number)
+
+
+@pytest.mark.parametrize(
+    ("rest", "allowed"),
+    [(0.0, 1e-3), (5e-3, 1e-3), (9.5e-3, 5e-4), (3e-2, 3e-3)],  # the rest of the error: none, half, nearly all, more
+)
+def test_what_friction_allows(rest: float, allowed: float) -> None:
+    """A tenth of 1 %, or what is left of it; a tenth of the rest where that is more. Errors go with the certificate."""
+    march = begun(job(accuracy=1e-2))
+    for error in (allowed / 11.5, allowed / 20.0, allowed / 23.0):  # at a certificate of a fifth of the tolerance
+        found = after(march, Parts(error, rest, 0.0, 0.0), Parts(0.0, 0.0, 0.0, 0.0)).of(march.scene, step(march))
+        assert found is not None
+        assert abs(np.log2(found / (CERTIFICATE * allowed / error))) <= 0.2501  # the nearest power of the root of two
+
+
+def test_bounds() -> None:
+    """Never smaller than the job's, nor more than so many times it, nor larger than what single steps bear."""
+    nothing, much = Parts(0.0, 0.0, 0.0, 0.0), Parts(1.0, 0.0, 0.0, 0.0)
+    for accuracy, highest in ((1e-3, MOST * 5e-4), (1e-2, MOST * 5e-3), (2e-2, 0.05), (0.5, 0.25)):
+        march = begun(job(accuracy=accuracy))
+        assert after(march, nothing, nothing).of(march.scene, step(march)) == pytest.approx(highest)
+        assert after(march, much, nothing).of(march.scene, step(march)) == pytest.approx(0.5 * accuracy)
+        area = Parts(SHARES[1] * accuracy, 0.0, 0.0, 0.0)  # as much as allowed, with that certificate
+        found = after(march, nothing, area).of(march.scene, step(march))
+        assert found == pytest.approx(max(0.5 * accuracy, CERTIFICATE))
+
+
+def test_where_it_is_the_jobs() -> None:
+    """A tolerance that is given stays, and a jump has that of the job."""
+    loose = StepTolerance(3.0)
+    march = begun(job(accuracy=1e-2))
+    jump = march.timeline().span(1).step(1)
+    assert jump.dt == 0.0
+    assert loose.of(march.scene, jump) is None
+    assert loose.of(begun(job(tolerance=4e-3)).scene, step(march)) is None
+
+
+def test_what_it_saves() -> None:
+    """A fifth of the operator calls and more; friction and area are those of a tight run, within what the solver was
+    allowed of the error of all. A tolerance next to the chosen one is given, and does not follow."""
+    _, tight = marched(job(tolerance=1e-7))
+    given, fixed = marched(job(tolerance=5.001e-3))
+    chosen, rows = marched(job())
+    calls, own = (sum(row.operator_calls for row in each[2:]) for each in (fixed, rows))
+    assert own <= 0.8 * calls
+    for name, share in zip(("friction", "contact_area_corrected"), SHARES, strict=True):
+        mean, exact = column(rows, name)[2:].mean(), column(tight, name)[2:].mean()
+        parts = getattr(chosen.state.errors, {"friction": "friction"}.get(name, "area"))
+        assert abs(mean / exact - 1.0) <= share * max(1e-2, parts.total)
+    assert given.state.tolerance == StepTolerance()
+
+
+def test_a_restart_goes_on_with_it(tmp_path: Path) -> None:
+    """The memory is saved: the same digits as without a stop."""
+    whole = pc.Simulation(job(), comm=MPI.COMM_SELF)
+    rows = [(row.friction, row.operator_calls) for row in whole.steps()]
+    run = pc.Simulation(job(), comm=MPI.COMM_SELF)
+    for row in run.steps():
+        if row.step == STEPS // 2:
+            break
+    run.save(tmp_path / "state.h5")
+    again = pc.Simulation.restore(tmp_path / "state.h5", comm=MPI.COMM_SELF)
+    rest = [(row.friction, row.operator_calls) for row in again.steps()]
+    assert rest == rows[-len(rest) :]
