@@ -20,7 +20,17 @@ from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
 WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the others to do so too
-LEAVE_FILES = {"run", "steady", "theory", "fit", "surface", "study", "plot", "report"}  # what they print is also there
+LEAVE_FILES = {
+    "run",
+    "steady",
+    "theory",
+    "fit",
+    "surface",
+    "study",
+    "plot",
+    "report",
+    "leak",
+}  # what they print is also there
 UNCOLLECTED_OBJECTS = 20_000  # that Python may make before it looks for cycles among them; imports make far more
 
 

@@ -1,6 +1,6 @@
 """Leakage of a run: the flow through the gaps that it has saved, as leak.csv and a picture."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -10,15 +10,15 @@ import numpy as np
 
 from .. import scene
 from ..errors import InputError
+from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
-from ..leakage.flow import Leak, Map, leak
+from ..leakage.flow import Flow, Leak, Map, leak, solve_flow
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import leakage
 from ..plotting.run import Fields, Run
 from ..storage import files, hdf5, tables
 
-TABLE, PICTURE = "leak.csv", "leak.png"
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
 
 
@@ -26,7 +26,7 @@ class Instant(NamedTuple):
     """One row of leak.csv.
 
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
-    touches; `constriction` [m] is the smallest gap on the widest path.
+    touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path.
     """
 
     time: float
@@ -47,8 +47,8 @@ class Gaps:
     def __init__(self, directory: Path, at: str = "") -> None:
         if not (directory / "measures.csv").is_file():
             raise InputError(f"{directory} is no output directory of a run; those of a sweep are in its cases/")
-        self.directory, self.job = directory, shown_job(directory / RESOLVED)
-        self.size, self.periodic = self.job.grid.size, self.job.grid.boundary == "periodic"
+        self.directory, grid = directory, shown_job(directory / RESOLVED).grid
+        self.size, self.periodic = grid.size, grid.boundary == "periodic"
         self.columns = tables.read(directory / "measures.csv")
         try:
             with self._open() as file:
@@ -65,21 +65,34 @@ class Gaps:
         return h5py.File(self.directory / "fields.h5", "r", locking=False)
 
     def read(self, index: int) -> Map:
-        """Return the gap [m] at a saved instant."""
+        """Return the gap [m] at a saved instant; raises InputError where it is not whole."""
         with self._open() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
+        if not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
+            step = int(self.fields.steps[index])
+            raise InputError(
+                f"{self.directory / 'fields.h5'}: the maps after step {step} have points that are no numbers"
+            )
         return np.where(pressure > 0.0, 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:
-        """Return the gap [m] of the undeformed surface that just touches; 0 where heights came from a file, which is
-        not read again and shows as flat."""
-        if any(part.shape == "flat" for part in self.job.surface):
-            return np.zeros(self.job.grid.points[::-1])
-        setup = scene.set_up(self.job, Slab(MPI.COMM_SELF, *self.job.grid.points))
+        """Return the gap [m] of the undeformed surface that just touches; raises InputError where its heights are not
+        there any more."""
+        job = reading.load(self.directory / RESOLVED)
+        setup = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
-    def row(self, index: int, found: Leak, bare: Leak) -> Instant:
+    def solve(self, index: int) -> tuple[Leak, list[Map]]:
+        """Return the flow at a saved instant, without its maps of pressure, and for both directions where it is."""
+        gap, flows, shown = self.read(index), list[Flow](), list[Map]()
+        for axis in ("x", "y"):
+            flow = solve_flow(gap, self.size, axis, self.periodic)
+            shown.append(leakage.flux(gap, flow.pressure, self.size))
+            flows.append(replace(flow, pressure=np.empty((0, 0))))
+        return Leak(*flows), shown
+
+    def row(self, index: int, found: Leak, bare: Leak | None) -> Instant:
         """Return the row of a saved instant."""
         rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
         row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in Instant._fields[1:3]}
@@ -92,38 +105,76 @@ class Gaps:
             int(found.along_x.percolates),
             int(found.along_y.percolates),
             found.constriction,
-            found.flow_x / bare.flow_x if bare.flow_x else np.nan,
-            found.flow_y / bare.flow_y if bare.flow_y else np.nan,
+            found.flow_x / bare.flow_x if bare and bare.flow_x else np.nan,
+            found.flow_y / bare.flow_y if bare and bare.flow_y else np.nan,
         )
 
 
 def write(directory: Path, at: str, comm: MPI.Intracomm) -> Iterator[str]:
-    """Solve for the flow of the saved instants, each on one rank, and write leak.csv and leak.png; collective.
+    """Solve for the flow of the saved instants, each on one rank, and write leak.csv and leak.png; of one instant
+    leak.STEP.csv and leak.STEP.png. Collective.
 
-    Returns, on root, what to say. Raises InputError for a directory without gaps.
+    Yields, on root, what to say. Raises InputError for a directory without gaps.
     """
     gaps = Gaps(directory, at)
     gaps.shown = comm.bcast(gaps.shown)  # a run that goes on may have saved more since another rank has looked
-    bare = leak(gaps.bare(), gaps.size, gaps.periodic) if comm.rank == 0 else None
-    mine = {index: leak(gaps.read(index), gaps.size, gaps.periodic) for index in gaps.shown[comm.rank :: comm.size]}
-    drawn = max((index for index, one in mine.items() if one.constriction > 0.0), default=-1)
-    drawn = comm.allreduce(drawn, MPI.MAX)
-    drawn = gaps.shown[-1] if drawn < 0 else drawn
-    found = comm.gather({index: one if index == drawn else _without_maps(one) for index, one in mine.items()})
-    if found is None or bare is None:
+    leaks, drawn, maps = _solve_all(gaps, comm)
+    if comm.rank > 0:
         return
-    leaks = {index: one for part in found for index, one in part.items()}
+    bare, missing = _bare_flow(gaps)
     rows = [gaps.row(index, leaks[index], bare) for index in gaps.shown]
-    lines = [",".join(Instant._fields), *(",".join(repr(value) for value in row) for row in rows)]
-    files.write(directory / TABLE, "\n".join(lines) + "\n")
-    run = Run(directory)
-    instant = run.instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
-    picture = leakage.draw(directory / PICTURE, gaps.size, gaps.read(drawn), leaks[drawn], instant, rows)
-    yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {directory / TABLE}"
+    lines = [",".join(Instant._fields), *(",".join(_cell(value) for value in row) for row in rows)]
+    name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
+    table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
+    files.write(table, "\n".join(lines) + "\n")
+    instant = Run(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
+    leakage.draw(
+        picture, gaps.size, gaps.read(drawn), (leaks[drawn].along_x, leaks[drawn].along_y), maps, instant, rows
+    )
+    yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
+    yield from (_describe_closure(rows, axis) for axis in "xy")
+    if missing:
+        yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
     yield f"picture: {picture}"
 
 
-def _without_maps(found: Leak) -> Leak:
-    """Return a flow without its maps of pressure, which only the picture needs."""
-    none = np.empty((0, 0))
-    return Leak(replace(found.along_x, pressure=none), replace(found.along_y, pressure=none))
+def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Leak], int, list[Map]]:
+    """Return, on root, the flow at all instants, the one to draw and its maps: the last that has a flow in both
+    directions, or else in one; collective."""
+    mine, drawn, maps, problem = dict[int, Leak](), (-1, -1), list[Map](), ""
+    try:
+        for index in gaps.shown[comm.rank :: comm.size]:
+            mine[index], found = gaps.solve(index)
+            directions = mine[index].along_x.percolates + mine[index].along_y.percolates
+            if (directions, index) > drawn:
+                drawn, maps = (directions, index), found
+    except (InputError, *hdf5.FAILURES) as error:
+        problem = str(error)
+    if problems := [text for text in comm.allgather(problem) if text]:
+        raise InputError(problems[0])
+    chosen = max(comm.allgather(drawn))
+    parts = comm.gather((mine, maps if drawn == chosen else [])) or []
+    leaks = {index: one for part, _ in parts for index, one in part.items()}
+    return leaks, chosen[1], next((found for _, found in parts if found), [])
+
+
+def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
+    """Return the flow of the undeformed surface that just touches, or None and why there is none."""
+    try:
+        return leak(gaps.bare(), gaps.size, gaps.periodic), ""
+    except (InputError, OSError) as error:
+        return None, " ".join(str(error).split())
+
+
+def _describe_closure(rows: Sequence[Instant], axis: str) -> str:
+    """Say from which instant on contact closes the gap along an axis."""
+    closed = [not getattr(row, f"percolates_{axis}") for row in rows]
+    if not any(closed):
+        return f"along {axis}: open at all instants"
+    first = rows[closed.index(True)]
+    where = f"{first.pressure:.4g} Pa, {first.contact_area:.3g} of the area in contact, at {first.time:g} s"
+    return f"along {axis}: closed at {sum(closed)} of {len(rows)} instants, first at {where}"
+
+
+def _cell(value: float) -> str:
+    return "" if value != value else repr(value)

@@ -121,7 +121,7 @@ def describe_directory(directory: Path) -> tuple[str, bool]:
     if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
         raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
     lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
-    for part in (_chosen_mesh, _run, _theory, _curve, _saved_states, _saved_maps, _sweep, _study):
+    for part in (_chosen_mesh, _run, _theory, _curve, _saved_states, _saved_maps, _leakage, _sweep, _study):
         try:
             lines += part(directory, claims)
         except InputError as error:
@@ -221,6 +221,14 @@ def _saved_maps(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
             layout = fields.SavedFields(file)
         saved = np.isfinite(layout.times).sum()
         yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
+
+
+def _leakage(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    path = directory / "leak.csv"
+    if path.exists():
+        columns = tables.read(path)
+        closed = ", ".join(f"closed along {axis} at {columns[f'percolates_{axis}'].count(0.0)}" for axis in "xy")
+        yield f"  leakage: leak.csv, {len(columns['time'])} instants, {closed} of them"
 
 
 def _sweep(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -77,9 +78,14 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
 
 
 def test_one_instant(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """It has files of its own, after its step, and leaves those of the whole run as they are."""
     out = run(comm, shared_path, leakage=None)
+    assert __main__.main(["leak", str(out)]) == 0
+    whole = (out / "leak.csv").read_bytes(), (out / "leak.png").read_bytes()
     assert __main__.main(["leak", str(out), "--at", "0.5"]) == 0
-    assert [float(row["time"]) for row in table(out / "leak.csv")] == [0.5]
+    assert [float(row["time"]) for row in table(out / "leak.3.csv")] == [0.5]
+    assert (out / "leak.3.png").is_file()
+    assert whole == ((out / "leak.csv").read_bytes(), (out / "leak.png").read_bytes())
     assert "flow_x" not in table(out / "measures.csv")[0]
 
 
@@ -95,6 +101,44 @@ def test_gap_and_pressure_must_have_been_saved(
 def test_what_is_no_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert __main__.main(["leak", str(tmp_path)]) == 2
     assert "is no output directory of a run; those of a sweep are in its cases/" in capsys.readouterr().err
+
+
+def saved_heights(where: Path) -> Path:
+    x = (np.arange(POINTS) + 0.5) / POINTS
+    np.save(where / "heights.npy", 1e-6 * np.cos(8 * np.pi * x) * np.cos(4 * np.pi * x)[:, None])
+    return where / "heights.npy"
+
+
+def test_shares_of_measured_heights(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """K over that of the heights that just touch; without the file the shares are empty, and it is said why."""
+    path = saved_heights(tmp_path)
+    out = run(MPI.COMM_SELF, tmp_path, leakage=None, surface={"shape": "file", "path": str(path)})
+    assert __main__.main(["leak", str(out)]) == 0
+    heights = np.load(path)
+    touching = pc.leak(heights.max() - heights, (1e-3, 1e-3))
+    for row in table(out / "leak.csv"):
+        for axis, bare in (("x", touching.flow_x), ("y", touching.flow_y)):
+            assert float(row[f"share_{axis}"]) == pytest.approx(float(row[f"flow_{axis}"]) / bare, rel=1e-6)
+    path.unlink()
+    capsys.readouterr()
+    assert __main__.main(["leak", str(out)]) == 0
+    assert "share_x and share_y are left empty" in capsys.readouterr().out
+    assert {row["share_x"] for row in table(out / "leak.csv")} == {""}
+
+
+@pytest.mark.mpi
+def test_a_gap_that_is_no_number_is_refused_by_all_ranks(
+    comm: MPI.Intracomm, shared_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = run(comm, shared_path, leakage=None)
+    if comm.rank == 0:
+        with h5py.File(out / "fields.h5", "r+") as file:
+            file["gap"][1, 3, 4] = np.nan
+    comm.Barrier()
+    assert __main__.main(["leak", str(out)]) == 2
+    told = capsys.readouterr().err
+    assert comm.rank > 0 or "maps after step 2 have points that are no numbers" in told
+    assert not (out / "leak.csv").exists()
 
 
 def test_random_contacts_close_at_about_42_percent() -> None:
