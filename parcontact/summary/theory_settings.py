@@ -30,9 +30,6 @@ class TheorySettings(NamedTuple):
     gamma: float
     waves: str
 
-    def __str__(self) -> str:
-        return f"γ = {self.gamma:g}, {self.waves}"
-
     @property
     def sentence(self) -> str:
         """The settings in words."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import parcontact as pc
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.rubber import compound, sane, tables
@@ -214,3 +215,9 @@ def test_temperatures_beyond_the_measured_ones() -> None:
     assert text.startswith("material: -60, -40, 120 C is beyond the -20 to 60 C")
     (own,) = describe_beyond(rubber(0.1, band=None, temperature=80.0))
     assert own.startswith("material: 80 C is beyond")
+
+
+def test_a_curve_from_python_warns_at_its_own_temperatures() -> None:
+    """They are not those of the job, whose material has its reference."""
+    with pytest.warns(UserWarning, match="material: -40 C is beyond the -20 to 60 C of its measurement"):
+        pc.steady(rubber(0.1, band=None), velocities=[0.1], pressures=[1e4], temperatures=[-40.0])
