@@ -58,7 +58,10 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
     theory_settings.write(out, theory_settings.TheorySettings(0.5, "lattice"))
     plots.plot([out])
-    assert drawn[1].get_suptitle().splitlines()[-1] == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
+    assert (
+        drawn[1].get_suptitle().splitlines()[-1]
+        == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
+    )
 
 
 def test_a_directory_above_that_of_a_run(tmp_path: Path) -> None:

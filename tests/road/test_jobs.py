@@ -209,6 +209,9 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     assert matplotlib.image.imread(road / "road-surface.png").ndim == 3
     found = jobs.load(road / "start/job.yaml")
     assert (found.grid.points, found.grid.size) == ((POINTS, POINTS), (LENGTH, LENGTH))
+    written = (road / "start/job.yaml").read_text()
+    for line in (f"points: [{POINTS}, {POINTS}]", "detrend: tilt", "periodic: smooth", "accuracy: 0.01"):
+        assert line in written
     assert main(*words, "--job", "start/job.yaml")[0] == 2
     code, _, err = main("surface", "road.npy")
     assert code == 2

@@ -36,6 +36,13 @@ def test_noisy_sets_at_five_temperatures(tmp_path: Path) -> None:
     assert 0.017 < made.series.scatter < 0.023  # the noise, as 200 numbers know it
 
 
+def test_no_branch_is_negligible() -> None:
+    """A branch of 1e-5 of the storage modulus at its frequency is left out, one of 1e-2 is not."""
+    times = np.array([1e-3, 1e-2])
+    left = [series._negligible(np.array([9e6, share * 1e6]), times, 1e6)[1] < share * 1e6 for share in (1e-5, 1e-2)]
+    assert left == [False, True]
+
+
 def test_fewer_branches_are_worse(tmp_path: Path) -> None:
     """The error asked for is met, by fewer branches the larger it is."""
     path = measured.write_sweeps(tmp_path / "rubber.csv")
