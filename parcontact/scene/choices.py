@@ -202,7 +202,7 @@ class Choices:
 
     # -- the solver ---------------------------------------------------------------------------------------------------
 
-    @decided("mixed precision")
+    @decided("preconditioner in single precision")
     def mixed_precision(self) -> Verdict:
         """A preconditioner in single precision, with transforms of its own, which costs no iteration."""
         if self.adhesion is not None:

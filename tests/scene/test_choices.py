@@ -87,7 +87,7 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
         {"history": [PRESS], "material": RUBBER, "numerics": {"kernel": "love"}, "output": {"energy": True}},
         {"allreduce": 5, "map bytes": 3 * MAP},
     ),
-    "mixed precision": (
+    "preconditioner in single precision": (
         {},
         {"numerics": {"precision": "mixed"}},
         None,
@@ -125,7 +125,7 @@ def test_energy_of_a_body_with_memory() -> None:
 
 def test_mixed_precision() -> None:
     """Off: no transform in single precision."""
-    off, on, _ = ROWS["mixed precision"]
+    off, on, _ = ROWS["preconditioner in single precision"]
     assert [name for name in whole(job(**off)) if name.startswith("fft ")] == [TRANSFORM]
     assert whole(job(**on))[f"fft {NX}x{NY} float32"] == 2 * ITERATIONS
 
@@ -143,7 +143,7 @@ def test_preconditioner_of_loose_solves(changes: Json, on: bool) -> None:
     """In single precision beside double, unless energies take it for the inverse of the operator."""
     numerics = {key: value for key, value in changes.items() if key != "energy"}
     planned = job(history=[PRESS], material=RUBBER, numerics=numerics, output={"energy": "energy" in changes})
-    assert row(planned, "mixed precision").on == on
+    assert row(planned, "preconditioner in single precision").on == on
 
 
 def test_single_operator(monkeypatch: pytest.MonkeyPatch) -> None:
