@@ -26,7 +26,6 @@ from ..solve.problem import Approach, MeanPressure
 from .starts import cells_moved
 from .sticking_energies import NO_ENERGIES, PathWork, StickingEnergies
 
-MANY_ITERATIONS = 15  # tuning: of a solve that is near a snap, or starts far away
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
 PART_TOLERANCE = 0.05  # tuning: of the parts of a step but for the last
@@ -117,8 +116,8 @@ class Path:
 def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: Path, pressure: Array) -> StuckContact:
     """Solve a step from the memory of the one before, with its pressure in a map; collective.
 
-    A jump goes along its path in parts, and so does a step that takes many iterations, so that it does not pass over an
-    equilibrium on its way. Where shorter parts are of no help the contact snaps, or comes off.
+    A jump goes along its path in parts, so that it does not pass over an equilibrium on its way, and so does a step
+    that is not solved at once, or comes off. Where shorter parts are of no help that stands.
     """
     law, gap, lag = scene.law(trial.alpha), memory.spare, memory.lag
     assert scene.sticking is not None
@@ -126,7 +125,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     if lag is not None and memory.modulus:
         lag *= memory.modulus / trial.alpha
     whole = JUMP_STRIDE if step.jump else 1.0
-    now_known, pulls = memory.pasts[0].known, isinstance(path.control, MeanPressure)
+    now_known = memory.pasts[0].known
     _start(scene, memory, step, trial, path, gap, still=step.jump)
     reached, stride, iterations, began, snapped = 0.0, whole, 0, memory.held, False
     work = PathWork(scene, path.approach, path.pressure)
@@ -135,7 +134,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
         loose = 1.0 if share == 1.0 else max(1.0, PART_TOLERANCE / scene.choices.numerics.tolerance)
         contact, detached = scene.sticking.solve(law, trial.effective, path.at(share), gap, lag, pressure, loose)
         iterations += contact.iterations
-        hard = detached or (pulls and contact.iterations > MANY_ITERATIONS) or (bool(contact.failure) and share == 1.0)
+        hard = detached or (bool(contact.failure) and share == 1.0)
         if hard and stride > LEAST_STRIDE * whole:
             if reached == 0.0:
                 _start(scene, memory, step, trial, path, gap, still=True)
@@ -147,8 +146,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
         snapped |= hard and now_known
         if detached or share == 1.0:
             break
-        easy = contact.iterations <= MANY_ITERATIONS // 3
-        reached, stride = share, min((1.0 + easy) * stride, whole)
+        reached = share
         began[...] = gap
     contact = replace(contact, iterations=iterations)
     pasts = PastGap(gap, step.position, True), memory.pasts[0]

@@ -135,7 +135,7 @@ def test_pull_off_of_a_punch() -> None:
     for cells in (10, 20, 40):
         points, size = 3 * cells, 3 * radius
         x = (np.arange(points) + 0.5) / points * size - size / 2
-        job = sphere(points, size / UNLOADED, 1, {"approach": 2e-7}, ramp(2e-7, -4e-6, 42))
+        job = sphere(points, size / UNLOADED, 1, {"approach": 2e-7}, {"approach": -1.9e-6}, ramp(-1.9e-6, -2.7e-6, 40))
         heights = np.where(x[:, None] ** 2 + x**2 <= radius**2, 0.0, -4e-6)
         job |= {"surface": {"shape": "array", "heights": heights}}
         job["adhesion"]["range"] = float(np.sqrt(2 * size / points * WORK / MODULUS))

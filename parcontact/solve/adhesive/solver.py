@@ -40,7 +40,7 @@ from ..iterate import LEAST_SHARE
 from ..problem import Approach, MeanPressure, Operator
 from . import kernels
 
-LEAST_CURVATURE = 0.1  # tuning: of the elastic one: with less the majorized step is made
+LEAST_CURVATURE = 0.02  # tuning: of the elastic one: with less the majorized step is made
 LONGEST_STRIDE = 64.0  # tuning: of majorized steps that follow each other, as where a contact snaps
 MAX_HALVINGS = 12  # of a step that raises E
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of the terms of a change of E
@@ -48,6 +48,7 @@ MAX_STALLED_ITERATIONS = 120  # iterations without a better certificate after wh
 SHARPER = 10.0  # accuracy: times the certificate of contacts that do not stick: with it the load is as right as theirs
 LEAST_TRACTION = 1e-3  # accuracy: of the strength of a point: pressures that add up to less are none
 LEAST_DESCENT = 0.1  # tuning: over that without the last direction: with less it is forgotten
+HELD = 0.5  # accuracy: of a load that pulls: all points being open, with less attraction than that nothing holds
 FAR = 4.0  # accuracy: times the range, by which all points are open where nothing holds any more
 
 
@@ -138,7 +139,9 @@ class GapSolver:
             if stuck > 1:  # even where z points across a bound, c does not
                 z[...] = self._c
             slope, scale = self._turn(it, members, scale)
-            step = self._step(it, g, slope)
+            step, stable = self._step(it, g, slope)
+            if not stable:  # on its way from one equilibrium to another, where certificates rise first
+                best = (math.inf, iteration)
             if self._descend(it, g, step, other):
                 g, other, stuck = other, g, 0
             else:
@@ -187,8 +190,10 @@ class GapSolver:
             it.m -= total / members
             kernels.centre(working, total / members, self._c)
         it.d = self.operators.mean * it.m - it.mean_gap - it.mean_height
-        pulled = isinstance(it.control, MeanPressure) and attraction / self.slab.points + it.m < 0.0
-        return members, pulled and -least > FAR * law.range
+        if not isinstance(it.control, MeanPressure) or -least <= 0.0:
+            return members, False
+        held = attraction / self.slab.points  # with all points open it only falls from here on
+        return members, held < HELD * -it.m or (held < -it.m and -least > FAR * law.range)
 
     def _lowest(self, it: _Iterate, g: Array) -> float:
         """The least uniform pressure that holds full contact; collective."""
@@ -238,8 +243,8 @@ class GapSolver:
         kernels.turn(self._working, z, beta, mean, self._t)
         return c_z + beta * c_t, c_z
 
-    def _step(self, it: _Iterate, g: Array, slope: float) -> float:
-        """The step of Newton, or the majorized one; leaves `K t` in the image; collective."""
+    def _step(self, it: _Iterate, g: Array, slope: float) -> tuple[float, bool]:
+        """The step of Newton, or the majorized one, and whether it is the former; `K t` is in its map; collective."""
         self.operators.inverse.apply(self._t, self._image)
         stiff, soft, total = self.slab.sum(*kernels.curvature(*it.law, g, self._t, self._image))
         mean, points = total / self.slab.points, self.slab.points
@@ -250,10 +255,10 @@ class GapSolver:
         true = stiff - points * mean**2 / self.operators.least_mean + own - soft
         if true > LEAST_CURVATURE * stiff:
             it.stride = 1.0
-            return slope / true
+            return slope / true, True
         step = it.stride * slope / stiff if stiff > 0.0 else 0.0
         it.stride = min(2.0 * it.stride, LONGEST_STRIDE)
-        return step
+        return step, False
 
     def _descend(self, it: _Iterate, g: Array, step: float, out: Array) -> bool:
         """Make the step, or a shorter one, to the gap `out` and its pressure; returns whether any lowers E;
