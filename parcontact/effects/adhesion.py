@@ -85,7 +85,7 @@ def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any) -> It
     if float(adhesion.range) < least * (1.0 - SAME):
         sentence = (
             f"must be at least {least:.3g} m for a viscoelastic body on cells of {cell:.3g} m, got {adhesion.range:g}: "
-            f"with less the mesh holds edges of contact fast, and rates mean nothing"
+            f"with less the mesh pins the edges of contact, and the rate of pulling has no meaning"
         )
         yield Fault(sentence, ("adhesion", "range"))
 
@@ -106,7 +106,7 @@ def _facts(job: Any) -> Iterator[str]:
     zone = law.process_zone(modulus)
     yield (
         f"adhesion: range {law.range:.4g} m, strength {law.strength:.4g} Pa, process zone l = {zone:.4g} m, "
-        f"cell h = {cell / zone:.3g} l; rates scale with l: what counts is velocity times relaxation time over l"
+        f"cell h = {cell / zone:.3g} l; what counts of a rate is velocity times relaxation time over l"
     )
     at_once = float(2.0 * job.material.instant_modulus / (1.0 - job.material.poisson))
     for index, shape in enumerate(job.surface):
@@ -164,7 +164,7 @@ class AdhesionColumns:
         if 0.0 < zone < cell * (1.0 - SAME):
             yield (
                 f"adhesion: a cell, {cell:.3g} m, is {cell / zone:.2g} times as long as the process zone, and the "
-                f"forces at edges of contact are not resolved: at 1.2 times pull-off is wrong by 2 %, at 2.7 times by "
+                f"forces at edges of contact are not resolved: 1.2 times makes pull-off wrong by 2 %, 2.7 times by "
                 f"12 %; use a range of {least:.3g} m or more, or cells of {zone:.3g} m"
             )
 
