@@ -42,6 +42,7 @@ SMALL = {
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
+    "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*[1-9]\d+ steps"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),
     "screenshots": Small(["nowhere"], r"^no screenshots: "),  # more: test_screenshots.py, where there is chromium
     "steady_table": Small(["128"], r"(?m)^[0-2] are off", (0, 1)),  # at 512 points none is
