@@ -101,5 +101,6 @@ def test_friction_of_rubber_that_warms_itself() -> None:
     top = int(np.argmax(simulated))
     assert np.all(np.diff(simulated[: top + 1]) > 0.0)
     assert np.all(np.diff(simulated[top:]) < 0.0)
-    assert np.all(simulated[rising] < friction[rising])
+    below = highest(friction) > SPEEDS
+    assert np.all(simulated[below] <= friction[below])
     assert max(point.rounds for point in warm) <= 10
