@@ -172,3 +172,12 @@ def test_without_load_the_surface_just_touches(boundary: str) -> None:
     after = march.row.measures
     assert np.allclose(march.field("gap"), gaps, rtol=0.0, atol=1e-9 * height)
     assert (before.approach, before.mean_gap) == pytest.approx((after.approach, after.mean_gap), rel=1e-9)
+
+
+def test_at_first_the_highest_point_just_touches(tmp_path: Path) -> None:
+    """Heights that a file gives above some level: to touch at their highest point, the level is that far away."""
+    heights = 5e-6 + 1e-6 * np.random.default_rng(3).random((32, 32))
+    np.save(tmp_path / "heights.npy", heights)
+    march = begun(job(ELASTIC, STANDS, surface={"shape": "file", "path": str(tmp_path / "heights.npy")}))
+    assert march.row.measures.approach == pytest.approx(-heights.max(), rel=1e-12)
+    assert march.row.measures.mean_gap == pytest.approx(heights.max() - heights.mean(), rel=1e-12)

@@ -20,7 +20,6 @@ from parcontact.march.loop import March, run
 from parcontact.physics.convolution import Convolution, MirroredConvolution
 from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
-from parcontact.solve.fallback import active_set
 
 GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
 
@@ -286,24 +285,4 @@ def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
     march = begun(data | {"numerics": numerics})
     march.scene.motion.at((0.0, 0.0)).base[0, 0] = np.nan
     with pytest.raises(StepError, match="not finite"):
-        run(march, [])
-
-
-def test_what_a_retry_leaves_unconverged_is_not_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A job takes a solve as it ends. Where that is not finite, retries must solve it."""
-    solve, made = ContactSolver.solve, list[Contact]()
-
-    def refuse(solver: ContactSolver, *given: Any, **more: Any) -> Contact:
-        contact = solve(solver, *given, **more)
-        if solver.slab.nx < GRID["points"][0]:
-            return contact
-        certificate = contact.certificate if made else replace(contact.certificate, penetration=np.nan)
-        made.append(replace(contact, failure="is refused", certificate=certificate))
-        return made[-1]
-
-    data = {"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [{"pressure": 1e4}]}
-    march = begun(data | {"numerics": {"accept_unconverged": True}})
-    monkeypatch.setattr(ContactSolver, "solve", refuse)
-    monkeypatch.setattr(active_set, "solve", lambda *_: made[-1])
-    with pytest.raises(StepError, match="is refused"):
         run(march, [])
