@@ -34,6 +34,7 @@ SMALL = {
     "error_coverage": Small(
         ["--scenes", "2", "--from", "13"], r"(?s)first half: 2 \| both .*2 scenes, .*written: ", (0, 1)
     ),
+    "heat_spread": Small(["--speeds", "1", "--points", "64"], r"(?m)^ +1 +[23]\d\.\d\d +[23]"),
     "faults": Small(
         ["--kinds", "kill,damage", "--trials", "2", "--flips", "4", "--shorter", "12"], r"2 made: 0 with faults; "
     ),
