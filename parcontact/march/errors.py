@@ -99,7 +99,8 @@ class Solved:
     """A step that has been solved: its contact, what it measures and the memory of the body after it.
 
     `remark` says what was unusual about it; `moved_start` whether its start was a pressure of whole cells ago, None
-    where there was no choice; `stuck` is what a contact with adhesion has besides.
+    where there was no choice; `stuck` is what a contact with adhesion has besides; `rounding` tells whether the solve
+    needed double precision (`march.rounding`).
     """
 
     step: Step
@@ -110,6 +111,7 @@ class Solved:
     remark: str = ""
     moved_start: bool | None = None
     stuck: StuckContact | None = None
+    rounding: float = 0.0
 
 
 def estimate_errors(scene: Scene, observations: Observations, solved: Solved) -> Estimate:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..errors import RunError
 from ..history.timeline import Step
@@ -60,7 +61,7 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
     if not np.isfinite(last.certificate.worst):
         yield FINITE
         return
-    reach = _reach(scene, last, h)
+    reach = reach_of(scene, last, h, last.u.dtype)
     if numerics.tolerance < reach:
         yield f"{numerics.precision} precision reaches only about {reach:.1g} here: try a larger numerics.tolerance"
         return
@@ -73,12 +74,12 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
     yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
 
 
-def _reach(scene: Scene, last: Contact, h: Array) -> float:
-    """Return the certificate that the rounding of heights, displacements and pressures allows; collective.
+def reach_of(scene: Scene, last: Contact, h: Array, dtype: DTypeLike) -> float:
+    """Return the certificate that the rounding of heights, displacements and pressures of a type allows; collective.
 
     A pressure p that is wrong in its last digit moves the body by that digit of `p (1 - nu) L/(2 pi)` in a wave as long
     as the box: a load far beyond full contact has no digits left for what differs from its mean.
     """
     sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
     sizes[2] *= scene.setup.half_space.largest_compliance
-    return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / last.certificate.length
+    return ROUNDINGS * float(np.finfo(dtype).eps) * max(sizes) / last.certificate.length

@@ -22,7 +22,7 @@ from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
-from . import sticking
+from . import rounding, sticking
 from .errors import Observations
 from .starts import Past, StartStatistics
 from .sticking import StickingMemory
@@ -40,8 +40,9 @@ class State:
     keeps one, others two or more. `approach` is the d of the body, `body` and `energy` are their memories; `starts` and
     `looks` are what was learnt of starts and of the embedded pair, `errors` the sums of the error budget, `chosen` the
     record of the steps that stages have chosen, which grows; `sticking` is the memory of a contact with adhesion,
-    `tolerance` that of the tolerance of solves. The next pressure will be in the map `spare`. Effects that follow the
-    steps keep what they remember themselves, as they are told only of steps that were made.
+    `tolerance` that of the tolerance of solves, `rounding` that of solves that need double precision. The next pressure
+    will be in the map `spare`. Effects that follow the steps keep what they remember themselves, as they are told only
+    of steps that were made.
 
     Two states share most maps, and the oldest ones of a state are spare in the next: a state can be used until a step
     begins from the one after it. Maps are in the run's units.
@@ -59,6 +60,7 @@ class State:
     chosen: ChosenSteps | None = None
     sticking: StickingMemory | None = None
     tolerance: StepTolerance = field(default_factory=StepTolerance)
+    rounding: float = 0.0
 
     @staticmethod
     def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
@@ -155,7 +157,7 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
         found |= state.tolerance.entries()
     if state.sticking is not None:
         found |= prefixed("sticking", sticking.entries(state.sticking, scene.units.height, scene.units.modulus))
-    return found | state.errors.entries()
+    return found | rounding.entries(scene, state.rounding) | state.errors.entries()
 
 
 def save(path: Path, scene: Scene, state: State, facts: Facts) -> None:
@@ -193,6 +195,7 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         None if state.chosen is None else ChosenSteps.of(scene.job, saved),
         None if state.sticking is None else sticking.restored(state.sticking, part_of("sticking", saved)),
         StepTolerance.restored(saved),
+        rounding.restored(saved),
     )
     return completed(scene, found)
 

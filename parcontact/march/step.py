@@ -18,7 +18,7 @@ from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.body import Trial, surface_of
 from ..physics.energy import EnergyMemory, Pressed
-from ..scene import Scene, solver_in_double, solver_on
+from ..scene import Scene, solver_on
 from ..solve.contact import Contact
 from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
@@ -26,6 +26,7 @@ from ..storage.row import Row
 from . import failure, sticking, sticking_energies
 from .errors import Estimate, Solved, estimate_errors
 from .failure import DetachedError, StepError
+from .rounding import rounding_after
 from .starts import Past, cells_moved, make_start
 from .state import State, energies_of
 
@@ -78,6 +79,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         state.chosen,
         None if solved.stuck is None else solved.stuck.memory,
         state.tolerance.after(scene, contact, errors.budget),
+        solved.rounding,
     )
 
 
@@ -164,12 +166,13 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     control = _control(scene, step, trial)
     if state.sticking is not None:
         return _solve_stuck(scene, state, step, trial, control)
-    problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha), control)
+    solver, operators = scene.in_double if state.rounding > 0.0 else (scene.solver, scene.operators)
+    problem = Problem(*operators, trial.effective, scene.constraint(trial.alpha), control)
     moved_start = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare)
     if state.alpha == 0.0:  # nothing has been solved before
         on = partial(solver_on, scene.setup)
-        cold_start.prepare(scene.solver, problem, state.spare, on)
-    contact, remark = scene.solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
+        cold_start.prepare(solver, problem, state.spare, on)
+    contact, remark = solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
     if contact.failure:
         contact, remark = _retry(scene, state, step, problem, contact)
     if step.passed:
@@ -179,8 +182,9 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     )
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
+    rounding = rounding_after(scene, state.rounding, contact, trial.effective)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
-    return Solved(step, trial, contact, measures, memory, remark, moved_start)
+    return Solved(step, trial, contact, measures, memory, remark, moved_start, rounding=rounding)
 
 
 def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: MeanPressure | Approach) -> Solved:
@@ -247,11 +251,13 @@ def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Con
 
     Returns the contact, and what to say of it; collective. Raises StepError when nothing helps.
     """
-    in_double, would_do = solver_in_double(scene.setup), _accepts(scene, failed)
+    single, would_do = failed.u.dtype == np.float32, _accepts(scene, failed)
+    in_double = (lambda: scene.in_double) if single else None
     if would_do and in_double is None:
         return failed, ""
     on, most = partial(solver_on, scene.setup), 1 if would_do else None
-    contact, tried = retry.retry_solve(scene.solver, problem, failed, on, in_double, most)
+    solver = scene.solver if state.rounding == 0.0 else scene.in_double[0]
+    contact, tried = retry.retry_solve(solver, problem, failed, on, in_double, most)
     if contact.failure:
         if would_do and _accepts(scene, contact):
             return contact, ""

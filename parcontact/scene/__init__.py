@@ -1,7 +1,7 @@
 """From a job to what is calculated with: the choices that follow from it, the rigid surface, the body, the solver."""
 
 from .choices import Choices, choices
-from .scene import Scene, Setup, build, build_on, describe_scene, set_up, solver_in_double, solver_on
+from .scene import Scene, Setup, build, build_on, describe_scene, set_up, solver_on
 
 __all__ = [
     "Choices",
@@ -12,6 +12,5 @@ __all__ = [
     "choices",
     "describe_scene",
     "set_up",
-    "solver_in_double",
     "solver_on",
 ]

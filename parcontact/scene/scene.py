@@ -4,9 +4,9 @@ What is made follows from the job alone, as `choices.py` decides; what a job doe
 Steady sliding takes the setup from here and brings a solver of its own.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -140,6 +140,12 @@ class Scene:
         if (own := self.choices.interface) is not None:
             self.probe = replace(self.probe, interface=replace(own, shift=own.shift * factor))
 
+    @cached_property
+    def in_double(self) -> tuple[ContactSolver, Operators]:
+        """A solver with an operator in double precision and its operators, made when they are first asked for, and
+        kept; asking first is collective."""
+        return solver_on(self.setup, self.slab, self.choices.numerics.tolerance, np.float64)
+
     def constraint(self, alpha: float) -> Constraint:
         """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
         hardness = self.choices.hardness
@@ -197,13 +203,6 @@ def solver_on(
     """
     on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
-
-
-def solver_in_double(setup: Setup) -> Callable[[], tuple[ContactSolver, Operators]] | None:
-    """Return a maker of a solver with an operator in double precision, for a retry; None where the scene has one."""
-    if not setup.choices.single_operator.on:
-        return None
-    return partial(solver_on, setup, setup.slab, setup.choices.numerics.tolerance, np.float64)
 
 
 def describe_scene(scene: Scene) -> Iterator[str]:

@@ -51,6 +51,7 @@ from .workspace import Workspace
 
 # tuning
 MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
+MAX_STALLED_IN_SINGLE = 12  # the same with displacements in single precision, of which double may lead on
 MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
 STEP = 0.95  # beside edges of contact, and 1 far from them
 MAX_STEP_RATIO = 1.25  # of the exact step over the one made, or its inverse: beyond it, steps are exact from then on
@@ -207,8 +208,10 @@ class ContactSolver:
         if not np.isfinite(worst):
             return NOT_FINITE
         asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
-        if iteration - best_at >= MAX_STALLED_ITERATIONS:
-            return f"stalled: no better certificate than {best:.3g} in {MAX_STALLED_ITERATIONS} iterations, now {asked}"
+        single = self.workspace.displacement.dtype == np.float32
+        most = MAX_STALLED_IN_SINGLE if single else MAX_STALLED_ITERATIONS
+        if iteration - best_at >= most:
+            return f"stalled: no better certificate than {best:.3g} in {most} iterations, now {asked}"
         if iteration >= self.max_iterations:
             return f"did not converge in max_iterations = {iteration}: the certificate is {asked}"
         return None
