@@ -57,9 +57,8 @@ class LeakageColumns:
         if instant.step.number % self._every:
             return
         scene, setup = self._scene, self._scene.setup
-        base, offset = scene.motion.at(instant.step.position).parts
         approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
-        gap = (instant.displacement - np.roll(base, offset, axis=1) - approach) * scene.units.height
+        gap = scene.gap(instant.displacement, instant.step.position, approach)
         whole = scene.slab.to_root(np.where(instant.pressure > 0.0, 0.0, np.maximum(gap, 0.0)))
         if whole is not None:
             found = leak(whole, setup.grid.size, setup.grid.boundary == "periodic")

@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
 from . import added_sections
-from .checks import advice, cells, limits, meaning, size
+from .checks import advice, cells, layer, limits, meaning, size
 from .sections import height_arrays, listing
 from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
@@ -138,6 +138,7 @@ class Job(Part):
             *(self.material.doubts if isinstance(self.material, Dma) else ()),
             *advice.resolution(*scene, self.numerics, self.directions),
             *meaning.warnings(*scene, self.initial, self.steady),
+            *layer.warnings(self.grid, self.surface, self.material.poisson, self.body, self.history),
             *size.warnings(self.grid, limits.count_steps(self.grid, self.history), self.output),
             *self._told("doubts"),
         )

@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ..effects.thermal import rise_of
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
@@ -108,11 +106,9 @@ class March:
             return state.pressure * (state.alpha * units.pressure)
         if name == "displacement":
             return self._displacement() * units.height
-        base, offset = scene.motion.at(state.position).parts
-        heights = np.roll(base, offset, axis=1)
         if name == "height":
-            return heights * units.height + scene.setup.surface.datum
-        return (self._displacement() - heights - state.approach) * units.height
+            return scene.heights(state.position) * units.height + scene.setup.surface.datum
+        return scene.gap(self._displacement(), state.position, state.approach)
 
     def _displacement(self) -> Array:
         """Return the displacement of the body, from the pressure where it is not at hand; collective."""

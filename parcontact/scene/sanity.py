@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
-from ..job.checks import advice, meaning, size
+from ..job.checks import advice, layer, meaning, size
 from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
@@ -20,7 +20,6 @@ from ..physics.measures import Measures
 from .measured_range import describe_beyond
 from .scene import Setup
 
-THICKEST = 1 / 3  # physics: height of a surface over the thickness of a layer that it strains little
 SEAM = 2.0  # accuracy: the jump across the edge over the largest increment inside: 1 if nothing is special
 ODD_CONTACTS = ("edge", "cells")  # at the edge of the box; a few cells wide
 FEW_CELLS = 0.15  # accuracy: of the area, too large if counted in cells: contacts of three cells, a circle of four
@@ -64,11 +63,9 @@ def _check_heights(setup: Setup) -> Iterator[str]:
         seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
         yield from seams
     body, span = setup.job.body, setup.heights.span
-    if body is not None and setup.roughness and span > THICKEST * body.thickness:
-        yield (
-            f"body.thickness: the surface is {span:.3g} m high, more than a third of the layer, {body.thickness:g} m: "
-            "strains are not small"
-        )
+    strained = layer.strained(span, body.thickness) if body is not None and setup.roughness else ""
+    if strained and not any(told.startswith("body.thickness: the surface") for told in setup.job.warnings):
+        yield strained
     if setup.shortest is not None and not seams:  # a seam has waves of its own
         yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.asked, setup.job.directions)
 

@@ -15,13 +15,13 @@ from ..effects.folded_branches import describe_folded_branches
 from ..history.chosen import describe_steps
 from ..job import Grid, Job
 from ..parallel.fft import FFT
-from ..parallel.slab import Slab
+from ..parallel.slab import Array, Slab
 from ..physics.body import Body, ElasticBody, ZenerBody
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
 from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
 from ..physics.layer import Layer
-from ..physics.motion import PARTS, AlongX, AnyFraction, Motion
+from ..physics.motion import PARTS, AlongX, AnyFraction, Motion, Vector
 from ..physics.probe import Probe
 from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
@@ -145,6 +145,15 @@ class Scene:
         """A solver with an operator in double precision and its operators, made when they are first asked for, and
         kept; asking first is collective."""
         return solver_on(self.setup, self.slab, self.choices.numerics.tolerance, np.float64)
+
+    def heights(self, position: Vector) -> Array:
+        """Return the heights of the surface at a position, of this rank's rows, in the run's units, as a new array."""
+        base, offset = self.motion.at(position).parts
+        return np.roll(base, offset, axis=1)
+
+    def gap(self, displacement: Array, position: Vector, approach: float) -> Array:
+        """Return the gap [m] of this rank's rows to a surface at a position; the others in the run's units."""
+        return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float) -> Constraint:
         """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""

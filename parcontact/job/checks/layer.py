@@ -1,0 +1,91 @@
+"""Warnings about a layer: what its thickness means beside the surface, the mesh and the material.
+
+Each says the value, the limit and what to change. All is judged by lower bounds, as in `meaning`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ..sections.calculation import Grid
+from ..sections.geometry import Flat, Rough, Sphere, Wave
+from ..sections.stages import Stage
+
+THICKEST = 1 / 3  # physics: what presses into a layer over its thickness; beyond, strains are not small
+FEWEST_CELLS = 2.0  # accuracy: in a thickness, over which the pressure at the edge of a contact falls
+LONGEST = 100.0  # physics: thicknesses; to longer waves rubber yields by its compressibility, of 1e-3 of the shear's
+NEARLY = 1e-4  # physics: below 1/2, of the Poisson's ratio of a rubber
+
+
+def warnings(
+    grid: Grid, surface: tuple[Any, ...], poisson: float, body: Any, history: tuple[Stage, ...]
+) -> Iterator[str]:
+    """Yield sentences about the `body` section of a job, which may be None."""
+    if body is None:
+        return
+    cell = max(grid.dx, grid.dy)
+    smooth = all(isinstance(shape, Wave | Flat) for shape in surface)
+    if body.thickness < FEWEST_CELLS * cell and grid.boundary == "periodic" and not smooth:
+        yield (
+            f"body.thickness: {body.thickness:g} m is thinner than {FEWEST_CELLS:g} cells of {cell:.3g} m, and the "
+            "edges of contacts are not resolved; use more grid.points, or a smaller grid.size"
+        )
+    if text := strained(2.0 * _rms_height(grid, surface), body.thickness):
+        yield text
+    yield from _indented(surface, body.thickness, history)
+    longest = max(_wavelengths(grid, surface), default=0.0)
+    if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
+        yield (
+            f"material.poisson: waves of {longest:.3g} m are more than {LONGEST:g} times as long as the layer is thick "
+            f"({body.thickness:g} m), and rubber yields to them by its compressibility; {poisson:g} leaves that out: "
+            "use 0.4995"
+        )
+
+
+def strained(height: float, thickness: float) -> str:
+    """Return what to say of a layer into which a surface of such a height [m] presses, or ''."""
+    if height <= THICKEST * thickness:
+        return ""
+    return (
+        f"body.thickness: the surface is {height:.3g} m high or more, above a third of the layer ({thickness:g} m), "
+        "where strains are not small; use a thicker layer, or a lower surface"
+    )
+
+
+def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[str]:
+    """Judge an indenter by its approach: the layer is strained by its share of the thickness."""
+    if len(surface) != 1 or not isinstance(surface[0], Sphere):
+        return
+    approaches = [
+        (max(stage.load.start, stage.load.end), index)
+        for index, stage in enumerate(history)
+        if stage.control == "approach"
+    ]
+    deepest, index = max(approaches, default=(0.0, 0))
+    if deepest > THICKEST * thickness:
+        yield (
+            f"history.{index}.approach: {deepest:.3g} m is more than a third of the layer ({thickness:g} m), where "
+            "strains are not small; use a smaller approach, or a thicker layer"
+        )
+
+
+def _rms_height(grid: Grid, surface: tuple[Any, ...]) -> float:
+    """Return a lower bound of the rms height of waves and roughness [m]: steep waves are the shortest at most."""
+    square = 0.0
+    for shape in surface:
+        if isinstance(shape, Wave):
+            square += shape.amplitude**2 / 2
+        elif isinstance(shape, Rough):
+            by_slope = (shape.rms_slope or 0.0) * shape.short_wavelength / (2 * math.pi)
+            square += max(shape.rms_height or 0.0, by_slope) ** 2
+    return math.sqrt(square)
+
+
+def _wavelengths(grid: Grid, surface: tuple[Any, ...]) -> Iterator[float]:
+    for shape in surface:
+        if isinstance(shape, Wave) and any(shape.waves):
+            yield 1.0 / math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
+        elif isinstance(shape, Rough):
+            yield shape.long_wavelength

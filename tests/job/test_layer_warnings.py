@@ -1,0 +1,73 @@
+"""Warnings about a layer, from the job alone: each at its limit, and not just below it."""
+
+import math
+from typing import Any
+
+import pytest
+
+from parcontact.job import Job
+
+ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2e-4}
+WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]}
+
+
+def warnings(thickness: float, surface: Any = WAVE, **changes: Any) -> list[str]:
+    """What a job with a layer is warned of, beside what it is warned of without."""
+    given = {
+        "grid": {"points": 64, "size": 1e-3},
+        "surface": surface,
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [{"pressure": 1e3}],
+        **changes,
+    }
+    body = {"thickness": thickness, **given.pop("body", {})}
+    plain = Job.model_validate(given).warnings
+    return [text for text in Job.model_validate({**given, "body": body}).warnings if text not in plain]
+
+
+def test_a_layer_of_common_sense_has_no_warning() -> None:
+    assert warnings(1e-3) == warnings(1e-4) == []
+
+
+def test_a_layer_thinner_than_two_cells() -> None:
+    """Where contact may have edges: not on waves alone."""
+    cell, rough = 1e-3 / 64, {**ROUGH, "rms_height": 1e-7}
+    assert warnings(2.01 * cell, rough) == warnings(1.99 * cell) == []
+    (text,) = warnings(1.99 * cell, rough)
+    assert "thinner than 2 cells of 1.56e-05 m" in text
+
+
+@pytest.mark.parametrize(
+    ("surface", "height"),
+    [
+        ([{**WAVE, "amplitude": 2e-5}], math.sqrt(2) * 2e-5),
+        (
+            [{**ROUGH, "rms_height": 1e-5}],
+            2e-5,
+        ),
+    ],
+)
+def test_a_surface_higher_than_a_third_of_the_layer(surface: Any, height: float) -> None:
+    """The height is twice the rms height, which no wave and no roughness is lower than."""
+    assert warnings(3.01 * height, surface) == []
+    (text,) = warnings(2.99 * height, surface)
+    assert f"the surface is {height:.3g} m high or more" in text
+
+
+def test_an_indenter_deeper_than_a_third_of_the_layer() -> None:
+    sphere = {"shape": "sphere", "radius": 1e-2}
+    press = {"approach": {"from": 0.0, "to": 4e-5}, "duration": 1.0, "time_step": 0.5}
+    assert warnings(1.21e-4, sphere, history=[press]) == []
+    (text,) = warnings(1.19e-4, sphere, history=[press])
+    assert text.startswith("history.0.approach: 4e-05 m is more than a third of the layer")
+
+
+def test_waves_to_which_rubber_is_compressible() -> None:
+    """Longer than 100 thicknesses, on a base to which it is bonded; not if the material is given as compressible."""
+    grid, surface = {"points": 1024, "size": 1e-2}, {**WAVE, "waves": [1, 0]}
+    assert warnings(1.01e-4, surface, grid=grid) == []
+    (text,) = warnings(0.99e-4, surface, grid=grid)
+    assert text.startswith("material.poisson: waves of 0.01 m are more than 100 times")
+    assert warnings(0.99e-4, surface, grid=grid, body={"base": "smooth"}) == []
+    rubber = {"model": "elastic", "shear_modulus": 1e6, "poisson": 0.4995}
+    assert warnings(0.99e-4, surface, grid=grid, material=rubber) == []
