@@ -1,6 +1,7 @@
 """`grid: {points: auto}`: the mesh of fewest points on which the errors are those of `numerics.accuracy`.
 
-It follows from the shortest wave of the surface and from the directions of sliding (`checks.cells`). The mesh may make
+It follows from the shortest wave of the surface, from the directions of sliding (`checks.cells`) and from a guess of
+the share in contact (`contact_share`). The mesh may make
 MESH_SHARE of the error of a march, whose time steps make the rest, and STEADY_SHARE of that of a friction curve.
 """
 
@@ -14,10 +15,12 @@ from pydantic import Field, ValidationError
 
 from ..errors import InputError
 from .checks import cells
+from .contact_share import smallest_share
 from .measured import extent_of
 from .model import Job, prepared
 from .sections.calculation import Accuracy, Grid, Numerics
 from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
+from .sections.materials import Material
 from .sections.part import Origin, Part
 from .sections.quantities import AUTO_POINTS
 from .sections.stages import Initial, Stage, Steady
@@ -33,6 +36,7 @@ class Scenery(Part):
 
     surface: tuple[Shape, ...] = Field(description="one shape, or a list of shapes")
     initial: Initial = Initial()
+    material: Material = Field(description="a mapping with model: elastic | zener")
     history: tuple[Stage, ...] = Field(default=(), description="a list of stages")
     steady: Steady | None = None
     numerics: Numerics = Numerics()
@@ -67,13 +71,16 @@ def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -
     directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
     asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
-    points = cells.choose(wave, box.size, directions, own)
+    body = scenery.material, scenery.history, scenery.initial, scenery.steady
+    contact = smallest_share(scenery.surface, wave, *body, box.lx * box.ly)
+    points = cells.choose(wave, box.size, directions, own, contact)
     dx, dy = (length / n for length, n in zip(box.size, points, strict=True))
     slides = " and ".join(f"({x:.3g}, {y:.3g})" for x, y in directions)
     return list(points), (
         f"mesh: {points[0]} x {points[1]} points, chosen by numerics.accuracy (friction {100 * asked.friction:g} %, "
         f"area {100 * asked.area:g} %): the shortest wave, {wave:.4g} m, has {wave / dx:.3g} cells along x and "
-        f"{wave / dy:.3g} along y; {f'it slides along {slides}' if slides else 'nothing slides'}"
+        f"{wave / dy:.3g} along y; {f'it slides along {slides}' if slides else 'nothing slides'}, "
+        f"with some {100 * contact:.2g} % in contact"
     )
 
 

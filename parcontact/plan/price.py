@@ -2,9 +2,9 @@
 
 Nothing more is tried. All parts of the error budget together keep the accuracy: the mesh may have MESH_SHARE of it,
 time steps TIME_SHARE, the solver the rest; steps that are chosen make CHOSEN_SHARE, whatever the mesh makes. The mesh
-has the cells per shortest wave that this takes (`advice.cells_per_wave`); where no wave is given the part that the
-mesh makes, which the trial saw, goes with the power of the cell that the budget knows (`physics.budget`). Heights from
-a file stay on their mesh. The part that time steps make, seen too, goes with the power 1.7 of the step for the
+has the cells per shortest wave that this takes, along the sliding and across it (`job.checks.cells`). The parts that
+the mesh makes, which the trial saw, go with the power of the cell that the budget knows (`physics.budget`). Heights
+from a file stay on their mesh. The part that time steps make, seen too, goes with the power 1.7 of the step for the
 exponential integrator, with the first for backward Euler; where a slide has cells per step they are one, a half, a
 third, ... as it needs. A step has as many operator calls as seen, times what a smaller tolerance and fractions of a
 cell add, and each takes as long as seen, in proportion to N log N.
@@ -21,7 +21,7 @@ from ..history.chosen import ChosenEnds
 from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
 from ..job.checks.advice import STEPS_PER_WAVE
-from ..job.checks.cells import cells_per_wave, fast_length
+from ..job.checks.cells import ASIDE, cells_across, cells_per_wave, fast_length, one_cell
 from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.sections.listing import plain
 from ..physics.budget import per_cent
@@ -33,6 +33,7 @@ from .sample import Sample, StageCost
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
 MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
+ACROSS_SHARE = 0.2  # of that of the mesh, for the cells across the sliding
 CHOSEN_SHARE = 0.65  # of the accuracy, what time steps make that follow it, in the mean of a stage
 EDGE_ORDER = 1.0  # of the cell, in which the error of the contact area falls
 CALLS_PER_DECADE = 1.5  # for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
@@ -50,35 +51,46 @@ def offer(costs: Costs, accuracy: float) -> Costs:
 
 def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
     """Points along x and y."""
-    factor = _finer(job, sample, accuracy)
-    nx, ny = (1 if n == 1 else n if factor == 1.0 else fast_length(n * factor) for n in job.grid.points)
+    grid, factors = job.grid, (_finer(job, sample, accuracy, axis) for axis in (0, 1))
+    nx, ny = (
+        1 if n == 1 else n if factor == 1.0 else fast_length(n * factor)
+        for n, factor in zip(grid.points, factors, strict=True)
+    )
     return nx, ny
 
 
-def _finer(job: Job, sample: Sample, accuracy: float) -> float:
-    """Return the points needed over those of the job; 1 where its surface has one mesh, or the mesh makes no error."""
+def _finer(job: Job, sample: Sample, accuracy: float, axis: int) -> float:
+    """Return the points needed along an axis over those of the job; 1 where its surface has one mesh, or the mesh makes
+    no error."""
     if any(isinstance(shape, OnOneMesh) for shape in job.surface):
         return 1.0
     error, order, waves = mesh_error(sample, "friction"), SPOTS_ORDER, shortest_wave(job)
-    share = MESH_SHARE * accuracy
-    of_waves = cells_per_wave(share) * max(job.grid.dx, job.grid.dy) / waves if waves else 0.0
+    share, across = MESH_SHARE * accuracy, mesh_error(sample, "friction", "across") or 0.0
+    slides = not job.directions or any(abs(way[axis]) > ASIDE for way in job.directions)
+    cells = cells_per_wave(share) if slides else cells_across(share)
+    of_waves = cells * (job.grid.dx, job.grid.dy)[axis] / waves if waves else 0.0
     if error is None:
         error, order = mesh_error(sample, "area") or 0.0, EDGE_ORDER
-    factor = (error / share) ** (1.0 / order) * sample.job.grid.nx / job.grid.nx
+    elif across:
+        error, share = (error - across, (1.0 - ACROSS_SHARE) * share) if slides else (across, ACROSS_SHARE * share)
+    factor = (error / share) ** (1.0 / order) * sample.job.grid.points[axis] / job.grid.points[axis]
     return max(of_waves, min(max(factor, 1.0 / COARSER), FINER)) if factor else of_waves or 1.0
 
 
-def mesh_error(sample: Sample, name: str) -> float | None:
-    """Return the part of the error of friction or area that the mesh of a sample makes; None where there is none, and
-    for friction that cannot be told from none, which no mesh makes exact to a share of it."""
+def mesh_error(sample: Sample, name: str, which: str = "mesh") -> float | None:
+    """Return the part of the error of friction or area that the mesh of a sample makes, or its cells `across` the
+    sliding; None where there is none, and for friction that cannot be told from none, which no mesh makes exact to a
+    share of it."""
     weight = sample.total(f"{name} weight")
-    error = sample.total(f"{name} mesh error") / weight if weight else None
+    error = sample.total(f"{name} {which} error") / weight if weight else None
     return None if name == "friction" and error is not None and error >= 1.0 else error
 
 
 def area_error(sample: Sample, job: Job) -> float:
-    """Return the part of the error of the contact area that the mesh of a job makes, in the first order of the cell."""
-    return (mesh_error(sample, "area") or 0.0) * (sample.job.grid.nx / job.grid.nx) ** EDGE_ORDER
+    """Return the part of the error of the contact area that the mesh of a job makes, in the first order of its mean
+    cell."""
+    own, tried = (grid.dx + grid.dy if 1 not in grid.points else grid.dx for grid in (job.grid, sample.job.grid))
+    return (mesh_error(sample, "area") or 0.0) * (own / tried) ** EDGE_ORDER
 
 
 def shortest_wave(job: Job) -> float | None:
@@ -142,9 +154,9 @@ def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple
         longest = min(longest, wave / STEPS_PER_WAVE / stage.speed)
     if not stage.speed or stage.chooses or isinstance(stage.time_step, GeometricStep):
         return math.ceil(stage.seconds / longest * (1.0 - SAME)), 1.0
-    way, cell = stage.seconds * stage.speed, max(job.grid.dx, job.grid.dy)
+    way, cell, before = stage.seconds * stage.speed, *(one_cell(stage, each.grid) * stage.speed for each in (job, own))
     cells = 1.0 / math.ceil(max(1.0, cell / (longest * stage.speed)) * (1.0 - SAME))
-    whole = way >= count * max(own.grid.dx, own.grid.dy) * (1.0 - SAME)
+    whole = way >= count * before * (1.0 - SAME)
     return math.ceil(way / (cells * cell) * (1.0 - SAME)), BETWEEN_CELLS if cells < 1.0 and whole else 1.0
 
 

@@ -213,6 +213,7 @@ def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator
             yield f"{name} weight", weight
             yield f"{name} time error", weight * parts.time
             yield f"{name} mesh error", weight * parts.mesh
+            yield f"{name} across error", weight * parts.across
 
 
 def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:

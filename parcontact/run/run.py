@@ -239,6 +239,7 @@ def chosen_by_accuracy(job: Job) -> set[str]:
     chosen = {
         "solver": numerics.tolerance_is_chosen,
         "time": bool(stages) and all(stage.chooses for stage in stages),
+        "mesh": bool(job.origin.mesh),
         "folded": numerics.branch_error == BRANCH_SHARE * numerics.asked.strictest,
     }
     return {name for name, by_accuracy in chosen.items() if by_accuracy}

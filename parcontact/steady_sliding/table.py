@@ -118,7 +118,7 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
-        self.warn(list(describe_missed(self._points, self._job.numerics.asked.both)))
+        self.warn(list(describe_missed(self._points, self._job.numerics.asked.both, bool(self._job.origin.mesh))))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
@@ -145,8 +145,9 @@ class CurveTable:
             self._waves.close()
 
 
-def describe_missed(points: Sequence[Point], asked: tuple[float, float]) -> Iterator[str]:
-    """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than asked for."""
+def describe_missed(points: Sequence[Point], asked: tuple[float, float], auto: bool = False) -> Iterator[str]:
+    """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than asked for; the
+    accuracy has chosen an `auto` mesh."""
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
     names = ("friction", "corrected contact area")
@@ -157,7 +158,7 @@ def describe_missed(points: Sequence[Point], asked: tuple[float, float]) -> Iter
             place = Wanted(point.speed, point.pressure, point.temperature)
             yield (
                 f"estimated error of the {name} at {len(missed)} of {len(points)} points: up to {describe(parts)}, "
-                f"at {place}{advice(parts, accuracy)}"
+                f"at {place}{advice(parts, accuracy, ['mesh'] * auto)}"
             )
 
 

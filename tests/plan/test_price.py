@@ -114,10 +114,12 @@ def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
     planned = job(grid=FINE)
     one, ten = (price.offer(costs(planned), accuracy) for accuracy in (1e-2, 1e-3))
     seconds = [each.marching / each.sample.steps for each in (one, ten)]
-    assert seconds[0] == pytest.approx(1.0)
-    assert seconds[1] == pytest.approx(1.5 * (240**2 * math.log(240**2 + 1)) / (80**2 * math.log(80**2 + 1)))
+    points = [math.prod(each.grid.points) for each in (planned, one.job, ten.job)]
+    work = [count * math.log(count + 1) for count in points]
+    assert seconds[0] == pytest.approx(work[1] / work[0])
+    assert seconds[1] == pytest.approx(1.5 * work[2] / work[0])
     halves = price.offer(costs(planned, time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01), 1e-2)
-    assert halves.marching / halves.sample.steps == pytest.approx(price.BETWEEN_CELLS)
+    assert halves.marching / halves.sample.steps == pytest.approx(price.BETWEEN_CELLS * seconds[0])
 
 
 def test_from_a_coarser_grid() -> None:

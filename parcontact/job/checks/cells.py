@@ -4,15 +4,20 @@ Friction comes from slopes along the sliding: the mesh makes its error along it,
 wants both directions alike. With c cells per shortest wave along the sliding and c' across it the relative errors are
 about
 
-    friction    hypot(ALONG (8/c)^2.5, ACROSS (4/c')^2.5),        area    AREA (4/c + 4/c')^1.3,
+    friction    hypot(ALONG (8/c)^2.5 l^0.3, ACROSS (4/c')^2.5 l^0.9) (1 - A)^2,
+    area        AREA (4/c + 4/c')^1.6 l^0.5 (1 - A)^3,        l = max(0.1/A, 1),
 
-found by experiment: steady states of ten rough surfaces of 2 to 91 % contact on 16 meshes of 2 to 32 cells per shortest
-wave, of cells up to eight times as long as wide. Along a direction (x, y) the cells of a grid are hypot(x dx, y dy).
+where a share A is in contact: what is wrong is wrong at edges, and light contact is of small spots. They were found by
+experiment, with A as it is guessed before (`job.contact_share`): steady states of twelve rough surfaces of 3 to 100 %
+contact on 40 meshes of 2.7 to 40 cells per shortest wave. `scripts/chosen_mesh.py` tells how the meshes that follow do
+on others: single surfaces may be three times as good or as bad. Along a direction (x, y) the cells of a grid are
+hypot(x dx, y dy).
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 
 from ..sections.calculation import Accuracy, Grid
@@ -20,13 +25,17 @@ from ..sections.stages import Initial, Stage, Steady
 
 Vector = tuple[float, float]
 
-ALONG, ACROSS, MESH_ORDER = 0.008, 0.003, 2.5  # accuracy: of friction, at 8 and at 4 cells
-AREA, AREA_ORDER = 0.01, 1.3  # accuracy: of the corrected area, at 8 cells both ways
+ALONG, ACROSS, MESH_ORDER = 0.01, 0.0015, 2.5  # accuracy: of friction, at 8 and at 4 cells
+AREA, AREA_ORDER = 0.02, 1.6  # accuracy: of the corrected area, at 8 cells both ways
+OPEN_FRICTION, OPEN_AREA = 2, 3  # accuracy: powers of the share that is open
+LIGHT = 0.1  # accuracy: the share in contact below which spots are small
+LIGHT_ALONG, LIGHT_ACROSS, LIGHT_AREA = 0.3, 0.9, 0.5  # accuracy: powers of it
+TYPICAL = 0.2  # accuracy: share in contact, where none is known
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across
 LEAST_CELLS = 2.1  # accuracy: per shortest wave; the grid has no waves shorter than two
 LONGEST = 8.0  # accuracy: the longer side of a cell over the shorter, in the experiments
-RATIOS = 48  # tuning: ratios of the sides that are tried
+MOST_CELLS = 400.0  # tuning: per shortest wave
 MULTIPLE = 16  # of which points along a side are, so that there are coarser grids to start from
 SAME = 1e-9  # relative: numbers this close are the same
 
@@ -41,14 +50,21 @@ def along(way: Vector, length: float, grid: Grid) -> float:
     return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
 
 
-def friction_error(c: float, across: float) -> float:
-    """Return the error of friction with so many cells per shortest wave along and across the sliding."""
-    return math.hypot(ALONG * (8.0 / c) ** MESH_ORDER, ACROSS * (4.0 / across) ** MESH_ORDER)
+def friction_error(c: float, across: float, share: float = TYPICAL) -> float:
+    """Return the error of friction with so many cells per shortest wave along and across the sliding, where that share
+    is in contact."""
+    small = max(LIGHT / share, 1.0)
+    parts = (
+        ALONG * (8.0 / c) ** MESH_ORDER * small**LIGHT_ALONG,
+        ACROSS * (4.0 / across) ** MESH_ORDER * small**LIGHT_ACROSS,
+    )
+    return (1.0 - share) ** OPEN_FRICTION * math.hypot(*parts)
 
 
-def area_error(c: float, across: float) -> float:
+def area_error(c: float, across: float, share: float = TYPICAL) -> float:
     """Return the error of the corrected area with so many cells per shortest wave in two directions."""
-    return AREA * (4.0 / c + 4.0 / across) ** AREA_ORDER
+    edges = (1.0 - share) ** OPEN_AREA * max(LIGHT / share, 1.0) ** LIGHT_AREA
+    return edges * AREA * (4.0 / c + 4.0 / across) ** AREA_ORDER
 
 
 def cells_per_wave(accuracy: float) -> int:
@@ -63,7 +79,7 @@ def cells_across(accuracy: float) -> float:
 
 def cells_for_area(accuracy: float) -> float:
     """Return how many it needs in both directions, for the contact area."""
-    return max(LEAST_CELLS, CELLS_PER_WAVE * (AREA / accuracy) ** (1.0 / AREA_ORDER))
+    return max(LEAST_CELLS, CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / AREA_ORDER))
 
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
@@ -94,31 +110,36 @@ def fast_length(least: float) -> int:
     return MULTIPLE * count
 
 
-def choose(wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy) -> tuple[int, int]:
+def choose(
+    wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, share: float = TYPICAL
+) -> tuple[int, int]:
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,
-    where it slides along these directions (unit vectors), or nowhere."""
-    ratios = [LONGEST ** (k / RATIOS) for k in range(-RATIOS, RATIOS + 1)]
-    cells = [_largest(wave, ratio, directions, asked) for ratio in ratios]
-    dx, dy = max(cells, key=lambda cell: (round(math.log(cell[0] * cell[1]), 9), -abs(math.log(cell[0] / cell[1]))))
-    return fast_length(size[0] / dx), fast_length(size[1] / dy)
+    where it slides along these directions (unit vectors), or nowhere, and that share of it is in contact."""
+    along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
+    best = along_x[-1], along_y[-1]
+    for ny in along_y:
+        cells = lambda nx, ny=ny: (wave * nx / size[0], wave * ny / size[1])  # noqa: E731
+        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, asked, share))
+        if place < len(along_x) and along_x[place] * ny < math.prod(best):
+            cx, cy = cells(along_x[place])
+            best = (along_x[place], ny) if max(cx, cy) <= LONGEST * min(cx, cy) else best
+    return best
 
 
-def _largest(wave: float, ratio: float, directions: Sequence[Vector], asked: Accuracy) -> Vector:
-    """Return the largest cell [m] with sides of this ratio that keeps what is asked."""
-    fits = lambda dx: _fits(wave / dx, wave / (ratio * dx), directions, asked)  # noqa: E731
-    low, high = wave / 1e4, wave / LEAST_CELLS
-    for _ in range(60):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low, ratio * low
+def _fast_lengths(most: float) -> list[int]:
+    """Return all lengths that transform fast, up to the first that is no shorter."""
+    found = [fast_length(1)]
+    while found[-1] < most:
+        found.append(fast_length(found[-1] + 1))
+    return found
 
 
-def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy) -> bool:
+def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, share: float) -> bool:
     """Return whether cells per wave along x and y keep the errors asked for."""
-    if min(cx, cy) < LEAST_CELLS or area_error(cx, cy) > asked.area:
+    if min(cx, cy) < LEAST_CELLS or area_error(cx, cy, share) > asked.area:
         return False
     for x, y in directions:
         c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-        if friction_error(c, across) > asked.friction:
+        if friction_error(c, across, share) > asked.friction:
             return False
     return True
