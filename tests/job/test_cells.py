@@ -27,7 +27,7 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
     c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
     friction = math.hypot(0.01 * (8.0 / c) ** 2.5 * 2**0.3, 0.0015 * (4.0 / across) ** 2.5 * 2**0.9)
-    return friction * 0.95**2, 0.02 * (4.0 / cx + 4.0 / cy) ** 1.6 * 0.95**3 * 2**0.5
+    return friction * 0.95**2, 0.025 * (4.0 / cx + 4.0 / cy) ** 1.6 * 0.95**3 * 2**0.5
 
 
 @pytest.mark.parametrize("asked", [BOTH, FRICTION, Accuracy(friction=0.05, area=0.3)])
@@ -55,4 +55,5 @@ def test_long_cells_lie_across_the_sliding() -> None:
     both = cells.choose(WAVE, SIZE, [(1.0, 0.0), (0.0, 1.0)], FRICTION)
     assert both[0] == both[1] > 2 * along_x[1]
     still = cells.choose(WAVE, SIZE, [], FRICTION)
-    assert still[0] == still[1] < along_x[0]
+    assert max(still) < along_x[0]
+    assert max(still) < 1.5 * min(still)  # squares, but for lengths that transform fast

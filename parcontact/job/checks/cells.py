@@ -26,7 +26,7 @@ from ..sections.stages import Initial, Stage, Steady
 Vector = tuple[float, float]
 
 ALONG, ACROSS, MESH_ORDER = 0.01, 0.0015, 2.5  # accuracy: of friction, at 8 and at 4 cells
-AREA, AREA_ORDER = 0.02, 1.6  # accuracy: of the corrected area, at 8 cells both ways
+AREA, AREA_ORDER = 0.025, 1.6  # accuracy: of the corrected area, at 8 cells both ways
 OPEN_FRICTION, OPEN_AREA = 2, 3  # accuracy: powers of the share that is open
 LIGHT = 0.1  # accuracy: the share in contact below which spots are small
 LIGHT_ALONG, LIGHT_ACROSS, LIGHT_AREA = 0.3, 0.9, 0.5  # accuracy: powers of it
