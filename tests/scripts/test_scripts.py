@@ -48,6 +48,7 @@ SMALL = {
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),
     "screenshots": Small(["nowhere"], r"^no screenshots: "),  # more: test_screenshots.py, where there is chromium
     "steady_table": Small(["128"], r"(?m)^[0-2] are off", (0, 1)),  # at 512 points none is
+    "sticky_area": Small(["--points", "64", "--to", "area.png"], r"(?s)with adhesion: .*without: .*picture: area.png"),
 }
 
 
