@@ -43,6 +43,31 @@ def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
         )
 
 
+def _in_curves(thermal: Thermal | None, history: Any, grid: Grid) -> Iterator[Fault]:
+    if thermal is None or thermal.counterbody is None:
+        return
+    if history:
+        yield Fault(
+            "is for friction curves: leave out the history, or the counterbody, and all heat goes into the rubber",
+            ("thermal", "counterbody"),
+        )
+    if grid.boundary == "free":
+        yield Fault("needs grid.boundary: periodic", ("thermal", "counterbody"))
+
+
+class Counterbody(Part):
+    """The rigid body, as it conducts heat."""
+
+    label: ClassVar[str] = "counterbody"
+    conductivity: Positive = Field(description="a positive conductivity of the rigid body [W/(m K)]")
+    diffusivity: Positive = Field(description="a positive thermal diffusivity of the rigid body [m^2/s]")
+
+    @property
+    def conductor(self) -> Conductor:
+        """The rigid body."""
+        return Conductor(self.conductivity, self.diffusivity)
+
+
 class Thermal(Part):
     """The `thermal` section: how the rubber conducts heat, and whether warm rubber relaxes faster."""
 
@@ -51,6 +76,7 @@ class Thermal(Part):
     diffusivity: Positive = Field(description="a positive thermal diffusivity of the rubber [m^2/s]")
     feedback: Literal["none", "mean"] = "none"
     distance: Positive | None = Field(default=None, description="a positive distance [m]")
+    counterbody: Counterbody | None = Field(default=None, description="a mapping with conductivity and diffusivity")
 
     @property
     def conductor(self) -> Conductor:
@@ -84,7 +110,10 @@ class ThermalColumns:
 
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
-    rules: ClassVar[tuple[Rule, ...]] = (Rule(("thermal", "material"), _shifts),)
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(("thermal", "material"), _shifts),
+        Rule(("thermal", "history", "grid"), _in_curves),
+    )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 
     @staticmethod

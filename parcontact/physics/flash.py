@@ -32,6 +32,18 @@ def spread_over(slab: Slab, weights: Array, total: float) -> Array:
     return weights * (total * slab.points / whole if whole > 0.0 else 0.0)
 
 
+def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: Array) -> float:
+    """Return the share of the heat of the interface that goes into the rubber: both surfaces are then equally warm in
+    the mean over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937) 222); collective.
+
+    `own` and `counterbody` are the rises [K] that all of this heat would make on either side, `other` is that of the
+    rubber by other heat; the mean is weighted by what is `rubbed`.
+    """
+    sums = slab.sum(*(float((rise * rubbed).sum()) for rise in (own, other, counterbody)))
+    whole = sums[0] + sums[2]
+    return min(max((sums[2] - sums[1]) / whole, 0.0), 1.0) if whole > 0.0 else 1.0
+
+
 def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
     """Return the temperatures of a contact, whose surface has these rises [K], from pairs of maps: a rise [K] and the
     heat that is made there; collective."""

@@ -14,7 +14,7 @@ import numpy as np
 from ..effects.thermal import Thermal
 from ..errors import RunError
 from ..parallel.slab import Array
-from ..physics.flash import Flash, flash_of, spread_over
+from ..physics.flash import Flash, flash_of, share_of, spread_over
 from ..physics.heat import depths_of, sliding_heat
 from ..physics.heat_unbounded import sliding_heat_unbounded
 from ..physics.measures import Measures
@@ -48,7 +48,12 @@ def warm(
         pairs.append((inside, heat))
     if (power := measures.friction_interface * measures.pressure * speed) > 0.0:
         rubbed = spread_over(slab, np.where(pressure > 0.0, 1.0, 0.0), power)
-        surface += operator().apply(rubbed, slab.empty())
+        rise = operator().apply(rubbed, slab.empty())
+        if section.counterbody is not None:
+            still = sliding_heat(fft, size, section.counterbody.conductor, (0.0, 0.0), time=operator.keywords["time"])
+            share = share_of(slab, rubbed, rise, surface, still.apply(rubbed, slab.empty()))
+            rubbed, rise = share * rubbed, share * rise
+        surface += rise
         inside += operator(depths).apply(rubbed, slab.empty())
         pairs.append((surface, rubbed))
     return flash_of(slab, surface, pairs), surface

@@ -97,6 +97,8 @@ def test_a_map_costs_as_a_branch() -> None:
 
 SHIFT = {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}
 WARMED = {**RUBBER, "shift": SHIFT}
+ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
+RUBS = {"shear_stress": 1e5}
 MEAN = {**WARM, "feedback": "mean"}
 PARTIAL = {"shape": "wave", "amplitude": 1e-5, "waves": [2, 0]}
 
@@ -139,10 +141,24 @@ def test_the_interface_is_shifted_with_the_rubber() -> None:
     assert found.measures.friction_interface == pytest.approx(stress * area / PRESSURE, rel=1e-9)
 
 
+def test_blok_shares_the_heat_of_the_interface() -> None:
+    """In full contact heat is uniform, and elastic rubber has the share of the effusivities of it, e/(e + e2); the better
+    the rigid body conducts, the less. A rigid body that conducts nothing leaves all."""
+    shares = []
+    for conductivity in (1e-9, 0.2, 20.0):
+        thermal = {**WARM, "counterbody": {"conductivity": conductivity, "diffusivity": 4e-7}}
+        point = hot(1.0, interface=RUBS, material=ELASTIC, surface={"shape": "flat"}, thermal=thermal)
+        alone = hot(1.0, interface=RUBS, material=ELASTIC, surface={"shape": "flat"}, thermal=WARM)
+        assert point.flash is not None
+        assert alone.flash is not None
+        shares.append(point.flash.mean / alone.flash.mean)
+        own, other = Conductor(0.2, 1e-7).effusivity, Conductor(conductivity, 4e-7).effusivity
+        assert shares[-1] == pytest.approx(own / (own + other), rel=1e-9)
+    assert shares == sorted(shares, reverse=True)
+
+
 # -- marches ----------------------------------------------------------------------------------------------------------
 
-ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
-RUBS = {"shear_stress": 1e5}
 SLIDE = {"pressure": PRESSURE, "velocity": SPEED, "distance": 4 * LENGTH, "cells_per_step": 1}
 
 
