@@ -25,7 +25,7 @@ history: [{pressure: 1.0e5, velocity: 0.1, distance: 3.125e-4, cells_per_step: 0
 output: {fields: [pressure], every: 7}
 checkpoint: {every: 5}
 """  # 160 steps and a jump
-SECONDS = 15.0  # in which a run that was hit must have ended
+SECONDS = 60.0  # in which a run that was hit must have ended
 BAD_INPUT, AGAIN = 2, 3
 
 
