@@ -82,11 +82,11 @@ class Effect(Protocol):
         ...
 
     def entries(self, units: Units) -> dict[str, Entry]:
-        """Return what it remembers after the last step, by name; maps are its own, not copies. Local to this rank."""
+        """Return what it remembers after the last step, by name; maps are its own, or made for a checkpoint."""
         ...
 
     def restore(self, saved: Saved) -> None:
-        """Go on from what a checkpoint has of the entries, in the run's units, numbers as arrays; local to this rank.
+        """Go on from what a checkpoint has of the entries, in the run's units, numbers as arrays.
 
         Maps have been read into those of `entries`.
         """

@@ -43,6 +43,11 @@ def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
         )
 
 
+def _no_warm_start(thermal: Thermal | None, initial: Any) -> Iterator[Fault]:
+    if thermal is not None and thermal.feedback != "none" and initial.state == "steady":
+        yield Fault("does not go with thermal.feedback: slide into the steady state with a stage", ("initial",))
+
+
 def _in_curves(thermal: Thermal | None, history: Any, grid: Grid) -> Iterator[Fault]:
     if thermal is None or thermal.counterbody is None:
         return
@@ -112,6 +117,7 @@ class ThermalColumns:
     columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("thermal", "material"), _shifts),
+        Rule(("thermal", "initial"), _no_warm_start),
         Rule(("thermal", "history", "grid"), _in_curves),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)

@@ -5,7 +5,7 @@ temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -24,6 +24,7 @@ from .point import Point
 MOST_ROUNDS = 10  # tuning: of the fixed point, more than any case has needed
 LEAST_ERROR = 0.02  # accuracy: of the flash temperature [K], 0.1 % of friction at most
 FINEST, COARSEST = 1e-3, 3e-2  # accuracy: of the same, relative
+HOTTEST = 200.0  # physics: rise of the temperature [K] above which rubber decomposes
 Vector = tuple[float, float]
 
 
@@ -94,4 +95,15 @@ class Feedback:
         raise RunError(
             f"steady sliding at {speed:g} m/s under {place[0]:g} Pa: the flash temperature did not settle in "
             f"{MOST_ROUNDS} rounds: rubber {last[0]:.4g} K warmer makes {last[0] + last[1]:.4g} K. Try feedback: none"
+        )
+
+
+def describe_hot(points: Sequence[Point]) -> Iterator[str]:
+    """Yield a sentence where rubber would become so hot that it is no rubber any more."""
+    hot = [(point.flash.mean, point.speed) for point in points if point.flash and point.flash.mean > HOTTEST]
+    if hot:
+        rise, speed = max(hot)
+        yield (
+            f"flash temperatures of {len(hot)} of {len(points)} points are above {HOTTEST:g} K, up to {rise:.3g} K at "
+            f"{speed:g} m/s: rubber decomposes there; take a smaller thermal.distance, velocity or pressure"
         )

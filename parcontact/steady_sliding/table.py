@@ -15,6 +15,7 @@ from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
 from ..storage.tables import GrowingTable
+from .heating import describe_hot
 from .point import Point
 from .sliding import SteadySliding
 
@@ -118,6 +119,7 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
+        self.warn(list(describe_hot(self._points)))
         self.warn(list(describe_missed(self._points, self._job.numerics.asked.both, bool(self._job.origin.mesh))))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)

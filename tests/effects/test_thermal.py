@@ -142,8 +142,8 @@ def test_the_interface_is_shifted_with_the_rubber() -> None:
 
 
 def test_blok_shares_the_heat_of_the_interface() -> None:
-    """In full contact heat is uniform, and elastic rubber has the share of the effusivities of it, e/(e + e2); the better
-    the rigid body conducts, the less. A rigid body that conducts nothing leaves all."""
+    """In full contact heat is uniform, and elastic rubber has the share e/(e + e2) of it, by the effusivities; the
+    better the rigid body conducts, the less. A rigid body that conducts nothing leaves all."""
     shares = []
     for conductivity in (1e-9, 0.2, 20.0):
         thermal = {**WARM, "counterbody": {"conductivity": conductivity, "diffusivity": 4e-7}}
@@ -263,12 +263,24 @@ def test_without_it_nothing() -> None:
     assert "thermal" not in marched(march_data(thermal=None))[0].scene.followers
 
 
+KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"
+
+
 @pytest.mark.parametrize(
     ("lines", "sentence"),
     [
         ("thermal: {conductivity: 0.2}", "5:10: thermal.diffusivity is missing"),
         ("thermal: {conductivity: -1, diffusivity: 1.0e-7}", "thermal.conductivity must be a positive conductivity"),
         ("thermal: {conductivity: 1, diffusivity: 1.0e-7, feedback: mean}", "5:59: thermal.feedback needs a material"),
+        (
+            f"{KEYS}, feedback: mean}}\ninitial: {{state: steady, velocity: 1, pressure: 1.0e5}}",
+            "initial does not go with",
+        ),
+        (f"{KEYS}, counterbody: {{conductivity: 2}}}}", "thermal.counterbody.diffusivity is missing"),
+        (
+            f"{KEYS}, counterbody: {{conductivity: 2, diffusivity: 1.0e-6}}}}\nhistory: [{{pressure: 1.0e5}}]",
+            "is for friction",
+        ),
         ("output: {fields: [temperature]}", "output.fields has temperature, which needs a thermal section"),
     ],
 )
