@@ -53,9 +53,11 @@ def draw(
         axes.legend()
 
     with style.drawing():
-        title = f"flow through the gap, {instant}\ncontact black, constriction circled"
+        circled = ", constriction circled" * any(flow.percolates for flow in flows)
+        title = f"flow through the gap, {instant}\ncontact black{circled}"
+        curve = [over] if len(rows) > 1 and any(row.constriction > 0.0 for row in rows) else []
         maps = [flow_map(axis, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
-        return style.save(style.figure_of(title, [maps, [over]] if len(rows) > 1 else [maps]), path)
+        return style.save(style.figure_of(title, [maps, curve] if curve else [maps]), path)
 
 
 def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux: Map) -> None:

@@ -68,11 +68,9 @@ class Gaps:
         """Return the gap [m] at a saved instant; raises InputError where it is not whole."""
         with self._open() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
-        if not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
+        if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
             step = int(self.fields.steps[index])
-            raise InputError(
-                f"{self.directory / 'fields.h5'}: the maps after step {step} have points that are no numbers"
-            )
+            raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are no whole maps of numbers")
         return np.where(pressure > 0.0, 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:
@@ -169,11 +167,14 @@ def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
 def _describe_closure(rows: Sequence[Instant], axis: str) -> str:
     """Say from which instant on contact closes the gap along an axis."""
     closed = [not getattr(row, f"percolates_{axis}") for row in rows]
+    if len(rows) == 1:
+        return f"along {axis}: {'closed' if closed[0] else 'open'}"
     if not any(closed):
         return f"along {axis}: open at all instants"
     first = rows[closed.index(True)]
-    where = f"{first.pressure:.4g} Pa, {first.contact_area:.3g} of the area in contact, at {first.time:g} s"
-    return f"along {axis}: closed at {sum(closed)} of {len(rows)} instants, first at {where}"
+    known = first.pressure == first.pressure  # its row of measures.csv is there
+    where = f", under {first.pressure:.4g} Pa, {first.contact_area:.3g} of the area in contact" if known else ""
+    return f"along {axis}: closed at {sum(closed)} of {len(rows)} instants, first at {first.time:g} s{where}"
 
 
 def _cell(value: float) -> str:
