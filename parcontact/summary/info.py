@@ -168,6 +168,16 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     if (directory / RESOLVED).exists():
         job = shown_job(directory / RESOLVED)
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
+        yield from (f"  {text}" for text in describe_pull_off(columns, job.grid.lx * job.grid.ly))
+
+
+def describe_pull_off(columns: Mapping[str, list[Any]], area: float) -> Iterator[str]:
+    """The lowest load of a surface that was pulled, and where: columns of measures.csv, area of the box [m^2]."""
+    pressures = columns["pressure"]
+    row = pressures.index(min(pressures))
+    if pressures[row] < 0.0:
+        where = f"t = {columns['time'][row]:g} s, approach {columns['approach'][row]:.4g} m"
+        yield f"lowest load: {pressures[row] * area:.4g} N, {pressures[row]:.4g} Pa, at {where}"
 
 
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
