@@ -10,6 +10,7 @@ from marching import marched
 from mpi4py import MPI
 
 from parcontact import scene
+from parcontact.effects.thermal import exponentials_of
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab
@@ -258,9 +259,22 @@ def test_a_step_costs_two_transforms_more() -> None:
     assert warm["operator"] == rubbed["operator"] == plain["operator"]
 
 
-def test_without_it_nothing() -> None:
-    """A job without the section has the counts of everything as before, and no map is held."""
-    assert "thermal" not in marched(march_data(thermal=None))[0].scene.followers
+def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A job without the section makes no memory of heat and calls nothing of it, in a march and in a friction curve;
+    with it there are a spectrum for each exponential and one of what is pressed, and the map of the rise."""
+
+    def refuse(*given: Any, **named: Any) -> None:
+        raise AssertionError("called without a thermal section")
+
+    warm = marched(march_data())[0].scene
+    for place in ("effects.thermal.HeatMemory", "effects.thermal.depths_of", "steady_sliding.sliding.warm"):
+        monkeypatch.setattr(f"parcontact.{place}", refuse)
+    plain = marched(march_data(thermal=None))[0].scene
+    assert states(job(thermal=None)).solve((SPEED, 0.0), PRESSURE).flash is None
+    assert "thermal" not in plain.followers
+    held = warm.slab.tally["map bytes"] - plain.slab.tally["map bytes"]
+    spectrum = 16 * 4 * 17  # bytes, of 32 x 4 points
+    assert held == (exponentials_of(warm.job).kept + 1) * spectrum + 8 * 32 * 4
 
 
 KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"
