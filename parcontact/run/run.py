@@ -11,6 +11,7 @@ from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
+from ..job.checks.cells import more_points
 from ..job.sections.calculation import BRANCH_SHARE
 from ..job.sections.listing import plain
 from ..march import loop
@@ -62,7 +63,8 @@ class Run:
         self.slab, self.job = march.scene.slab, march.scene.job
         self.timeline = march.timeline(options.until or 0.0)
         known = set(sanity.ODD_CONTACTS if options.beside else ())
-        self.contacts = sanity.ContactWatch(self.job.numerics.strict, self.timeline, known)
+        more = more_points(self.job.grid)
+        self.contacts = sanity.ContactWatch(self.job.numerics.strict, self.timeline, known, more)
         self.watch.state_bytes = sum(entry.nbytes for entry in march.entries().values()) * self.slab.comm.size
         self.first, self.saved, self.failed, self.stop = march.row.step, -1, False, ""
         self.began, self.saving = time.monotonic(), 0.0

@@ -128,6 +128,7 @@ class ContactWatch:
     strict: bool
     timeline: Timeline
     seen: set[str] = field(default_factory=set)
+    more: str = "more grid.points"
 
     def judge(self, step: int, measures: Measures) -> list[str]:
         """Return warnings about a step; raises RunError where they are errors."""
@@ -136,7 +137,9 @@ class ContactWatch:
 
     def judge_point(self, measures: Measures, where: str, final: bool = True) -> list[str]:
         """Return warnings about a contact, of its cells if it is `final`; raises RunError where they are errors."""
-        found = dict(zip(ODD_CONTACTS, (at_edge(measures), few_cells(measures) if final else ""), strict=True))
+        found = dict(
+            zip(ODD_CONTACTS, (at_edge(measures), few_cells(measures, self.more) if final else ""), strict=True)
+        )
         new = {kind: f"{where}: {text}" for kind, text in found.items() if text and kind not in self.seen}
         self.seen |= new.keys()
         if new and self.strict:
@@ -154,13 +157,13 @@ def at_edge(measures: Measures) -> str:
     )
 
 
-def few_cells(measures: Measures) -> str:
-    """Return what to say of contacts that consist of their own edges, or ''."""
+def few_cells(measures: Measures, more: str) -> str:
+    """Return what to say of contacts that consist of their own edges, or ''; `more` points are where they pay."""
     area = measures.contact_area
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
     if excess <= FEW_CELLS:
         return ""
     return (
         f"spots of contact are only a few cells wide: contact_area is about {excess:.1%} too large (more than "
-        f"{FEW_CELLS:.0%} is warned of); use more grid.points, a smaller grid.size or a larger load"
+        f"{FEW_CELLS:.0%} is warned of); use {more}, a smaller grid.size or a larger load"
     )

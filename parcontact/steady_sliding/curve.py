@@ -11,6 +11,7 @@ from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, identity
+from ..job.checks.cells import more_points
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -166,7 +167,7 @@ class _Curve:
 
     def __post_init__(self) -> None:
         chosen, self.slab = self.sliding.setup.choices, self.sliding.setup.slab
-        self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline)
+        self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
 
     def go(self) -> int:
         """Solve what lacks; collective. Returns the exit code."""

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from parcontact.job.checks import cells
-from parcontact.job.sections.calculation import Accuracy
+from parcontact.job.sections.calculation import Accuracy, Grid
 
 SIZE = (1e-3, 1e-3)
 WAVE = 6.25e-5
@@ -57,3 +57,13 @@ def test_long_cells_lie_across_the_sliding() -> None:
     still = cells.choose(WAVE, SIZE, [], FRICTION)
     assert max(still) < along_x[0]
     assert max(still) < 1.5 * min(still)  # squares, but for lengths that transform fast
+
+
+def test_where_more_points_pay() -> None:
+    """Along the longer sides of cells; on squares and lines of points nothing is said."""
+    found = [
+        cells.more_points(Grid(points=points, size=SIZE))
+        for points in ((64, 64), (64, 60), (64, 16), (16, 64), (64, 1))
+    ]
+    more = "more grid.points"
+    assert found == [more, more, f"{more} along y", f"{more} along x", more]

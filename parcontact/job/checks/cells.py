@@ -34,6 +34,7 @@ TYPICAL = 0.2  # accuracy: share in contact, where none is known
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across
 LEAST_CELLS = 2.1  # accuracy: per shortest wave; the grid has no waves shorter than two
+LONG = 1.2  # accuracy: cells with such sides are no squares
 LONGEST = 8.0  # accuracy: the longer side of a cell over the shorter, in the experiments
 MOST_CELLS = 400.0  # tuning: per shortest wave
 MULTIPLE = 16  # of which points along a side are, so that there are coarser grids to start from
@@ -100,6 +101,13 @@ def _unit(way: Vector) -> Vector:
     """Return the unit vector along a way that points to +x, or to +y, rounded."""
     sign = math.copysign(1.0, way[0] or way[1]) / math.hypot(*way)
     return round(sign * way[0], 9), round(sign * way[1], 9)
+
+
+def more_points(grid: Grid) -> str:
+    """Return where more points pay for edges of contact: along the longer sides of cells."""
+    if 1 in grid.points or max(grid.dx, grid.dy) < LONG * min(grid.dx, grid.dy):
+        return "more grid.points"
+    return f"more grid.points along {'x' if grid.dx > grid.dy else 'y'}"
 
 
 def fast_length(least: float) -> int:

@@ -12,6 +12,7 @@ from typing import Any
 from ..sections.calculation import Grid
 from ..sections.geometry import Flat, Rough, Sphere, Wave
 from ..sections.stages import Stage
+from .cells import more_points
 
 THICKEST = 1 / 3  # physics: what presses into a layer over its thickness; beyond, strains are not small
 FEWEST_CELLS = 2.0  # accuracy: in a thickness, over which the pressure at the edge of a contact falls
@@ -30,7 +31,7 @@ def warnings(
     if body.thickness < FEWEST_CELLS * cell and grid.boundary == "periodic" and not smooth:
         yield (
             f"body.thickness: {body.thickness:g} m is thinner than {FEWEST_CELLS:g} cells of {cell:.3g} m, and the "
-            "edges of contacts are not resolved; use more grid.points, or a smaller grid.size"
+            f"edges of contacts are not resolved; use {more_points(grid)}, or a smaller grid.size"
         )
     if text := strained(2.0 * _rms_height(grid, surface), body.thickness):
         yield text
