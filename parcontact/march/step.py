@@ -105,17 +105,34 @@ def _accepted(scene: Scene, state: State, step: Step) -> tuple[Solved, Estimate,
             continue
         errors = estimate_errors(scene, state.observations, solved)
         if step.judge is None:
-            return solved, errors, None
+            return _remarked(scene, state, solved), errors, None
         error = scene.slab.agree(errors.step)
         if solved.stuck is None:
             verdict = step.judge(error)
         else:
             front = _front(scene, state, solved)
             verdict = step.judge(error, front)
-            solved = replace(solved, stuck=solved.stuck._replace(snapped=front > sticking.SNAP_FRONT))
+            snapped = solved.stuck.snapped or front > sticking.SNAP_FRONT
+            solved = replace(solved, stuck=solved.stuck._replace(snapped=snapped))
         if not isinstance(verdict, Step):
             return solved, errors, verdict
         step = verdict
+
+
+def _remarked(scene: Scene, state: State, solved: Solved) -> Solved:
+    """Return a step of a viscoelastic contact with adhesion with what to say if it is too long, once in a run."""
+    stuck, step = solved.stuck, solved.step
+    if stuck is None or stuck.memory.told or step.jump or scene.material.branched is None:
+        return solved
+    front = _front(scene, state, solved)
+    if front <= sticking.SNAP_FRONT:
+        return solved
+    remark = (
+        f"{failure.where(scene, step)}: the edge of contact moves by {0.5 * front:.2g} process zones, and rates are "
+        "resolved up to half of one: use shorter steps, or time_step: auto; further steps are not looked at"
+    )
+    memory = replace(stuck.memory, told=True)
+    return replace(solved, stuck=stuck._replace(memory=memory), remark=solved.remark or remark)
 
 
 def _loses(state: State, stuck: sticking.StuckContact) -> bool:

@@ -51,7 +51,8 @@ class StickingMemory:
 
     `lag` is what a free body lacks (`solve.adhesive.sticking`) per pressure, for the modulus `modulus`, None of a
     periodic one. `energies` are counted where they are asked for. `detached` is when nothing held the surfaces any more
-    [s], under which load; NEVER before. `snaps` is the number of steps in which the contact snapped.
+    [s], under which load; NEVER before. `snaps` is the number of steps in which the contact snapped; `told`
+    says that the run has been told of steps that are too long.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -62,6 +63,7 @@ class StickingMemory:
     energies: StickingEnergies = NO_ENERGIES
     detached: tuple[float, float] = NEVER
     snaps: int = 0
+    told: bool = False
 
 
 class StuckContact(NamedTuple):
@@ -150,7 +152,8 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
         began[...] = gap
     contact = replace(contact, iterations=iterations)
     pasts = PastGap(gap, step.position, True), memory.pasts[0]
-    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.energies, snaps=memory.snaps)
+    now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.energies)
+    now = replace(now, snaps=memory.snaps, told=memory.told)
     (flips,) = scene.slab.sum(kernels.count_flips(memory.pasts[0].gap, gap)) if now_known else (0.0,)
     columns = _columns(scene, trial, contact.p)
     return StuckContact(contact, now, gap == 0.0, columns, work.total * trial.alpha, flips, snapped, detached)

@@ -230,6 +230,8 @@ def _longest_slide(timeline: Timeline) -> float:
 
 def _material(job: Job) -> Prony:
     """Return the incompressible body that is as stiff as the job's half space, to which nu is a factor."""
+    if job.section("adhesion") is not None:
+        raise InputError("the theory excludes adhesion: leave out the section adhesion")
     if job.material.hardness is not None:
         raise InputError("the theory excludes counterbodies that yield: leave out material.hardness")
     series, factor = relaxation_of(job.material), 0.5 / (1.0 - job.material.poisson)

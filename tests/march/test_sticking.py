@@ -177,3 +177,14 @@ def test_chosen_steps_follow_the_edge() -> None:
     snapped = np.array([row.errors is None for row in found[1:]])
     assert march.state.sticking is not None
     assert 0.1 < moved[(areas[:-1] > 0.01) & ~snapped].max() < 1.5
+
+
+def test_given_steps_that_are_too_long_are_said_once() -> None:
+    """A rubber sphere is pulled off in three steps: the edge passes many process zones, which one remark says."""
+    rubber = {**ZENER, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
+    grid = {"points": 32, "size": 4e-4, "boundary": "free"}
+    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": rubber}
+    job["adhesion"] = {**STICK, "range": 3e-7}
+    pull = {"approach": {"from": 1e-6, "to": -1e-6}, "duration": 3.0, "time_step": 1.0}
+    _, found = marched({**job, "history": [{"approach": 1e-6}, pull]})
+    assert ["process zones" in row.remark for row in found].count(True) == 1
