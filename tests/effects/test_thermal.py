@@ -74,16 +74,6 @@ def test_a_wave_in_full_contact() -> None:
     assert point.flash.lower < point.flash.mean < point.flash.upper
 
 
-def test_heat_of_the_interface_adds() -> None:
-    """In full contact it is uniform, which changes the mean of the box alone, by 2 q sqrt(t/pi)/e."""
-    plain, rubbed = (states(job(interface=section)) for section in (None, {"shear_stress": 1e5}))
-    for each in (plain, rubbed):
-        each.solve((SPEED, 0.0), PRESSURE)
-    one, other = plain.field("temperature"), rubbed.field("temperature")
-    added = 2e5 * SPEED / math.sqrt(math.pi) / Conductor(0.2, 1e-7).effusivity
-    assert np.abs(other - one - added).max() < 1e-9 * added
-
-
 def test_a_map_costs_as_a_branch() -> None:
     """Two transforms for the rise, as for the map of a branch, two for that at depth, and one for the depths."""
     with_map, without = states(job()), states(job(thermal=None))
