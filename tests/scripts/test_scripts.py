@@ -42,6 +42,9 @@ SMALL = {
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
+    "many_ranks": Small(
+        ["--ranks", "2", "--points", "64"], r"(?m)^  2 ranks: apart [\d.e-]+; a step .* exchanges of transforms$"
+    ),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*[1-9]\d+ steps"),
