@@ -149,9 +149,11 @@ def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
 
 @pytest.mark.mpi
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
+    """Preconditioners sum up in single precision, to 1e-7 of the steps of a solve, of which the last are 1e-2 or less of
+    the pressure."""
     for boundary in ("periodic", "free"):
         job = rough(3e4, boundary, body={"thickness": 1e-4})
-        assert last_row(job, comm).max_pressure == pytest.approx(last_row(job).max_pressure, rel=1e-9)
+        assert last_row(job, comm).max_pressure == pytest.approx(last_row(job).max_pressure, rel=1e-8)
 
 
 @pytest.mark.parametrize(
