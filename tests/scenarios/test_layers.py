@@ -149,7 +149,7 @@ def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
 
 @pytest.mark.mpi
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
-    """Preconditioners sum up in single precision: to 1e-7 of a step of a solve, the last of which are 1e-2 of p or less."""
+    """Preconditioners sum up in single precision: to 1e-7 of a step, the last of which are 1e-2 of p or less."""
     for boundary in ("periodic", "free"):
         job = rough(3e4, boundary, body={"thickness": 1e-4})
         assert last_row(job, comm).max_pressure == pytest.approx(last_row(job).max_pressure, rel=1e-8)
