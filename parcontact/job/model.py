@@ -94,8 +94,8 @@ class Job(Part):
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
-        """Return the sections, and the sweep, which is gone once a case is read."""
-        return (*super().words(), "sweep")
+        """Return the sections, those of our effects too, and the sweep, which is gone once a case is read."""
+        return (*dict.fromkeys((*super().words(), *added_sections.OURS)), "sweep")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Job) and dict(self) == dict(other)
