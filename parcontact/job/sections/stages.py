@@ -19,6 +19,7 @@ Control = Literal["pressure", "force", "approach"]
 CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
 PRESSURE = "a pressure [Pa] of zero or more"
 FORCE = "a force [N] of zero or more"
+SIGNED = ", with adhesion also below zero"
 APPROACH = "a finite approach [m]"
 SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
 
@@ -109,8 +110,8 @@ class Stage(Part):
     """One stage of the history: a load, a velocity, and how long they last; an instantaneous stage is one solve."""
 
     name: str = Field(default="stage", description="text (put numbers in quotes)")
-    pressure: Annotated[Ramp | None, _ramp(Real, PRESSURE)] = Field(default=None, description=PRESSURE)
-    force: Annotated[Ramp | None, _ramp(Real, FORCE)] = Field(default=None, description=FORCE)
+    pressure: Annotated[Ramp | None, _ramp(Real, PRESSURE)] = Field(default=None, description=PRESSURE + SIGNED)
+    force: Annotated[Ramp | None, _ramp(Real, FORCE)] = Field(default=None, description=FORCE + SIGNED)
     approach: Annotated[Ramp | None, _ramp(Real, APPROACH)] = Field(default=None, description=APPROACH)
     velocity: Velocity = (0.0, 0.0)
     duration: Positive | None = Field(default=None, description="a positive time [s]")
