@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from ..errors import InputError
 from ..history.timeline import Step
@@ -35,7 +35,8 @@ class Instant:
     """A step just made, in the run's units unless others are given; maps are valid until the next step begins.
 
     The pressure on this rank's rows is `modulus pressure` (0 outside contact), `displacement` that of the body; both
-    have the shape (ny_loc, nx). `slid` [m] is by how much the surface moved in the step.
+    have the shape (ny_loc, nx). `slid` [m] is by how much the surface moved in the step. With adhesion `touching` is
+    where the surfaces touch.
     """
 
     step: Step
@@ -45,6 +46,12 @@ class Instant:
     slid: float
     measures: Measures
     sticking: tuple[float, ...] | None = None
+    touching: Array | None = None
+
+    @property
+    def closed(self) -> NDArray[Any]:
+        """Where the surfaces touch: under pressure, unless they stick."""
+        return self.pressure > 0.0 if self.touching is None else self.touching
 
 
 class Effect(Protocol):

@@ -59,7 +59,7 @@ class LeakageColumns:
         scene, setup = self._scene, self._scene.setup
         approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
         gap = scene.gap(instant.displacement, instant.step.position, approach)
-        whole = scene.slab.to_root(np.where(instant.pressure > 0.0, 0.0, np.maximum(gap, 0.0)))
+        whole = scene.slab.to_root(np.where(instant.closed, 0.0, np.maximum(gap, 0.0)))
         if whole is not None:
             found = leak(whole, setup.grid.size, setup.grid.boundary == "periodic")
             self._values = found.flow_x, found.flow_y, found.constriction

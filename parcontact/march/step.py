@@ -45,7 +45,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     energy = _advance_energy(scene, state, solved)
     if solved.stuck is not None and energy is not None:
         solved = replace(solved, stuck=_count_energies(scene, state, solved, energy, slid))
-    if solved.stuck is not None and (solved.stuck.snapped or _loses(state, solved.stuck)):
+    if solved.stuck is not None and (solved.stuck.snapped or _loses(state, solved)):
         solved, errors = replace(solved, stuck=solved.stuck.noted()), replace(errors, budget=None)
     _tell_effects(scene, solved, slid)
     if state.chosen is not None and verdict is not None:
@@ -109,6 +109,8 @@ def _accepted(scene: Scene, state: State, step: Step) -> tuple[Solved, Estimate,
         error = scene.slab.agree(errors.step)
         if solved.stuck is None:
             verdict = step.judge(error)
+        elif sticking.is_apart(solved.stuck, state.row.measures, solved.measures):
+            verdict = step.judge(0.0)
         else:
             front = _front(scene, state, solved)
             verdict = step.judge(error, front)
@@ -135,9 +137,12 @@ def _remarked(scene: Scene, state: State, solved: Solved) -> Solved:
     return replace(solved, stuck=stuck._replace(memory=memory), remark=solved.remark or remark)
 
 
-def _loses(state: State, stuck: sticking.StuckContact) -> bool:
-    """Return whether a step has lost energy in a snap, as far as energies are counted."""
-    return state.sticking is not None and stuck.memory.energies.lost > state.sticking.energies.lost
+def _loses(state: State, solved: Solved) -> bool:
+    """Return whether a step has lost energy in a snap, where energies are counted."""
+    stuck, past = solved.stuck, state.sticking
+    if stuck is None or past is None or sticking.is_apart(stuck, state.row.measures, solved.measures):
+        return False
+    return stuck.memory.energies.lost > past.energies.lost
 
 
 def _front(scene: Scene, state: State, solved: Solved) -> float:
@@ -166,11 +171,11 @@ def _count_energies(
 
 def _tell_effects(scene: Scene, solved: Solved, slid: float) -> None:
     """Tell the effects that follow the steps of one that was made; collective."""
-    u = solved.body.displacement
+    u, stuck = solved.body.displacement, solved.stuck
     assert u is not None
-    columns = None if solved.stuck is None else solved.stuck.columns
+    told = () if stuck is None else (stuck.columns, stuck.touching)
     for follower in scene.followers.values():
-        follower.follow(Instant(solved.step, solved.contact.p, solved.trial.alpha, u, slid, solved.measures, columns))
+        follower.follow(Instant(solved.step, solved.contact.p, solved.trial.alpha, u, slid, solved.measures, *told))
 
 
 # -- the contact of a step ---------------------------------------------------------------------------------------------

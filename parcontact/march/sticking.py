@@ -159,6 +159,12 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     return StuckContact(contact, now, gap == 0.0, columns, work.total * trial.alpha, flips, snapped, detached)
 
 
+def is_apart(stuck: StuckContact, before: Measures, now: Measures) -> bool:
+    """Return whether nothing touches before and after a step, and no point is under tension after it: what is left of
+    the load is no more than the solver's error."""
+    return not (before.contact_area or now.contact_area or stuck.columns[0])
+
+
 def front_of(scene: Scene, flips: float, before: Measures, now: Measures) -> float:
     """Return by how many half process zones the edge of the contact has moved in a step, in the mean.
 

@@ -47,8 +47,9 @@ class Gaps:
     def __init__(self, directory: Path, at: str = "") -> None:
         if not (directory / "measures.csv").is_file():
             raise InputError(f"{directory} is no output directory of a run; those of a sweep are in its cases/")
-        self.directory, grid = directory, shown_job(directory / RESOLVED).grid
-        self.size, self.periodic = grid.size, grid.boundary == "periodic"
+        job = shown_job(directory / RESOLVED)
+        self.directory, self.sticks = directory, job.section("adhesion") is not None
+        self.size, self.periodic = job.grid.size, job.grid.boundary == "periodic"
         self.columns = tables.read(directory / "measures.csv")
         try:
             with self._open() as file:
@@ -71,7 +72,7 @@ class Gaps:
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
             step = int(self.fields.steps[index])
             raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are no whole maps of numbers")
-        return np.where(pressure > 0.0, 0.0, np.maximum(gap, 0.0))
+        return np.maximum(gap, 0.0) if self.sticks else np.where(pressure > 0.0, 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:
         """Return the gap [m] of the undeformed surface that just touches; raises InputError where its heights are not

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from restarting import ELASTIC, ROUGH, SPHERE, ZENER, Bench, cut, rows, same
 
+from parcontact.leakage.flow import leak
 from parcontact.summary import info
 
 STICK = {"work": 0.05, "range": 1e-6}
@@ -188,3 +189,31 @@ def test_given_steps_that_are_too_long_are_said_once() -> None:
     pull = {"approach": {"from": 1e-6, "to": -1e-6}, "duration": 3.0, "time_step": 1.0}
     _, found = marched({**job, "history": [{"approach": 1e-6}, pull]})
     assert ["process zones" in row.remark for row in found].count(True) == 1
+
+
+def test_chosen_steps_of_surfaces_apart_are_long() -> None:
+    """Before it touches and is under tension, a load is no more than the solver's error: that shortens no step of
+    rubber whose fastest branch relaxes in 1e-9 of the stage (thousands of steps if it did), and is no snap."""
+    grid = {"points": 24, "size": 3e-4, "boundary": "free"}
+    branches = [{"modulus": 1e6 * 10**k, "relaxation_time": 10.0 ** (-3 * k)} for k in range(4)]
+    body = {"model": "zener", "modulus_inf": 1e6, "branches": branches}
+    surface = {"shape": "sphere", "radius": 1e-3}
+    history = [{"approach": {"from": -4e-5, "to": -2e-5}, "duration": 1.0}]
+    job = {"grid": grid, "surface": surface, "material": body, "adhesion": STICK, "history": history}
+    march, made = marched({**job, "numerics": {"accuracy": 0.05}})
+    assert len(made) < 100
+    assert march.state.sticking is not None
+    assert march.state.sticking.snaps == 0
+
+
+def test_a_fluid_flows_where_the_gap_is_open() -> None:
+    """Contacts that stick are closed where their gap is 0, whatever the pressure: the flow of a run is that through the
+    map of gaps, to the solver's tolerance; it rises when the sphere is pulled off."""
+    grid = {"points": 24, "size": 3e-4, "boundary": "free"}
+    history = [{"approach": {"from": 1e-6, "to": -3e-6}, "duration": 1.0, "time_step": 0.25}]
+    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": ELASTIC, "adhesion": STICK}
+    march, made = marched({**job, "leakage": {"every": 1}, "history": history})
+    found = leak(march.field("gap"), (3e-4, 3e-4), periodic=False)
+    flows = [row.added[-3] for row in made if row.step]
+    assert flows[-1] == pytest.approx(found.flow_x, rel=1e-3)
+    assert 0.0 < flows[0] < flows[-1]
