@@ -17,7 +17,6 @@ from parcontact.job import (
     describe,
     log_range,
 )
-from parcontact.job.added_sections import OURS
 from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.resolved import shown_job
 
@@ -142,13 +141,6 @@ def test_accuracy_chooses_what_is_not_given(tmp_path: Path) -> None:
 
 def test_an_empty_value_is_an_absent_key(tmp_path: Path) -> None:
     assert job_of(tmp_path, SMALL, "numerics=", "title=").numerics.tolerance == 5e-3
-
-
-@pytest.mark.parametrize("section", OURS)
-def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section: str) -> None:
-    assert job_of(tmp_path, SMALL + f"{section}:\n") == job_of(tmp_path, SMALL)
-    with pytest.raises(InputError, match=f"zzzzzz is not a known key; there are .*\\b{section}\\b"):
-        job_of(tmp_path, SMALL + "zzzzzz: 1\n")
 
 
 def test_anchors_and_merges(tmp_path: Path) -> None:
