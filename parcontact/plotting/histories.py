@@ -17,6 +17,13 @@ from .run import Run
 EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
 FEW_ROWS = 8
 FLASH = "flash_temperature"
+ENERGIES = {
+    "work done": "work",
+    "dissipated": "dissipated",
+    "stored": "stored",
+    "surfaces": "surface_energy",
+    "snaps": "snap_loss",
+}
 VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
@@ -86,7 +93,7 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
         (
             "approach",
             Axis("approach", UNITS["approach"]),
-            {"": np.where(load > 0.0, columns["approach"], np.nan)},
+            {"": np.where(load != 0.0, columns["approach"], np.nan)},
             free and along.axis.name != "approach",
         ),
         ("gap", Axis("mean gap", UNITS["mean_gap"]), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
@@ -101,7 +108,7 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
         (
             "energy",
             Axis("energy", UNITS["work"]),
-            {"work done": columns["work"], "dissipated": columns["dissipated"], "stored": columns["stored"]},
+            {name: columns[column] for name, column in ENERGIES.items() if column in columns},
             run.lasts and bool(np.isfinite(columns["work"]).all()),
         ),
     )

@@ -49,7 +49,8 @@ def _draw_pressures(
         axes.plot(x, pressure, "k" + dashes, lw=1.0, label=name)
     if reach:
         axes.set_xlim(-reach, reach)
-    axes.set_ylim(bottom=0.0)
+    if not any((pressure < 0.0).any() for _, _, pressure in curves):
+        axes.set_ylim(bottom=0.0)
     axes.set_title(title)
     axes.locator_params(nbins=5)
     units.label(axes.xaxis, along, "m")

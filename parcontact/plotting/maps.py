@@ -86,11 +86,14 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
 
 
 def mask(name: str, values: Array, pressure: Array | None) -> Array:
-    """Return a map as it is drawn: pressures where there are any, gaps, none negative, where there is no contact."""
+    """Return a map as it is drawn: pressures where there are any, gaps, none negative, where there is no contact.
+
+    Only contacts that stick have pressures below 0: theirs are drawn everywhere, and closed is where the gap is 0.
+    """
     if name == "pressure":
-        return np.where(values > 0.0, values, np.nan)
+        return values if (values < 0.0).any() else np.where(values > 0.0, values, np.nan)
     if name == "gap":
-        closed = values <= 0.0 if pressure is None else pressure > 0.0
+        closed = values <= 0.0 if pressure is None or (pressure < 0.0).any() else pressure > 0.0
         return np.where(closed, np.nan, np.maximum(values, 0.0))
     return values
 
@@ -98,7 +101,7 @@ def mask(name: str, values: Array, pressure: Array | None) -> Array:
 def _find_window(pressure: Array | None) -> Window:
     """Return the rows and columns around a contact that fills only a part of the box; else all of them."""
     whole = slice(None), slice(None)
-    if pressure is None or not (pressure > 0.0).any():
+    if pressure is None or not (pressure > 0.0).any() or (pressure < 0.0).any():
         return whole
     cut = []
     for axis in (1, 0):

@@ -128,3 +128,15 @@ def test_load_over_approach_is_a_loop(tmp_path: Path, drawn: list[Figure]) -> No
     assert x.size == 9
     assert np.all(np.diff(x[:5]) > 0)
     assert np.all(np.diff(x[4:]) < 0)
+
+
+def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Approach, force and pressure go below 0, and all five energies are there."""
+    stick = "adhesion: {work: 0.05, range: 3.0e-6}\noutput: {energy: true, fields: [pressure]}\n"
+    stages = "history: [{approach: {from: -4.0e-6, to: -1.0e-6}, duration: 1.0, time_step: 0.25}]\n"
+    plots.plot([ran(tmp_path, SPHERE + ELASTIC + stick + stages)])
+    found = {axes.get_ylabel().split(" [")[0]: axes for axes in drawn[0].axes if axes.get_lines()}
+    for name in ("approach", "force", "pressure"):
+        assert found[name].get_ylim()[0] < 0.0
+        assert min(np.nanmin(np.array(line.get_ydata())) for line in found[name].get_lines()) < 0.0
+    assert len(found["energy"].get_legend_handles_labels()[1]) == 5

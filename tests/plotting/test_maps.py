@@ -128,3 +128,11 @@ def test_rare_colours_stay() -> None:
     colors[:2] = np.arange(256)[None, :, None]
     found = np.asarray(Image.open(io.BytesIO(results.to_small_png(Image.fromarray(colors)))).convert("RGB"))
     assert np.abs(found.astype(int) - colors).max() <= 0.02 * 255
+
+
+def test_contacts_that_stick_are_closed_where_their_gap_is_zero() -> None:
+    """Pressures below 0, which only they have, are drawn; a rest of pressure where the gap is open closes nothing."""
+    pressure, gap = np.array([[3.0, -2.0, 1e-6, -1e-9]]), np.array([[0.0, 0.0, 2e-6, 3e-6]])
+    assert np.isnan(maps.mask("gap", gap, pressure)).tolist() == [[True, True, False, False]]
+    assert np.array_equal(maps.mask("pressure", pressure, None), pressure)
+    assert np.isnan(maps.mask("gap", gap, np.abs(pressure))).all()
