@@ -2,7 +2,6 @@
 
     .venv/bin/python scripts/bench.py [PART...] [--points 512] [--rounds 15] [--json FILE] [--peers DIRECTORY]
 
-    fft      a forward and a backward transform, over FFTW alone; planning them, the first time and again
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
@@ -12,7 +11,6 @@
     effects  what each effect adds to a step at equal iterations; --picture draws it
     start    the command line, over an interpreter that only imports numpy
     scale    a transform, a cold solve and a sliding step on two ranks, over one
-    memory   bytes of a run as they are planned and held, and in maps
     sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
     large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
 
@@ -39,14 +37,14 @@ from bench.adhesive import adhesion
 from bench.effects import effects
 from bench.program import start
 from bench.scaling import WORLD, march, scale
-from bench.slides import folded, held, slide, steady
-from bench.solves import fft, large, sizes, solve
+from bench.slides import folded, slide, steady
+from bench.solves import large, sizes, solve
 from bench.table import Line
 
 FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
-PARTS = {"fft": fft, "solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
-PARTS |= {"folded": folded, "memory": held, "sizes": sizes, "large": large, "adhesion": adhesion}
+PARTS = {"solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
+PARTS |= {"folded": folded, "sizes": sizes, "large": large, "adhesion": adhesion}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills runs, fills disks and damages checkpoints; then the same command must finish with the undisturbed result.
 
-    .venv/bin/python scripts/faults.py [--trials 320] [--seed 0] [--kinds kill,race] [--only NUMBER]
+    .venv/bin/python scripts/faults.py [--trials 320] [--seed 0] [--kinds kill,fill] [--only NUMBER]
 
 Each trial is of one kind, by its number. `kill` is SIGKILL of one rank, of all ranks, or of mpirun too, at a random
 instant, every other time inside the writing of a checkpoint; the others are described below. `fill` needs root (it
@@ -11,7 +11,6 @@ lost, hung or changed.
 
 import contextlib
 import csv
-import fcntl
 import os
 import signal
 import subprocess
@@ -50,7 +49,7 @@ output: {fields: [pressure, gap], every: 10, energy: true}
 checkpoint: {every: 4, keep: 2}
 numerics: {tolerance: 1.0e-3}
 """
-KINDS = ("kill", "damage", "fall_back", "fill", "race", "vanish", "lock", "narrow")
+KINDS = ("kill", "damage", "fall_back", "fill", "vanish", "narrow")
 VANISHING = ("fields.xdmf", "run.log", "job.yaml", "job.resolved.yaml", ".lock", ".parcontact")
 LIMITS = {"f": (1, 6000), "n": (8, 60), "v": (200_000, 1_500_000)}  # of ulimit: kB of a file, open files, kB of memory
 Faults = Iterator[str]
@@ -157,14 +156,6 @@ class Disturbances:
         finally:
             subprocess.run(["umount", mount], check=True)
 
-    def race(self, out: Path) -> Faults:
-        """Two runs begin together in a new directory: one runs, the other is refused or finds it finished."""
-        both = [self.start(out), self.start(out)]
-        codes = sorted(process.wait(600) for process in both)
-        if codes not in ([0, 0], [0, 2]):
-            yield f"race: ended with {codes}"
-        yield from self.judged(out)
-
     def vanish(self, out: Path) -> Faults:
         """A file is removed, or replaced, while a run writes it; or all of the directory is removed."""
         process, name = self.under_way(out), self.dice.choice((*VANISHING, "all"))
@@ -175,17 +166,6 @@ class Disturbances:
             if self.dice.random() < 0.5 and not name.startswith("."):
                 (out / name).write_text("mine")
         yield from self.ended(process, f"{name} removed")
-        yield from self.judged(out)
-
-    def lock(self, out: Path) -> Faults:
-        """Another program has locked fields.h5 when a run is to go on: refused, and nothing changes."""
-        self.stopped(out)
-        with (out / "fields.h5").open("rb") as file:
-            before = file.read()
-            fcntl.flock(file, fcntl.LOCK_EX)
-            yield from self.ended(self.start(out), "fields.h5 locked", (2,))
-        if (out / "fields.h5").read_bytes() != before:
-            yield "lock: the file has changed"
         yield from self.judged(out)
 
     def narrow(self, out: Path) -> Faults:

@@ -1,4 +1,4 @@
-"""Parts `slide`, `folded`, `steady` and `memory`: sliding step by step and directly, and what a run holds.
+"""Parts `slide`, `folded` and `steady`: sliding step by step and directly.
 
 The slide beside peers has eight branches and backward Euler, as tamaas can do it too: relaxation times from 1e-4 to
 1e3, moduli of 2 each over a long-term modulus of 1, in a box of length 1 at a velocity of 1, by one cell a step.
@@ -21,7 +21,6 @@ import parcontact as pc
 from parcontact import scene
 from parcontact.job import load
 from parcontact.parallel.slab import Slab
-from parcontact.plan import memory
 from parcontact.steady_sliding.sliding import SteadySliding
 
 from .peers import TAMAAS_SLIDING, Task, compare_peers
@@ -142,14 +141,3 @@ def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
     curve = [sliding.solve((0.03 * 10 ** (k / 8), 0.0), 1e5).operator_calls for k in range(min(17, rounds + 2))]
     yield Line("curve: operator calls per further point", statistics.fmean(curve[1:]))
     yield Line("curve: the most of them", max(curve[1:]))
-
-
-def held(points: int, *_: object) -> Iterator[Line]:
-    march = begun(sliding_job(points, 2))
-    slab = march.scene.slab
-    begun_with = slab.tally["map bytes"]
-    marched(march)
-    yield Line("planned", memory.total(march.scene.job) / 1e6, "MB")
-    yield Line("held", begun_with / 1e6, "MB")
-    yield Line("held at most, the first solve included", slab.tally["map bytes at most"] / 1e6, "MB")
-    yield Line("held at most, in maps", slab.tally["map bytes at most"] / (8 * points * points))

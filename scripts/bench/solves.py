@@ -1,4 +1,4 @@
-"""Parts `fft`, `solve`, `sizes` and `large`: transforms, cold elastic solves, and how costs grow with the grid."""
+"""Parts `solve`, `sizes` and `large`: cold elastic solves, and how costs grow with the grid."""
 
 import argparse
 import math
@@ -9,15 +9,12 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
-from parcontact.parallel.fft import FFT
-from parcontact.parallel.fftw import export_wisdom, import_wisdom, pyfftw
 from parcontact.parallel.slab import Slab
 
 from .peers import ASPHER_COLD, TAMAAS_COLD, Task, compare_peers
 from .table import Line, compare, interleave
-from .work import LOAD, MODULUS, Cold, Slide, distance, pair
+from .work import LOAD, MODULUS, Cold, Slide, distance
 
 ERROR = 1e-7  # of pressures
 PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
@@ -27,25 +24,6 @@ LIGHT = 0.036  # mean pressure over E* of `large`, for 8 % of contact at a slope
 LARGE_ERROR = 1e-5  # of its pressures
 COARSER = 4  # times fewer points, where the tolerance for that is looked for
 FURTHER = 1e3  # times smaller a tolerance, to see the error
-
-
-def fft(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    heights, out = (pyfftw.zeros_aligned((points, points), "float64", n=64) for _ in range(2))
-    waves = pyfftw.zeros_aligned((points, points // 2 + 1), "complex128", n=64)
-    forward = pyfftw.FFTW(heights, waves, (0, 1), "FFTW_FORWARD", ("FFTW_MEASURE",))
-    backward = pyfftw.FFTW(waves, out, (0, 1), "FFTW_BACKWARD", ("FFTW_MEASURE", "FFTW_DESTROY_INPUT"))
-    heights[...] = np.random.default_rng(1).random(heights.shape)
-    bare = {"FFTW alone": lambda: (forward.execute(), backward.execute())}
-    ours = {name: pair(Slab(MPI.COMM_SELF, points, points), name) for name in ("float64", "float32")}
-    yield from compare(interleave({**bare, **ours}, rounds), "FFTW alone")
-    before = export_wisdom()
-    pyfftw.forget_wisdom()
-    for name in ("the first time", "again"):  # again: with FFTW's wisdom of the first time, which runs keep
-        began = time.process_time()
-        FFT(Slab(MPI.COMM_SELF, points, points))
-        yield Line(f"planning, {name}", 1e3 * (time.process_time() - began), "ms")
-        import_wisdom(export_wisdom())  # forgets plans, too: those of the next run are made from what is kept
-    import_wisdom(before)
 
 
 def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:

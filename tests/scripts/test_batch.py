@@ -57,7 +57,7 @@ def batch(tmp_path: Path) -> Batch:
         env = {"PATH": f"{there}:/usr/bin:/bin", "PARCONTACT_BIN": there, "CODE": "0", "LEFT": ""}
         env |= slurm if system == "slurm" else {**pbs, "JOB": job or shlex.join(words)}
         env |= {name: str(value) for name, value in variables.items()}
-        command = ["bash", str(SCRIPTS / f"{system}.sh"), *(words if system == "slurm" else ())]
+        command = ["bash", str(SCRIPTS / "batch.sh"), *(words if system == "slurm" else ())]
         done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
         assert done.stderr == ""
         said = [line.split("|")[:-1] for line in (tmp_path / "said").read_text().splitlines()]
@@ -65,7 +65,7 @@ def batch(tmp_path: Path) -> Batch:
         at = said[0].index(f"{there}/parcontact")
         following: list[str] | None = None
         if len(said) > 1 and system == "slurm":
-            following = said[1][said[1].index(str(SCRIPTS / "slurm.sh")) + 1 :]
+            following = said[1][said[1].index(str(SCRIPTS / "batch.sh")) + 1 :]
         elif len(said) > 1:
             following = shlex.split((tmp_path / "JOB").read_text())
         assert not list(tmp_path.glob(".parcontact-exit*"))
