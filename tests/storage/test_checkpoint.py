@@ -19,7 +19,7 @@ from parcontact.summary import info
 
 NX, NY = 6, 9
 NOON = "2026-01-01T12:00:00+00:00"  # one instant on all ranks
-WHENCE = Provenance((Link("title: x\n", 2, started=NOON),), (3,))
+WHENCE = Provenance((Link("title: w\n", 5, started=NOON), Link("title: x\n", 2, started=NOON)), (3,))
 FACTS = Facts({"grid": {"points": [NX, NY]}}, WHENCE, step=7, time=0.25)
 
 
@@ -62,6 +62,7 @@ def test_any_number_of_ranks_reads_it(communicators: list[MPI.Intracomm], shared
             assert (contents.step, contents.time, contents.shape) == (7, 0.25, (NY, NX))
             assert contents.job == FACTS.job
             assert contents.chain == FACTS.provenance.chain
+            assert contents.ranks == 2  # of the newest run
             slab = Slab(reader, NX, NY)
             wanted = entries(slab)
             empty = {name: Entry(np.zeros_like(entry.value), entry.unit) for name, entry in wanted.items()}
@@ -131,6 +132,18 @@ def test_maps_that_cannot_be_read(comm: MPI.Intracomm, tmp_path: Path, monkeypat
     write(tmp_path / "file.h5", comm)
     monkeypatch.setattr(hdf5, "read", fail)
     assert look(tmp_path / "file.h5", comm) == "cannot read file.h5"
+
+
+def test_where_the_maps_are(tmp_path: Path) -> None:
+    """Byte by byte those of both maps, and nothing of the numbers between them."""
+    with h5py.File(tmp_path / "file.h5", "w") as file:
+        for name, shape in (("a", (2, 3)), ("b", (40,)), ("c", (3, 5)), ("d", (3, 5))):
+            file[name] = np.ones(shape)
+        maps = [(file[name].id.get_offset(), file[name].nbytes) for name in "acd"]
+        found = checkpoint.find_regions(file)
+    bytes_of_maps = {byte for start, length in maps for byte in range(start, start + length)}
+    assert [byte for start, stop in found for byte in range(start, stop)] == sorted(bytes_of_maps)
+    assert 1 < len(found) <= len(maps)
 
 
 def test_every_bit_counts(comm: MPI.Intracomm, tmp_path: Path) -> None:
