@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
-from numpy.typing import DTypeLike
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
 from ..job.checks import limits
@@ -16,9 +15,7 @@ from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..physics.adhesion import AdhesionLaw, smallest_range
-from ..physics.entries import Entry
-from ..physics.units import Units
-from .effect import Decision, Instant
+from .effect import Decision, Effect, Instant
 
 MOST_CELLS = 2.0  # physics: process zones in a cell; with more, nothing can be said about rates
 SAME = 1e-9  # rounding: of a range
@@ -132,7 +129,7 @@ def _kind(tabor: float) -> str:
     return "between the theories of Johnson, Kendall and Roberts (1.5 pi w R) and of Derjaguin, Muller and Toporov (2)"
 
 
-class AdhesionColumns:
+class AdhesionColumns(Effect):
     """The share of the area under tension, the force of all tension [N], the energy of the surfaces [J] and the energy
     lost in snaps [J]."""
 
@@ -173,11 +170,6 @@ class AdhesionColumns:
         """Yield the lengths and numbers that go with the law: process zone, Tabor's and Johnson's parameters."""
         yield from _facts(job)
 
-    @staticmethod
-    def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return none: the march holds the gaps."""
-        return ()
-
     def __init__(self, scene: Any) -> None:
         self._values: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
 
@@ -187,9 +179,3 @@ class AdhesionColumns:
 
     def values(self) -> Sequence[float]:
         return self._values
-
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """Nothing is remembered here: the march has the gaps."""
-        return {}
-
-    def restore(self, saved: Any) -> None: ...

@@ -59,7 +59,7 @@ class Effect(Protocol):
 
     It may have `rules` for the whole job, as sections have them, `lifts`: checks of other jobs that do not hold with
     it, and `doubts` and `facts`: functions of a job that give warnings, and what the section means in it. Methods are
-    collective, unless they say otherwise.
+    collective, unless they say otherwise. A class that inherits from this one remembers nothing, unless it says so.
     """
 
     section: ClassVar[type[Part]]  # what it adds to a job
@@ -73,7 +73,7 @@ class Effect(Protocol):
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
         """Return the types of the maps that it holds and that a checkpoint has; what else it holds is not planned."""
-        ...
+        return ()
 
     def __init__(self, scene: Any) -> None: ...
 
@@ -90,7 +90,7 @@ class Effect(Protocol):
 
     def entries(self, units: Units) -> dict[str, Entry]:
         """Return what it remembers after the last step, by name; maps are its own, or made for a checkpoint."""
-        ...
+        return {}
 
     def restore(self, saved: Saved) -> None:
         """Go on from what a checkpoint has of the entries, in the run's units, numbers as arrays.

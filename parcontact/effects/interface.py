@@ -6,17 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
-from numpy.typing import DTypeLike
 from pydantic import Field
 
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
-from ..physics.entries import Entry
 from ..physics.interface import InterfaceFriction
 from ..physics.measures import Measures
-from ..physics.units import Units
-from .effect import Decision, Instant
+from .effect import Decision, Effect, Instant
 
 LEAST_POISSON = 0.49  # below it shear moves the surface, and the solve would have to be coupled
 
@@ -62,7 +59,7 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
     return whole - measures.friction_interface, measures.friction_interface
 
 
-class InterfaceColumns:
+class InterfaceColumns(Effect):
     """Columns of the friction of the body, along the velocity (positive where it opposes it), and of the interface."""
 
     section: ClassVar[type[Part]] = Interface
@@ -75,10 +72,6 @@ class InterfaceColumns:
         why = "there is no interface section" if law is None else f"a shear stress of {law.shear_stress:g} Pa at most"
         return Decision("interface", law is not None, why)
 
-    @staticmethod
-    def maps(job: Any) -> Sequence[DTypeLike]:
-        return ()
-
     def __init__(self, scene: Any) -> None:
         self._values = (0.0, 0.0)
 
@@ -87,9 +80,3 @@ class InterfaceColumns:
 
     def values(self) -> Sequence[float]:
         return self._values
-
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """Nothing is remembered."""
-        return {}
-
-    def restore(self, saved: Any) -> None: ...

@@ -7,15 +7,12 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import DTypeLike
 from pydantic import Field
 
 from ..job.sections.part import Part
 from ..job.sections.quantities import Count
 from ..leakage.flow import leak
-from ..physics.entries import Entry
-from ..physics.units import Units
-from .effect import Decision, Instant
+from .effect import Decision, Effect, Instant
 
 NOTHING = (math.nan, math.nan, math.nan)
 
@@ -27,7 +24,7 @@ class Leakage(Part):
     every: Count = Field(default=1, description="a positive whole number of steps")
 
 
-class LeakageColumns:
+class LeakageColumns(Effect):
     """The conductivity K [m^3] of the gap along x and along y, and its critical constriction [m].
 
     The gap is gathered on root, which solves for the flow.
@@ -43,10 +40,6 @@ class LeakageColumns:
             "there is no leakage section" if section is None else f"the flow is calculated every {section.every} steps"
         )
         return Decision("leakage", section is not None, why)
-
-    @staticmethod
-    def maps(job: Any) -> Sequence[DTypeLike]:
-        return ()
 
     def __init__(self, scene: Any) -> None:
         self._scene, self._every = scene, scene.job.section("leakage").every
@@ -67,9 +60,3 @@ class LeakageColumns:
 
     def values(self) -> Sequence[float]:
         return self._values
-
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """Nothing is remembered."""
-        return {}
-
-    def restore(self, saved: Any) -> None: ...

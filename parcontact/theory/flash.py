@@ -41,13 +41,7 @@ def kernel(q: Values, other: Values, reach: Values) -> Array:
 
 
 def flash_temperature(
-    heat: Values,
-    share: Values,
-    passing: Values,
-    sliding: Values,
-    q: Values,
-    conductivity: float,
-    diffusivity: float,
+    heat: Values, share: Values, passing: Values, sliding: Values, q: Values, conductivity: float, diffusivity: float
 ) -> Array:
     """The rise in K of rubber in contact under the heat `heat` [W/m^2, mean over the nominal area], which is made by
     waves q [1/m] on the `share` in contact, where each point is for a time `passing` [s], all having slid for `sliding`

@@ -77,34 +77,6 @@ def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexV
 # steady sliding
 
 
-def lead(
-    kx: Values,
-    ky: Values,
-    vx: Values,
-    vy: Values,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-) -> Array:
-    """The angle of G*(omega) in rad by which each wave of pressure runs ahead of its wave of height (in time)."""
-    return np.angle(complex_modulus(frequency(kx, ky, vx, vy), modulus_inf, moduli, relaxation_times))
-
-
-def steady_pressure_amplitude(
-    amplitude: ComplexValues,
-    kx: Values,
-    ky: Values,
-    vx: Values,
-    vy: Values,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-) -> ComplexArray:
-    """2 k A conj(G*(omega)) in Pa for each wave, relative to the surface that slides at (vx, vy) m/s."""
-    modulus = complex_modulus(frequency(kx, ky, vx, vy), modulus_inf, moduli, relaxation_times)
-    return pressure_amplitude(amplitude, kx, ky, modulus)
-
-
 def friction_coefficient(
     mean_pressure: Values,
     amplitude: ComplexValues,
@@ -165,12 +137,7 @@ def velocity_step_modulus(
 
 
 def load_rest_slide_modulus(
-    t: ArrayLike,
-    rest: float,
-    omega: ArrayLike,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
+    t: ArrayLike, rest: float, omega: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
 ) -> ComplexArray:
     """M(t) in Pa at times t >= 0 (s) of sliding at omega (rad/s) after `rest` (s) in full contact of a virgin body.
 

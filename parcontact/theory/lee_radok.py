@@ -33,13 +33,6 @@ def load_step_contact_radius(
     return np.cbrt(3 * radius * force * compliance / 16)
 
 
-def load_step_approach(
-    t: ArrayLike, force: float, radius: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> Array:
-    """d(t) = a(t)^2/R in m at times t >= 0 (s, any shape)."""
-    return load_step_contact_radius(t, force, radius, modulus_inf, moduli, relaxation_times) ** 2 / radius
-
-
 def load_step_pressure(
     r: ArrayLike,
     t: ArrayLike,
@@ -72,31 +65,12 @@ def load_step_pressure(
 # an approach put on at t = 0 and held
 
 
-def displacement_step_contact_radius(approach: float, radius: float) -> float:
-    """a = sqrt(R d) in m, constant."""
-    return float(np.sqrt(radius * approach))
-
-
 def displacement_step_force(
     t: ArrayLike, approach: float, radius: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
 ) -> Array:
     """W(t) = (16/3) sqrt(R) d^(3/2) G(t) in N at times t >= 0 (s, any shape)."""
     modulus = relaxation(t, modulus_inf, moduli, relaxation_times)
     return np.asarray(16 / 3 * np.sqrt(radius * approach) * approach * modulus)
-
-
-def displacement_step_pressure(
-    r: ArrayLike,
-    t: ArrayLike,
-    approach: float,
-    radius: float,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-) -> Array:
-    """p(r, t) = (8/(pi R)) G(t) sqrt(a^2 - r^2) in Pa at distances r (m) and times t >= 0 (s), which broadcast."""
-    inside = np.sqrt(np.maximum(radius * approach - np.asarray(r, float) ** 2, 0))
-    return 8 / (np.pi * radius) * relaxation(t, modulus_inf, moduli, relaxation_times) * inside
 
 
 # an approach that rises evenly to `peak_approach` in `rise_time` and falls back as fast

@@ -27,11 +27,7 @@ def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: 
 
 
 def contact_fraction(
-    mean_pressure: Values,
-    amplitude: Values,
-    wavelength: Values,
-    shear_modulus: Values,
-    poisson: Values = 0.5,
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
     """The part of the surface that is in contact, f = 2a/lambda = (2/pi) asin sqrt(p/p*)."""
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
@@ -55,11 +51,7 @@ def pressure(
 
 
 def peak_pressure(
-    mean_pressure: Values,
-    amplitude: Values,
-    wavelength: Values,
-    shear_modulus: Values,
-    poisson: Values = 0.5,
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
     """p(0) in Pa: 2 sqrt(p p*) in partial contact, p + p* in full contact."""
     return pressure(0.0, mean_pressure, amplitude, wavelength, shear_modulus, poisson)
@@ -81,11 +73,7 @@ def gap(
 
 
 def mean_gap(
-    mean_pressure: Values,
-    amplitude: Values,
-    wavelength: Values,
-    shear_modulus: Values,
-    poisson: Values = 0.5,
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
     """The mean of the gap over one wave in m, Delta (1 - s + s ln s)."""
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)

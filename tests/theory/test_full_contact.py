@@ -36,12 +36,10 @@ def test_steady_table(row: tuple[float, ...]) -> None:
     assert_allclose(frequency, omega, rtol=4e-6)
     modulus = complex_modulus(frequency, *ZENER)
     assert_allclose([modulus.real, modulus.imag], [storage, loss], rtol=3e-7)
-    amplitude = full_contact.steady_pressure_amplitude(HEIGHT, K, 0.0, v, 0.0, *ZENER)
+    amplitude = full_contact.pressure_amplitude(HEIGHT, K, 0.0, modulus)
     assert_allclose(abs(amplitude), size, rtol=3e-7)
-    lead = full_contact.lead(K, 0.0, v, 0.0, *ZENER)
-    assert_allclose(lead, phase, rtol=3e-6)
-    assert_allclose(np.angle(amplitude), -lead, rtol=1e-13)
-    assert_allclose(lead / K, 1e-6 * shift, rtol=4e-5)
+    assert_allclose(-np.angle(amplitude), phase, rtol=3e-6)
+    assert_allclose(-np.angle(amplitude) / K, 1e-6 * shift, rtol=4e-5)
 
 
 @pytest.mark.parametrize("row", STEADY)
@@ -236,8 +234,7 @@ def test_march_of_a_map(heights: np.ndarray) -> None:
 def test_waves_across_the_velocity_give_no_friction() -> None:
     case = (HEIGHT, ACROSS, ALONG)
     assert full_contact.friction_coefficient(MEAN, *case, 1.0, 0.0, *ZENER) == 0
-    size = np.abs(full_contact.steady_pressure_amplitude(*case, 1.0, 0.0, *ZENER))
-    assert_allclose(size, 2 * K * HEIGHT * ZENER.modulus_inf, rtol=1e-14)
+    assert full_contact.frequency(ACROSS, ALONG, 1.0, 0.0) == 0.0
 
 
 def test_changing_sign_gives_no_friction() -> None:
