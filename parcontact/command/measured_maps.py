@@ -16,7 +16,7 @@ from ..storage import files
 JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps
 MANY_POINTS = 2**20  # of a job to start from, at most
 UNSAID = ("give unit", "give size")  # in messages about maps that do not say all
-HOW = "here as --set surface.unit=um and --set surface.size=[1e-3,1e-3]"
+HOW = "on the command line: --set surface.unit=um --set surface.size=[1e-3,1e-3]"
 LOAD = {"pressure": 1.0e5}
 
 

@@ -43,7 +43,7 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
     loads = [{"pressure": 1e4}, {"pressure": 1.1e4}]
     _, rows = bench.march(crossed(loads, POINTS, material=zener(GLASSY, [], []), numerics={"tolerance": 1e-6}))
     seconds, usual = rows[-1].seconds / rows[-1].operator_calls, PER_POINT * POINTS**2 / comm.size
-    yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms for an operator call and all that belongs to it"
+    yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms for an operator call with all that belongs to it"
     if seconds > SLOW * usual:
         yield f"warning: that is slow, {1e3 * usual:.2g} ms are usual; are other programs at work, or too many threads?"
     rate = comm.bcast(measure_write_rate(where))

@@ -11,6 +11,7 @@ from ..history.timeline import Span, Timeline
 from ..job import Grid
 from ..physics.folding import Band, FoldedBranches, Phase
 from ..physics.prony import Prony
+from ..printed import per_cent
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
@@ -25,8 +26,8 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
     )
     return [
         f"branches: {len(found.kept)} of {count} are followed in time; {folded}. "
-        f"Relative error of friction by this (at rest: of the modulus): at most {found.bound:.2g} "
-        f"(numerics.branch_error is {found.allowed:g})"
+        f"Error of friction by this, at rest of the modulus: at most {per_cent(found.bound)} "
+        f"(numerics.branch_error allows {per_cent(found.allowed)})"
     ]
 
 

@@ -79,8 +79,8 @@ def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -
     return list(points), (
         f"mesh: {points[0]} x {points[1]} points, chosen by numerics.accuracy (friction {100 * asked.friction:g} %, "
         f"area {100 * asked.area:g} %): the shortest wave, {wave:.4g} m, has {wave / dx:.3g} cells along x and "
-        f"{wave / dy:.3g} along y; {f'it slides along {slides}' if slides else 'nothing slides'}, "
-        f"with some {100 * contact:.2g} % in contact"
+        f"{wave / dy:.3g} along y; {f'the surface slides along {slides}' if slides else 'nothing slides'}, "
+        f"with about {100 * contact:.2g} % in contact"
     )
 
 

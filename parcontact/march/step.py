@@ -296,5 +296,5 @@ def _accepts(scene: Scene, contact: Contact) -> bool:
 
 def _passed(scene: Scene, step: Step) -> str:
     """Return what to say of a step that stands for several."""
-    what = f"{failure.where(scene, step)} stands for the {step.passed} before it"
-    return f"{what}: at rest under a constant load nothing changes by more than the tolerance"
+    what = f"{failure.where(scene, step)} takes the place of {step.passed} steps more"
+    return f"{what}: at rest, under a constant load, nothing changes by more than the tolerance"

@@ -39,6 +39,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..printed import per_cent
 from .entries import Entry, Saved
 from .mesh_error import SPOTS_ORDER, SPOTS_POWER, WAVES_ORDER, area_by_mesh, friction_by_mesh
 from .time_error import RunProperties, StepObservation, count_spots, share_of_area, time_error
@@ -87,6 +88,7 @@ class Parts:
 
 
 NAMES = ("solver", "time", "folded", "mesh")  # that add up
+LITTLE = 0.05  # of the error by the mesh: what one direction makes is not told
 SUMS = "budget/sums"  # in a checkpoint
 REMEDIES = {
     "solver": "a smaller numerics.tolerance",
@@ -254,7 +256,7 @@ class ErrorSums:
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
         """Sentences for run.log, with what to change where friction or the area is more wrong than `asked` for; the
         accuracy has `chosen` the settings behind these parts."""
-        found = zip(("friction", "contact area, corrected"), (self.friction, self.area), asked, strict=True)
+        found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
             f"estimated error of {name}: {describe(parts)}, mean over {way}{advice(parts, accuracy, chosen)}"
@@ -262,19 +264,19 @@ class ErrorSums:
             if parts is not None
         ]
         if self.friction is not None and self.friction.total >= 1.0:
-            lines.append(f"friction is 0 +- {self.friction_within:.2g}: it is smaller than its own error")
+            lines.append(f"friction is 0 +- {self.friction_within:.2g}: it is smaller than its estimated error")
         return lines
 
 
 def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
     """Return what to change where more is wrong than `accuracy` allows, or that it is not."""
     if not exceeds(parts.total, accuracy):
-        return f"; within the {100 * accuracy:g} % of numerics.accuracy"
+        return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
     if worst == "mesh" and worst not in chosen and parts.across:
         worst = "along" if parts.along >= parts.across else "across"
     remedy = SMALLER if worst in chosen else REMEDIES[worst]
-    return f". numerics.accuracy asks for {100 * accuracy:g} %: try {remedy}"
+    return f"; more than the {100 * accuracy:g} % that numerics.accuracy asks for: try {remedy}"
 
 
 def exceeds(error: float, accuracy: float) -> bool:
@@ -282,13 +284,11 @@ def exceeds(error: float, accuracy: float) -> bool:
     return error > ROUNDED * accuracy
 
 
-def per_cent(share: float) -> str:
-    """Return a share in per cent, to two digits at least."""
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
-
-
 def describe(parts: Parts) -> str:
-    """Return the total in per cent, and what it is made of."""
-    shares = ", ".join(f"{SHOWN.get(name, name)} {per_cent(getattr(parts, name))}" for name in NAMES)
-    split = f": {per_cent(parts.along)} along, {per_cent(parts.across)} across the sliding" if parts.across else ""
-    return f"{100 * parts.total:.3g} % ({shares}{split})"
+    """Return the total in per cent, and the parts that it is made of; of the mesh also those of both directions, where
+    neither is small."""
+    there = [name for name in NAMES if getattr(parts, name)]
+    shares = ", ".join(f"{SHOWN.get(name, name)} {per_cent(getattr(parts, name))}" for name in there)
+    both = min(parts.across, parts.along) > LITTLE * parts.mesh
+    split = f": {per_cent(parts.along)} along, {per_cent(parts.across)} across the sliding" if both else ""
+    return f"{per_cent(parts.total, 3)} ({shares or 'no part'}{split})"

@@ -24,9 +24,9 @@ from ..job.checks.advice import STEPS_PER_WAVE
 from ..job.checks.cells import ASIDE, cells_across, cells_per_wave, fast_length, one_cell
 from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.sections.listing import plain
-from ..physics.budget import per_cent
 from ..physics.mesh_error import SPOTS_ORDER
 from ..physics.time_error import TIME_ORDER
+from ..printed import per_cent
 from .costs import Costs
 from .report import duration_text, ranks_text, unit_of
 from .sample import Sample, StageCost
@@ -179,7 +179,9 @@ def table(costs: Costs) -> Iterator[str]:
     unit, size = unit_of(max(each.held for _, each in rows))
     sample = costs.sample
     slides = sample.total("friction weight") > 0.0
-    yield f"what accuracy costs, in {'friction; the contact area is then within' if slides else 'contact area'}"
+    yield "cost of an accuracy of " + (
+        "friction (area: error of the contact area then)" if slides else "the contact area"
+    )
     heads = (("area", 9), ("mesh", 14), ("steps" if costs.job.history else "states", 9))
     head = "".join(f"{text:>{width}}" for text, width in heads if slides or text != "area")
     yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11} {ranks_text(sample.ranks):>11}"
@@ -190,12 +192,12 @@ def table(costs: Costs) -> Iterator[str]:
         yield f"  {name:9}{area}{numbers}{each.held / size:11.4g} {whole:>11}"
     mesh = mesh_error(sample, "friction")
     mesh = mesh_error(sample, "area") if mesh is None else mesh
-    errors = [] if sample.job.steady else [f"errors of {per_cent(time_error(StageCost(0), sample))} by time steps"]
-    errors.append("errors by the mesh unknown" if mesh is None else f"errors of {per_cent(mesh)} by the mesh")
-    points, what = " x ".join(map(str, sample.job.grid.points)), "state" if sample.job.steady else "step"
+    errors = [] if sample.job.steady else [f"time steps {per_cent(time_error(StageCost(0), sample))}"]
+    errors.append("mesh unknown" if mesh is None else f"mesh {per_cent(mesh)}")
+    points, word = " x ".join(map(str, sample.job.grid.points)), "state" if sample.job.steady else "step"
     calls = sample.total("operator") / max(sample.steps, 1)
-    yield f"measured on {points} points: times, {calls:.3g} operator calls a {what}, {', '.join(errors)}"
+    yield f"measured on {points} points: times, {calls:.3g} operator calls a {word}, errors ({', '.join(errors)})"
     yield (
-        "scaled: cells by what the shortest wave or a contact spot needs, steps by the order of the integrator, "
-        f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time by N log N"
+        "estimated from these: the mesh by the shortest wave or contact spot, the number of steps by the order of the "
+        f"integrator, {CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time in proportion to N log N"
     )

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 from ..job import Job
+from ..printed import per_cent
 from ..scene import choices
 from . import memory
 from .costs import Costs
@@ -61,7 +62,8 @@ def steps(costs: Costs) -> Iterator[str]:
     tried = sample.job.grid.points
     grid = "" if tried == job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
     where = f"on {ranks_text(sample.ranks)}{grid}"
-    yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s; the others are assumed to be like them"
+    rest = "" if sample.tried >= sample.steps else "; the others are assumed to be like them"
+    yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s{rest}"
 
 
 def times(costs: Costs) -> Iterator[str]:
@@ -70,15 +72,15 @@ def times(costs: Costs) -> Iterator[str]:
     if sample.disturbed:
         load = f"load {os.getloadavg()[0]:.2g} on {len(os.sched_getaffinity(0))} cores"
         yield (
-            f"warning: this machine is busy with other programs ({load}), and the trial had only {sample.share:.0%} of "
-            "a core for each rank; the times below are too long"
+            f"warning: this machine is busy with other programs ({load}), and each rank of the trial had only "
+            f"{per_cent(sample.share)} of a core; the times below are too long"
         )
     word = "step" if costs.job.history else "state"
-    parts = (("to start", sample.starting), ("for the scene", costs.building), ("to write files", costs.writing))
+    parts = (("to start", sample.starting), ("to make the scene", costs.building), ("to write files", costs.writing))
     shares = ", ".join(f"{seconds:.2g} s {what}" for what, seconds in parts)
     yield (
         f"time on {ranks_text(sample.ranks)}: {costs.step:.3g} s a {word}, "
-        f"{duration_text(costs.whole)} in all, with {shares}"
+        f"{duration_text(costs.whole)} in all, of it {shares}"
     )
     yield f"memory of a rank: {_bytes(costs.held)} in maps at most, {_bytes(costs.resident)} resident"
 

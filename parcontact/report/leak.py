@@ -17,6 +17,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import leakage
 from ..plotting.run import Fields, Run
+from ..printed import per_cent, quantity
 from ..storage import files, hdf5, tables
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
@@ -169,13 +170,15 @@ def _describe_closure(rows: Sequence[Instant], axis: str) -> str:
     """Say from which instant on contact closes the gap along an axis."""
     closed = [not getattr(row, f"percolates_{axis}") for row in rows]
     if len(rows) == 1:
-        return f"along {axis}: {'closed' if closed[0] else 'open'}"
+        return f"along {axis} contact {'closes the gap' if closed[0] else 'leaves the gap open'}"
     if not any(closed):
-        return f"along {axis}: open at all instants"
+        return f"along {axis} contact leaves the gap open at all instants"
     first = rows[closed.index(True)]
     known = first.pressure == first.pressure  # its row of measures.csv is there
-    where = f", under {first.pressure:.4g} Pa, {first.contact_area:.3g} of the area in contact" if known else ""
-    return f"along {axis}: closed at {sum(closed)} of {len(rows)} instants, first at {first.time:g} s{where}"
+    under = f"under {quantity(first.pressure, 'Pa')}, with {per_cent(first.contact_area)} of the area in contact"
+    where = f", {under}" if known else ""
+    found = f"closes the gap at {sum(closed)} of {len(rows)} instants, first at t = {quantity(first.time, 's')}"
+    return f"along {axis} contact {found}{where}"
 
 
 def _cell(value: float) -> str:

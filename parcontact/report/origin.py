@@ -58,11 +58,12 @@ def describe_errors(
     ]
     tables = [Table(("estimated error of", "largest", second), rows)]
     if found:
+        names = list(dict.fromkeys(part for one in found.values() for part in one.parts))
         parts = [
-            (name, _percent(one.total / 100), *(f"{part:.3g} %" for part in one.parts.values()))
+            (name, _percent(one.total / 100), *(f"{one.parts.get(part, 0.0):.3g} %" for part in names))
             for name, one in found.items()
         ]
-        head = ("estimated error of", "in all", *next(iter(found.values())).parts)
+        head = ("estimated error of", "in all", *names)
         tables.insert(0, Table(head, parts, f"parts, {where}"))
     return Section("Error budget", said, tables)
 

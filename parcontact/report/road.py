@@ -13,6 +13,7 @@ from ..parallel.fft import FFT
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 from ..plotting import style, surface, units
+from ..printed import per_cent, quantity
 from ..road import statistics, treatment
 from ..road.prepared_map import prepare
 from ..scene import rigid_surface
@@ -35,24 +36,25 @@ def describe(job: Job, heights: Array, told: list[str], shortest: float | None, 
         prepared = prepare(part, job.grid)
         (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
         measured = statistics.describe(treatment.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size)
-        lines = [f"size           {lx:.5g} x {ly:.5g} m", f"points         {nx} x {ny}"]
-        lines.append(f"pixel          {lx / nx:.4g} x {ly / ny:.4g} m")
-        lines.append(f"missing        {float(np.isnan(prepared.cut).mean()):.2%} of its points")
+        lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]
+        lines.append(f"pixel          {quantity(lx / nx, 'm', 4)} x {quantity(ly / ny, 'm', 4)}")
+        lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
         surface.draw(surface.Sketch(heights, job.grid.size, found, measured), picture)
     except OSError as error:
         raise RunError(f"{picture} cannot be written: {error}") from error
     yield from (*lines, *told)
-    yield f"rms height     {found.rms_height:.5g} m"
-    yield f"rms slope      {found.rms_slope:.5g}"
-    yield f"rms curvature  {found.rms_curvature:.5g} 1/m"
+    yield f"rms height     {quantity(found.rms_height, 'm', 4)}"
+    yield f"rms slope      {found.rms_slope:.4g}"
+    yield f"rms curvature  {found.rms_curvature:.4g} 1/m"
     yield f"Nayak          {found.nayak:.4g}"
-    yield f"spectrum       waves of {max(job.grid.size):.4g} to {2.0 * max(job.grid.dx, job.grid.dy):.4g} m"
+    longest, two_cells = max(job.grid.size), 2.0 * max(job.grid.dx, job.grid.dy)
+    yield f"spectrum       waves of {quantity(longest, 'm', 4)} to {quantity(two_cells, 'm', 4)}"
     yield f"Hurst          {f'{found.hurst:.3g}' if found.hurst == found.hurst else NOT_SELF_AFFINE}"
     if shortest is not None:
         cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
-        yield f"shortest wave  {shortest:.4g} m, {cells:.3g} cells"
+        yield f"shortest wave  {quantity(shortest, 'm', 4)}, {cells:.3g} cells"
     yield f"picture: {picture}"
 
 

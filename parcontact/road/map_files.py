@@ -66,7 +66,7 @@ def _refuse_odd_numbers(path: Path, found: Map) -> None:
 
 def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Map:
     if unit is None:
-        raise InputError(f"{path} says no unit of its heights: give unit: {TO_GIVE}")
+        raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
     if path.suffix == ".xyz":
         if size is not None:
             raise InputError(f"{path} has positions of its own: give no size")
@@ -148,7 +148,7 @@ def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | Non
     _refuse_twice(path, unit is not None and own_unit is not None, "a unit", "unit")
     _refuse_twice(path, size is not None and own_size is not None, "a size", "size")
     if own_unit is None and unit is None:
-        raise InputError(f"{path} says no unit of its heights: give unit: {TO_GIVE}")
+        raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
     topography = chosen.topography(**({"physical_sizes": size} if own_size is None and size is not None else {}))
     if len(topography.nb_grid_pts) != 2:
         raise InputError(f"{path} is a line scan; a map was expected")

@@ -8,6 +8,7 @@ from ..errors import InputError
 from ..job import Grid, Topography
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
+from ..printed import per_cent
 from . import map_files, treatment
 from .treatment import Treated
 
@@ -30,7 +31,7 @@ class Prepared:
         (ny, nx), done = self.cut.shape, self.treated
         lines = [f"road: {nx} x {ny} points of the map, {self.size[0]:.4g} x {self.size[1]:.4g} m, are used"]
         if done.missing:
-            lines.append(f"road: {done.missing} missing points ({done.missing / self.cut.size:.2%}) were filled")
+            lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / self.cut.size)}) were filled")
         if done.outliers:
             lines.append(f"road: {done.outliers} points stick out of their neighbours by far; they are as measured")
         if len(done.trend) > 1:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..printed import per_cent
 from .shift import WLF, Arrhenius, Factors, Shift
 
 if TYPE_CHECKING:
@@ -64,16 +65,18 @@ class Compound:
 
         series, found = self.series, []
         if series.error > POOR:
-            found.append(f"the fit misses the {self._weighed} by {series.error:.0%} (rms), more than {POOR:.0%}")
+            found.append(
+                f"the fit misses the {self._weighed} by {per_cent(series.error)} (rms), more than {per_cent(POOR)}"
+            )
         noise = 0.0 if math.isnan(series.scatter) else series.scatter
         both = self.measured.kind == "frequency" and self.weigh == "both"
         if both and series.best > max(CONTRADICTS * noise, LEAST_DOUBT):
             storage, loss = series.alone
             found.append(
                 "storage and loss moduli contradict each other (Kramers-Kronig), or the sweeps do not shift onto one "
-                f"curve: together no relaxation spectrum meets them better than {series.best:.2%}, alone they are met "
-                f"to {storage:.2%} and {loss:.2%}, and neighbours of one sweep scatter by {noise:.2%}. Check the "
-                "table, or fit one of them: --weight storage, or --weight loss"
+                f"curve: the best fit to both misses them by {per_cent(series.best)}, fits to one of them by "
+                f"{per_cent(storage)} and {per_cent(loss)}, and neighbouring points of a sweep scatter by "
+                f"{per_cent(noise)}. Check the table, or fit one of them: --weight storage, or --weight loss"
             )
         return [*found, *self._gaps(), *odd_moduli(self.measured.sets)]
 
@@ -91,26 +94,30 @@ class Compound:
             gap = max(mine[0], its[0]) - min(mine[1], its[1])
             if gap > WIDE_GAP:
                 yield (
-                    f"the sweeps at {one:g} and {other:g} C do not overlap: after the shift {gap:.2g} decades lie "
-                    "between them, in which moduli are a guess; measure at a temperature between, or give the shift: "
+                    f"the sweeps at {one:g} and {other:g} C do not overlap: after the shift a gap of {gap:.2g} decades "
+                    "is left, in which moduli are a guess; measure at a temperature in between, or give the shift: "
                     "--shift FILE"
                 )
 
     def text(self) -> str:
         """The material file: what it is and how good, then the material."""
         series, shift, section = self.series, self.shift, self.material()
-        at = f" at {shift.reference:g} C" if shift is not None else ""
-        kind = "Young's moduli, divided by 2 (1 + poisson)" if self.measured.tension else "shear moduli"
+        to = f", shifted to {shift.reference:g} C" if shift is not None else ""
+        kind = "Young's moduli, divided by 2 (1 + poisson)," if self.measured.tension else "shear moduli"
         temperatures = self.temperatures
-        noise = "" if math.isnan(series.scatter) else f"; neighbours of one sweep scatter by {series.scatter:.2%}"
+        noise = (
+            ""
+            if math.isnan(series.scatter)
+            else f"; neighbouring points of a sweep scatter by {per_cent(series.scatter)}"
+        )
         lines = [
-            f"{TITLE} {self.measured.path.name}: {kind}, {self.measured.kind} domain.",
-            f"# {len(series.moduli)} branches; rms error of the {self._weighed} {series.error:.2%}; no "
-            f"relaxation spectrum does better than {series.best:.2%}{noise}.",
-            f"# Measured band, reduced{at}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",
+            f"{TITLE} {self.measured.path.name}: {kind} over {self.measured.kind}.",
+            f"# {len(series.moduli)} branches. The fit misses the {self._weighed} by {per_cent(series.error)} (rms), "
+            f"the best one of any number of branches by {per_cent(series.best)}{noise}.",
+            f"# Measured frequencies{to}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",
             *([f"# Measured at {', '.join(f'{t:.4g}' for t in temperatures)} C."] if temperatures else []),
-            "# All moduli are of shear [Pa], times in s"
-            + (f" at {shift.reference:g} C; temperature: T in a job shifts them." if shift is not None else "."),
+            "# Moduli are shear moduli [Pa], times are in s"
+            + (f" at {shift.reference:g} C; `temperature: T` in a job shifts them." if shift is not None else "."),
         ]
         branches = section.pop("branches")
         lines += [f"{key}: {_flow(value)}" for key, value in section.items()]
@@ -142,14 +149,14 @@ def fitted(
     exchanged = missed if missed <= POOR or measured.kind == "time" else series.swapped(measured.sets, logs)
     if exchanged < SWAPPED * missed:
         raise InputError(
-            f"{path}: storage and loss moduli seem to be exchanged: a fit misses them by {missed:.0%}, and by "
-            f"{exchanged:.0%} if each is taken for the other"
+            f"{path}: storage and loss moduli seem to be exchanged: the fit misses them by {per_cent(missed)}, and by "
+            f"{per_cent(exchanged)} if each is taken for the other"
         )
     if missed > HOPELESS:
         raise InputError(
-            f"{path}: the best fit misses the moduli by {missed:.0%} (rms), more than {HOPELESS:.0%}: they are not "
-            "those of one linear viscoelastic body, or the sweeps do not shift onto one another; check units and "
-            "temperatures"
+            f"{path}: the best fit misses the moduli by {per_cent(missed)} (rms), more than {per_cent(HOPELESS)}: they "
+            "are not those of one linear viscoelastic body, or the sweeps do not shift onto one another; check units "
+            "and temperatures"
         )
     return found
 

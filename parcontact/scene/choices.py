@@ -22,6 +22,7 @@ from ..physics.adhesion import AdhesionLaw
 from ..physics.folding import FoldedBranches, fold_branches, keep_all
 from ..physics.interface import InterfaceFriction
 from ..physics.prony import Prony
+from ..printed import per_cent
 from ..solve.precision import LOOSE, VERY_LOOSE
 from .decided import Decided, Verdict, decided
 
@@ -108,9 +109,8 @@ class Choices:
         found = self.folded
         if not found.folded:
             return False, found.reason or "no branch is far faster or slower than all that happens"
-        kinds = ((found.memoryless, "memoryless"), (found.frozen, "frozen"))
-        folded = " and ".join(f"{len(numbers)} {kind}" for numbers, kind in kinds if numbers)
-        return True, f"{folded} of {self.prony.moduli.size}; error of friction {found.bound:.2g} at most"
+        folded = f"{found.folded} of {self.prony.moduli.size} are too fast or too slow to need a map"
+        return True, f"{folded}; error of friction at most {per_cent(found.bound)}"
 
     @decided("isolated contact")
     def isolated(self) -> Verdict:
@@ -147,17 +147,17 @@ class Choices:
     def sliding(self) -> Verdict:
         """A surface that moves."""
         moves = self.timeline.moves
-        return moves, "the surface moves" if moves else "the surface stands in all stages"
+        return moves, "the surface moves" if moves else "the surface does not move in any stage"
 
     @decided("sub-cell or oblique sliding")
     def part_cells(self) -> Verdict:
         """Heights made anew when the surface has moved, but for whole cells along x on a periodic box."""
         if not self.sliding.on:
-            return False, "the surface stands"
+            return False, "the surface does not move"
         if self.isolated.on:
             return True, "a free box is not cyclic: the heights are made anew"
         if self.slides_along_x and self.further_starts.on:
-            return True, "stages that choose their own steps begin with parts of a cell where they must"
+            return True, "chosen steps may be parts of a cell"
         if (step := self.timeline.first_between_cells()) is None:
             return False, "every step is of whole cells along x"
         return True, "the surface moves along y too" if step.position[1] else f"step {step.number} ends between cells"
@@ -167,20 +167,20 @@ class Choices:
         """The last pressure but one, from which the next one is extrapolated."""
         if self.adhesion is not None:
             return False, "contacts with adhesion start from the last gaps"
-        return self.timeline.lasts, "stages last" if self.timeline.lasts else "every stage is a single solve"
+        return (on := self.timeline.lasts), "stages have steps" if on else "every stage is a single solve"
 
     @decided("starts from a whole cell earlier")
     def further_starts(self) -> Verdict:
         """The two pressures before that: with thirds and quarters of a cell a step starts from a whole cell ago."""
         moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)
         on = self.extrapolated_starts.on and self.timeline.chooses and moves
-        return on, f"the surface slides in {'' if on else 'no '}steps that are chosen"
+        return on, f"the surface slides in {'' if on else 'no '}chosen steps"
 
     @decided("chosen time steps")
     def chosen_steps(self) -> Verdict:
         """Time steps that follow the error of the last one (`march.choosing`)."""
         why = describe_steps(self.job)
-        return bool(why) and self.job.remembers, why or "every stage says in which steps"
+        return bool(why) and self.job.remembers, why or "every stage gives its steps"
 
     @decided("rest cut short")
     def short_rest(self) -> Verdict:

@@ -17,6 +17,7 @@ from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
+from ..printed import per_cent
 from .measured_range import describe_beyond
 from .scene import Setup
 
@@ -164,6 +165,6 @@ def few_cells(measures: Measures, more: str) -> str:
     if excess <= FEW_CELLS:
         return ""
     return (
-        f"spots of contact are only a few cells wide: contact_area is about {excess:.1%} too large (more than "
-        f"{FEW_CELLS:.0%} is warned of); use {more}, a smaller grid.size or a larger load"
+        f"spots of contact are only a few cells wide: contact_area is about {per_cent(excess)} too large (more than "
+        f"{per_cent(FEW_CELLS)} gets this warning); use {more}, a smaller grid.size or a larger load"
     )

@@ -27,6 +27,7 @@ from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
 from ..physics.units import Units
+from ..printed import quantity
 from ..solve.adhesive import kernels as laws
 from ..solve.adhesive.solver import GapOperators, GapSolver, Law
 from ..solve.adhesive.sticking import StickingSolver
@@ -223,8 +224,8 @@ def describe_scene(scene: Scene) -> Iterator[str]:
         yield f"stages that choose their time steps: {steps}"
     if found := scene.setup.roughness:
         yield (
-            f"surface: rms height {found.rms_height:.4g} m, rms slope {found.rms_slope:.4g}, Nayak's parameter "
-            f"{found.nayak:.3g}; m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2"
+            f"surface: rms height {quantity(found.rms_height, 'm', 4)}, rms slope {found.rms_slope:.4g}, Nayak's "
+            f"parameter {found.nayak:.3g} (moments m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2)"
         )
 
 

@@ -211,9 +211,9 @@ class ContactSolver:
         single = self.workspace.displacement.dtype == np.float32
         most = MAX_STALLED_IN_SINGLE if single else MAX_STALLED_ITERATIONS
         if iteration - best_at >= most:
-            return f"stalled: no better certificate than {best:.3g} in {most} iterations, now {asked}"
+            return f"stalled: no residual below {best:.3g} in {most} iterations, now {asked}"
         if iteration >= self.max_iterations:
-            return f"did not converge in max_iterations = {iteration}: the certificate is {asked}"
+            return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
         return None
 
     def _turn(self, problem: Problem, level: float, slope: float, members: float, free: Array) -> tuple[float, float]:

@@ -20,7 +20,7 @@ class Wanted(NamedTuple):
 
     def __str__(self) -> str:
         heated = "" if math.isnan(self.temperature) else f" at {self.temperature:g} C"
-        return f"{self.speed:g} m/s under {self.pressure:g} Pa{heated}"
+        return f"{self.speed:.4g} m/s under {self.pressure:.4g} Pa{heated}"
 
 
 def asked(speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()) -> list[Wanted]:

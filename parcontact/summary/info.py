@@ -16,12 +16,14 @@ from ..errors import InputError
 from ..job.resolved import RESOLVED, shown_job
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
+from ..printed import quantity
 from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
 from . import slide, sweep_table, theory_beside, theory_settings
 
+LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # numbers of one name at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
 
@@ -161,10 +163,10 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     how = "finished" if ended else "not finished"
     if ended and claim is not None and claim.detached:
         yield f"  {claim.detached}"
-    yield f"  run: {how} after step {step}, t = {time:g} s, {len(columns['step'])} rows"
-    last = {name: columns[name][-1] for name in ("pressure", "friction", "contact_area", "approach")}
-    yield "  last row: " + ", ".join(f"{name} {value:.6g}" for name, value in last.items())
-    yield f"  wall time of its steps: {math.fsum(columns['seconds']):.4g} s"
+    yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
+    last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in LAST_ROW.items() if name in columns]
+    yield f"  last row: {', '.join(last)}"
+    yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if (directory / RESOLVED).exists():
         job = shown_job(directory / RESOLVED)
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
@@ -176,8 +178,9 @@ def describe_pull_off(columns: Mapping[str, list[Any]], area: float) -> Iterator
     pressures = columns["pressure"]
     row = pressures.index(min(pressures))
     if pressures[row] < 0.0:
-        where = f"t = {columns['time'][row]:g} s, approach {columns['approach'][row]:.4g} m"
-        yield f"lowest load: {pressures[row] * area:.4g} N, {pressures[row]:.4g} Pa, at {where}"
+        where = f"t = {quantity(columns['time'][row], 's', 4)}, approach {quantity(columns['approach'][row], 'm', 4)}"
+        load = f"{quantity(pressures[row] * area, 'N', 4)}, {quantity(pressures[row], 'Pa', 4)}"
+        yield f"lowest load: {load}, at {where}"
 
 
 def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
@@ -199,10 +202,9 @@ def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     table = directory / "steady.csv"
     if table.exists() and (speeds := (columns := tables.read(table))["velocity"]):
         best = int(np.argmax(columns["friction"]))
-        yield (
-            f"  friction curve: {len(speeds)} points from {min(speeds):g} to {max(speeds):g} m/s; the largest friction "
-            f"is {columns['friction'][best]:.6g} at {speeds[best]:g} m/s under {columns['pressure'][best]:g} Pa"
-        )
+        place = curve_points.Wanted(speeds[best], columns["pressure"][best])
+        yield f"  friction curve: {len(speeds)} points from {min(speeds):.4g} to {max(speeds):.4g} m/s"
+        yield f"  largest friction of the curve: {columns['friction'][best]:.4g} at {place}"
         errors = {name: slide.largest(columns[name]) for name in slide.ERRORS if name in columns}
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
@@ -221,7 +223,7 @@ def _asked(accuracy: Any) -> str:
 def _saved_states(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     for path in sorted(directory.glob("checkpoint/step-*.h5")):
         contents = checkpoint.inspect(path)
-        yield f"  checkpoint after step {contents.step}, t = {contents.time:g} s"
+        yield f"  checkpoint after step {contents.step}, t = {quantity(contents.time, 's', 4)}"
 
 
 def _saved_maps(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..job import Initial, Ramp, Stage
-from ..physics.budget import per_cent
+from ..printed import per_cent, quantity, with_error
 
 DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
 SAME_INSTANT = 1e-9  # relative: instants this close are the same
@@ -78,17 +78,23 @@ def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> fl
     return max(float(y[at] - mean_over_end(x[near], y[near], 1.0)), 0.0)
 
 
-def _within(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> str:
-    """Return the error of the highest friction of some rows, as text: its estimate, and the ripple on which it sits;
-    '' where none of this is known."""
+def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> str:
+    """Return the highest friction of some rows as text, with its error: its estimate, and the ripple on which it
+    sits."""
     friction = np.asarray(columns["friction"], float)[rows]
     at = int(np.argmax(friction[1:])) + 1
     error = float(columns[ERRORS[0]][rows[at]]) * friction[at] if ERRORS[0] in columns else math.nan
     wave = ripple(np.asarray(columns["distance"], float)[rows], friction, at, cell)
     both = wave + (error if error == error else 0.0)
-    if not both > 0.0:
-        return ""
-    return f" +- {both:.2g}" + (f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * both else "")
+    rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * both else ""
+    return with_error(float(friction[at]), both) + rippled
+
+
+def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str) -> str:
+    """Return the mean of a column over the last three quarters as text, with that of its known errors."""
+    distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
+    within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
+    return with_error(mean_over_end(distance, values), mean_over_end(distance, within))
 
 
 def describe(
@@ -109,21 +115,22 @@ def describe(
         ends_with = _slide(so_far).stop - 1
         yield f"the last slide has not begun; these numbers are of the one before, which ends with history.{ends_with}"
     rows = _during(so_far, np.asarray(columns["time"], float))
-    distance, within = np.asarray(columns["distance"], float)[rows], _within(columns, rows, cell)
-    after = f"{found.mu_max_distance:.4g} m after its start"
-    yield f"mu_max, the highest friction of the slide, is {found.mu_max:.6g}{within}, {after}"
-    length = f"{distance[-1] - distance[0]:.4g} m"
-    yield f"mu_dyn, the mean friction over the last three quarters of the slide of {length}, is {found.mu_dyn:.6g}"
-    edges = measure(so_far, {**columns, "contact_area": columns[CORRECTED]}) if CORRECTED in columns else None
-    corrected = f", and {edges.contact_area:.6g} as corrected for its edges" if edges else ""
-    yield f"the mean contact area over the same distance is {found.contact_area:.6g} as counted in points{corrected}"
+    after = f"{quantity(found.mu_max_distance, 'm')} after its start"
+    yield f"mu_max, the highest friction of the slide, is {_highest(columns, rows, cell)}, {after}"
+    length = quantity(columns["distance"][rows[-1]] - columns["distance"][rows[0]], "m")
+    dynamic = _mean(columns, rows, "friction", ERRORS[0])
+    yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
+    area = f"{found.contact_area:.4g} as counted in points"
+    if CORRECTED in columns:
+        area = f"{_mean(columns, rows, CORRECTED, ERRORS[1])} as corrected for its edges, and {area}"
+    yield f"the mean contact area over the same distance is {area}"
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
         parts = ", ".join(f"{what[name]} {per_cent(value)}" for name, value in known.items())
-        yield f"largest estimated errors of a single step of the slide: {parts}"
+        yield f"largest estimated errors of single steps of the slide: {parts}"
     if known.get(ERRORS[0], 0.0) >= 1.0:
-        yield "in some steps of the slide friction is smaller than its own error"
+        yield "in some steps of the slide friction is smaller than its estimated error"
     if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
 
@@ -143,7 +150,7 @@ def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error:
     allowed = known * abs(start) + error * abs(mu_dyn)
     if abs(mu_dyn - start) > allowed:
         yield (
-            f"mu_dyn differs from friction of the steady start, {start:.6g}, by {abs(mu_dyn - start):.2g}, more than "
+            f"mu_dyn differs from friction of the steady start, {start:.4g}, by {abs(mu_dyn - start):.2g}, more than "
             f"their estimated errors together, {allowed:.2g}. As velocity and load are the same, they should agree: "
             "try shorter time steps and a smaller numerics.tolerance"
         )

@@ -46,9 +46,9 @@ def describe(directory: Path, history: Sequence[Stage]) -> Iterator[str]:
     """Yield a sentence, if there is a theory. Raises InputError for damaged tables."""
     results = compare(directory, history)
     if results:
-        pairs = (f"{one.name} {one.theory:.4g}{_run(one)}" for one in results)
+        pairs = (f"{one.name} {one.theory:.3g}{_run(one)}" for one in results)
         yield f"Persson's theory predicts {', '.join(pairs)}"
 
 
 def _run(one: Beside) -> str:
-    return "" if one.run is None else f" (run: {one.run:.4g})"
+    return "" if one.run is None else f" (run: {one.run:.3g})"

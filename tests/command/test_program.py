@@ -237,7 +237,7 @@ def test_check_reads_a_measured_road(main: Main, tmp_path: Path) -> None:
     path = job(tmp_path / "job.yaml", surface={"shape": "topography", "path": "road.npy", "size": [1e-3, 1e-3]})
     code, _, said = main("check", path)
     assert code == 2
-    assert said.endswith("says no unit of its heights: give unit: m | mm | um | nm\n")
+    assert said.endswith("does not say the unit of its heights: give unit: m | mm | um | nm\n")
 
 
 def test_help(main: Main) -> None:

@@ -254,4 +254,4 @@ def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
     log = (tmp_path / "out" / "run.log").read_text()
     bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
     assert "branches: 1 of 4 are followed in time; those of 1e-06 s are too fast to remember; those of 3, 10" in log
-    assert f"of the modulus): at most {bound:.2g} (numerics.branch_error is 0.01)" in log
+    assert f"of the modulus: at most {100 * bound:.2g} % (numerics.branch_error allows 1 %)" in log

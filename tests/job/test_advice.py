@@ -10,8 +10,8 @@ SLIDING = "[{pressure: 1, velocity: 1, distance: 1e-4, cells_per_step: 2}]"
 
 def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     long, short = job_of(tmp_path, replaced(SMALL, surface=ROUGH)).warnings
-    assert "only 2 long waves fit into the box along x" in long
-    assert "a size of 0.002 m or a long_wavelength of 0.00025 m" in long
+    assert "only 2 of the longest waves fit into the box along x" in long
+    assert "a grid.size of 0.002 m or a long_wavelength of 0.00025 m" in long
     assert "only 4 cells per shortest wave along x" in short
     assert (
         "128 points (4 times the memory, some 8 times the time in sliding) or a short_wavelength of 0.000125 m" in short

@@ -99,7 +99,7 @@ def test_check_says_it(tmp_path: Path, main: Main) -> None:
     code, said, _ = main("check", tmp_path / "job.yaml")
     assert code == 0
     assert "mesh: " in said
-    assert "it slides along (1, 0)" in said
+    assert "the surface slides along (1, 0)" in said
 
 
 def test_from_python_and_in_a_sweep(tmp_path: Path) -> None:

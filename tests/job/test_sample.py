@@ -26,9 +26,9 @@ def job(slide: dict[str, Any] = ROUND, **changes: Any) -> Job:
 @pytest.mark.parametrize(
     ("grid", "shares"),
     [
-        ({"points": 128, "size": 1e-3}, ("6.0%", "4.2%", "4 x 4")),
-        ({"points": [256, 128], "size": [2e-3, 1e-3]}, ("4.2%", "3.0%", "8 x 4")),
-        ({"points": [1024, 1], "size": [8e-3, 1e-3]}, ("4.2%", "3.0%", "32")),
+        ({"points": 128, "size": 1e-3}, ("6 %", "4.2 %", "4 x 4")),
+        ({"points": [256, 128], "size": [2e-3, 1e-3]}, ("4.2 %", "3 %", "8 x 4")),
+        ({"points": [1024, 1], "size": [8e-3, 1e-3]}, ("4.2 %", "3 %", "32")),
     ],
 )
 def test_another_seed(grid: dict[str, Any], shares: tuple[str, str, str]) -> None:

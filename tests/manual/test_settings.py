@@ -26,7 +26,7 @@ def test_a_job(
     assert __main__.main(["job.yaml", "--quiet"]) == 0
     assert "warning" not in capsys.readouterr().err
     log = (tmp_path / "out" / "job" / "run.log").read_text()
-    assert log.count("within the") == log.count("estimated error of") > 0  # of numerics.accuracy, as budget.advice says
+    assert log.count("; within the") == log.count("estimated error of") > 0  # as budget.advice says
     for text in re.findall(r"^```text\n(.*?)^```", after, re.M | re.S):
         compare_lines(text, log)
     compare_table(after, Path("out/job/measures.csv"))

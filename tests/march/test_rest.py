@@ -52,7 +52,7 @@ def test_an_elastic_body_is_solved_once() -> None:
     assert [row.step for row in found] == [0, 1, 1 + (steps - 1) // 2, steps]
     assert march.scene.slab.tally["operator"] == calls + 2
     assert [row.iterations for row in found[2:]] == [0, 0]
-    assert "stands for the 29 before it" in found[-1].remark
+    assert "takes the place of 29 steps more" in found[-1].remark
     every, found = marched(job({**DWELL, "time_step": 1e-2}, material=ELASTIC))
     assert [row.step for row in found] == list(range(12))
     assert every.scene.slab.tally["operator"] == calls + 10
@@ -71,8 +71,8 @@ def test_a_relaxed_body_jumps_to_the_end(monkeypatch: pytest.MonkeyPatch) -> Non
         assert [row.step for row in found[:-1]] == list(range(len(found) - 1))
         assert found[-1].step == total
         assert found[-1].time == pytest.approx(0.1, rel=1e-12)
-        passed = f"step {total} at t = 0.1 s (stage 'dwell') stands for the {total - len(found) + 1} before it: "
-        assert found[-1].remark == passed + "at rest under a constant load nothing changes by more than the tolerance"
+        passed = f"step {total} at t = 0.1 s (stage 'dwell') takes the place of {total - len(found) + 1} steps more: "
+        assert found[-1].remark == passed + "at rest, under a constant load, nothing changes by more than the tolerance"
         ends.append(found[-2].time)
     assert 5e-3 < ends[0] < 0.03
     assert 2e-3 < (ends[1] - ends[0]) / np.log(1e2) < 5e-3
@@ -192,7 +192,7 @@ def test_restarts_bit_for_bit(bench: Bench) -> None:
             same(whole, part, made[-1])
     if bench.comm.rank == 0:
         assert re.search(
-            rf"step {after} at .* stands for the {after - before - 1} before it", (whole / "run.log").read_text()
+            rf"step {after} at .* takes the place of {after - before - 1} steps more", (whole / "run.log").read_text()
         )
         with h5py.File(whole / "fields.h5") as file:
             assert not np.isnan(file["t"][...]).any()

@@ -37,7 +37,9 @@ def test_one_solve_stalls(comm: MPI.Intracomm) -> None:
     assert rows[-1].measures.friction == pytest.approx(exact[-1].measures.friction, rel=1e-3)
 
 
-@pytest.mark.filterwarnings("ignore:surface.0. only 2 long waves", "ignore:history.0.pressure. a mean pressure")
+@pytest.mark.filterwarnings(
+    "ignore:surface.0. only 2 of the longest waves", "ignore:history.0.pressure. a mean pressure"
+)
 def test_it_is_remembered(tmp_path: Path) -> None:
     """A run that goes on knows that single precision does not do; a job in double precision has no such number."""
     run = pc.Simulation(job("mixed"), comm=MPI.COMM_SELF)

@@ -80,7 +80,7 @@ def test_what_stalls_at_first_is_solved(tmp_path: Path, seed: int, stretch: floa
     }
     march, found = marched(data)
     assert found[-1].certificate.worst <= 1e-8
-    said = r"stalled: no better certificate than \d[.]\d+ in .*; solved when retried with .*"
+    said = r"stalled: no residual below \d[.]\d+ in .*; solved when retried with .*"
     assert re.search(said, found[-1].remark)
     assert march.scene.slab.tally["retry"] == 1 + found[-1].remark.count(", with ")
 

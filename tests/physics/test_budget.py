@@ -195,10 +195,10 @@ def test_summary() -> None:
     assert friction.startswith("estimated error of friction: ")
     assert "solver 0.078 %" in friction
     assert "try" not in friction
-    assert area.startswith("estimated error of contact area, corrected: ")
-    assert area.endswith(". numerics.accuracy asks for 1.2 %: try a finer grid")
+    assert area.startswith("estimated error of the corrected contact area: ")
+    assert area.endswith("; more than the 1.2 % that numerics.accuracy asks for: try a finer grid")
     assert ErrorSums().lines((0.012, 0.012)) == []
-    assert ", mean over time. numerics.accuracy asks" in area
+    assert ", mean over time; more than the" in area
     assert summary.lines((0.012, 0.012), ["mesh"])[1].endswith(": try a smaller numerics.accuracy")
 
 

@@ -61,7 +61,7 @@ def test_what_other_programs_have_disturbed_is_told() -> None:
     (quiet, _), (warning, *_) = report.times(costs_of_a_trial(0.95)), report.times(costs_of_a_trial(0.46))
     assert "busy" not in quiet
     assert "busy with other programs" in warning
-    assert "46% of a core for each rank" in warning
+    assert "each rank of the trial had only 46 % of a core" in warning
 
 
 def test_places_that_cannot_be_written_to(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert re.search(r"tried: [12] states on 1 rank in", said)
     assert re.search(r"time on 1 rank: \S+ s\*? a state, ", said)
     steady = said[said.index("parcontact steady:") :]
-    told = re.search(r"operator calls a state, errors of ([\d.]+) % by the mesh", steady)
+    told = re.search(r"operator calls a state, errors \(mesh ([\d.]+) %\)", steady)
     assert told
     found = pc.steady(planned)
     assert 0.01 * float(told[1]) == pytest.approx(found.error_friction.mean(), rel=0.2)  # the rest is the solver's

@@ -65,7 +65,7 @@ def test_a_map_on_a_coarse_grid_is_told(tmp_path: Path) -> None:
     (text,) = sanity.check_heights(frame_of(part, 64))
     assert text.startswith("surface: only 4.")
     assert "cells per shortest wave along x" in text
-    assert "use at least 8: 12" in text
+    assert "needs 8: use 12" in text
 
 
 def test_friction_of_a_map_whose_waves_the_grid_lacks(tmp_path: Path) -> None:

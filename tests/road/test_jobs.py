@@ -175,7 +175,7 @@ def test_the_grid_of_a_mirrored_map_is_twice_as_long(road: Path) -> None:
         ),
         (
             "{shape: topography, path: road.npy, size: [1, 1]}",
-            "road.npy says no unit of its heights: give unit: m | mm",
+            "road.npy does not say the unit of its heights: give unit: m | mm",
         ),
     ],
 )
@@ -202,9 +202,9 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     monkeypatch.chdir(road)
     code, out, err = main(*words, "--job", "start/job.yaml")
     assert code == 0, err
-    for line in (r"size +0.001 x 0.001 m", r"points +192 x 192", r"pixel +5.208e-06 x 5.208e-06 m"):
+    for line in (r"size +1 mm x 1 mm", r"points +192 x 192", r"pixel +5.208 um x 5.208 um"):
         assert re.search(f"^{line}$", out, re.MULTILINE)
-    for line in (r"missing +(2.\d+|1.9\d)%", r"rms slope +0.0", r"spectrum +waves of 0.001 to 1.042e-05 m"):
+    for line in (r"missing +(2(.\d)?|1.9) %", r"rms slope +0.0", r"spectrum +waves of 1 mm to 10.42 um"):
         assert re.search(f"^{line}", out, re.MULTILINE)
     assert matplotlib.image.imread(road / "road-surface.png").ndim == 3
     found = jobs.load(road / "start/job.yaml")
@@ -215,5 +215,5 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     assert main(*words, "--job", "start/job.yaml")[0] == 2
     code, _, err = main("surface", "road.npy")
     assert code == 2
-    assert "says no unit of its heights" in err
+    assert "does not say the unit of its heights" in err
     assert "--set surface.unit=um" in err

@@ -63,7 +63,7 @@ def save(path: Path, values: object) -> None:
 
 SQUARE = "".join(f"{x} {y} 0\n" for x in range(6) for y in range(6))
 BAD = {
-    "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "says no unit of its heights"),
+    "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "does not say the unit of its heights"),
     "no size": ("road.npy", HEIGHTS, ("m", None, None), "does not say how large its map is"),
     "a line": ("road.npy", HEIGHTS[0], ("m", SIZE, None), "has 1 dimensions; a map of two"),
     "a block": ("road.npy", HEIGHTS[None], ("m", SIZE, None), "has 3 dimensions; a map of two"),

@@ -176,7 +176,7 @@ def test_contacts_of_a_few_cells() -> None:
     job = job_of(SPHERE, [{"approach": 1e-7}], grid=FREE)
     (text,) = run(job)
     assert text.startswith("step 1: spots of contact are only a few cells wide")
-    assert "(more than 15% is warned of); use more grid.points" in text
+    assert "(more than 15 % gets this warning); use more grid.points" in text
     with pytest.raises(RunError, match=r"numerics\.strict"):
         run(job_of(SPHERE, [{"approach": 1e-7}], grid=FREE, numerics={"strict": True}))
 

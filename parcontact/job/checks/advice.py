@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ...printed import per_cent
 from ..sections.calculation import Accuracy, Grid, Numerics
 from ..sections.geometry import Rough
 from ..sections.materials import Elastic, Zener
@@ -60,8 +61,8 @@ def _waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Se
     name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
     if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
         yield (
-            f"surface.{index}: only {length / shape.long_wavelength:.3g} long waves fit into the box along {name}; "
-            f"for a representative surface use at least {LONG_WAVES}: a size of "
+            f"surface.{index}: only {length / shape.long_wavelength:.3g} of the longest waves fit into the box along "
+            f"{name}, and a representative surface has at least {LONG_WAVES}; use a grid.size of "
             f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
         )
     otherwise = " or a short_wavelength of {:.4g} m"
@@ -70,8 +71,8 @@ def _waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Se
 
 def measured(grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
     """Yield what to say of the shortest wave [m] of a measured surface that slides along these directions."""
-    known = f", of {wave:.3g} m by the spectrum of the heights"
-    otherwise = ", to which a map is interpolated, or heights without waves below {:.4g} m"
+    known = f" ({wave:.3g} m, by the spectrum of the heights)"
+    otherwise = ", to which a map is interpolated, or heights without waves shorter than {:.4g} m"
     yield from _few_cells("surface", wave, known, otherwise, grid, asked, directions)
 
 
@@ -91,8 +92,8 @@ def _few_cells(
     slides = lambda axis: not directions or any(abs(way["xy".index(axis)]) > ASIDE for way in directions)  # noqa: E731
     finer = max((max(lack, 1.0) for axis, lack in lacks.items() if slides(axis)), default=1.0)
     yield (
-        f"{key}: only {wave / cell:.3g} cells per shortest wave along {name}{known}; for {reason} use at "
-        f"least {max(wants[name]):.3g}: {math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave)} points "
+        f"{key}: only {wave / cell:.3g} cells per shortest wave along {name}{known}; {reason} needs "
+        f"{max(wants[name]):.3g}: use {math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave)} points "
         f"({more:.2g} times the memory, some {more * finer:.2g} times the time in sliding)"
         f"{otherwise.format(max(wants[name]) * cell)}"
     )
@@ -139,8 +140,8 @@ def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:
         return ""
     counts = [max(length / longest, 1.0) for _, length, _ in _directions(grid)]
     root = math.sqrt(math.prod(counts))
-    friction = f"friction by about {SEED_FRICTION / root:.1%} and " if slides else ""
+    friction = f"friction by about {per_cent(SEED_FRICTION / root)} and " if slides else ""
     return (
-        f"another seed of the surface would change {friction}the contact area by about {SEED_AREA / root:.1%} "
+        f"another seed of the surface would change {friction}the contact area by about {per_cent(SEED_AREA / root)} "
         f"(standard deviation): {' x '.join(f'{count:.3g}' for count in counts)} of its longest waves fit into the box"
     )

@@ -130,7 +130,7 @@ class GapSolver:
             best = min(best, (certificate.worst, iteration))
             failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best)
             if stuck > 2 and failure is None:
-                failure = f"stalled: no step lowers the energy, at a certificate of {certificate.worst:.3g}"
+                failure = f"stalled: no step lowers the energy, at a residual of {certificate.worst:.3g}"
             if failure is not None:
                 if g is not gap:
                     gap[...] = g
@@ -223,9 +223,9 @@ class GapSolver:
             return "met numbers that are not finite"
         asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
         if iteration - best_at >= MAX_STALLED_ITERATIONS:
-            return f"stalled: no better certificate than {best:.3g} in {MAX_STALLED_ITERATIONS} iterations, now {asked}"
+            return f"stalled: no residual below {best:.3g} in {MAX_STALLED_ITERATIONS} iterations, now {asked}"
         if iteration >= self.max_iterations:
-            return f"did not converge in max_iterations = {iteration}: the certificate is {asked}"
+            return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
         return None
 
     def _turn(self, it: _Iterate, members: float, scale: float) -> tuple[float, float]:

@@ -80,5 +80,5 @@ class Proximal:
             if worst <= 0.5 * best:
                 best, since = worst, 0
             if worst <= self.tolerance or since >= MAX_STEPS_TO_HALVE or steps >= MOST_STEPS * self.solver.max_steps:
-                failure = "" if worst <= self.tolerance else f"no progress in {since} contacts: certificate {worst:.3g}"
+                failure = "" if worst <= self.tolerance else f"no progress in {since} contacts: residual {worst:.3g}"
                 return SteadyContact(start, contact.u, d, certificate, projections, sets, steps, failure)

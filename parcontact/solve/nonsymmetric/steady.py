@@ -202,9 +202,11 @@ class SteadySolver:
         if certificate.worst <= self.tolerance:
             return ""
         reason = (
-            f"no progress in {since} sets" if since >= MAX_STALLED_SETS else f"not converged in {steps} linear steps"
+            f"no progress in {since} sets of points"
+            if since >= MAX_STALLED_SETS
+            else f"not converged in {steps} linear steps"
         )
-        return f"{reason}: certificate {certificate.worst:.3g}"
+        return f"{reason}: the residual is {certificate.worst:.3g} where {self.tolerance:.3g} was asked for"
 
     def _next_set(self, x: Array, h: Array, kappa: float) -> float:
         """Mark the next set; returns how far from a solution x seems to be."""

@@ -1,0 +1,60 @@
+"""Numbers as an engineer writes them: prefixes of units, shares in per cent, as many digits as the error allows."""
+
+import math
+
+PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+MOST_DIGITS = 6  # of a number with an error
+
+
+def prefixed(unit: str, largest: float) -> tuple[str, float]:
+    """Return the unit with the prefix that suits the largest value, and its size in the unit without one.
+
+    Squares, m², go up by a million; they keep the larger unit down to a thousandth of it. No unit and degrees have no
+    prefix, and there are no kiloseconds.
+    """
+    if unit in ("", "°C") or not largest:
+        return unit, 1.0
+    square = unit == "m²"
+    order = math.log10(abs(largest)) + 1e-9
+    power = 3 * math.floor((order + 3.0) / 6.0 if square else order / 3.0)
+    power = min(max(power, min(PREFIXES)), 0 if unit == "s" else max(PREFIXES))
+    return PREFIXES[power] + unit, 10.0 ** (2 * power if square else power)
+
+
+def text(value: float, unit: str, digits: int = 3) -> str:
+    """Return a number with its unit, for pictures and pages: 11.7 µm."""
+    rounded = float(f"{value:.{digits}g}")
+    shown, size = prefixed(unit, rounded)
+    return f"{rounded / size:g} {shown}".rstrip()
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """Return a number with its unit, for terminals that know few letters: 11.7 um."""
+    return text(value, unit, digits).replace("µ", "u")
+
+
+def per_cent(share: float, digits: int = 2) -> str:
+    """Return a share in per cent: 0.033 %, 2.2 %, 130 %."""
+    percent = 100.0 * share
+    return f"{percent:.{digits}g} %" if percent < 10.0**digits - 0.5 else f"{percent:.0f} %"
+
+
+def with_error(value: float, error: float) -> str:
+    """Return a number and its error: two digits of the error, and the number as far as these: 0.01483 +- 0.00036.
+
+    Four digits where no error is known; at most MOST_DIGITS where it is small.
+    """
+    if not 0.0 < error < math.inf:
+        return f"{value:.4g}"
+    last = _exponent(error) - 1  # the power of ten of the last digit that is shown
+    first = max(_exponent(value), last + 1) if value else last + 1
+    shown = max(last, first + 1 - MOST_DIGITS)
+    if -4 <= first < MOST_DIGITS:
+        within = f"{error:.{max(-last, 0)}f}" if shown == last else f"{error:.1e}"
+        return f"{value:.{max(-shown, 0)}f} +- {within}"
+    return f"{value:.{first - shown}e} +- {error:.1e}"
+
+
+def _exponent(value: float) -> int:
+    """Return the power of ten of the first of two digits."""
+    return int(f"{value:.1e}".partition("e")[2])
