@@ -1,6 +1,7 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
 import csv
+import re
 from collections.abc import Callable
 from pathlib import Path
 
