@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .fault import quote, shorten
-from .places import UNREADABLE, Key, Place, PlacedDict, Source, put
+from .places import UNREADABLE, Key, Place, Source
 from .python_data import source_of
 from .sweep_cases import SWEEP, Sweep, refuse_overrides, take
 from .yamltext import parse, read, read_with_content
@@ -101,26 +101,24 @@ def _apply(source: Source, override: Override) -> None:
 
     `surface.0` is also a surface that is one mapping instead of a list.
     """
-    node, path = source.data, override.path
-    if not isinstance(node, dict):
+    if not isinstance(source.data, dict):
         return
-    if path[:2] == ("surface", "0") and isinstance(node.get("surface"), dict):
-        path = ("surface", *path[2:])
-    for index, name in enumerate(path):
+    node, found, given = source.data, Key(), override.path
+    if given[:2] == ("surface", "0") and isinstance(node.get("surface"), dict):
+        given = ("surface", *given[2:])
+    for index, name in enumerate(given):
         if isinstance(node, list) and str(name).isdecimal() and int(name) < len(node):
-            key: str | int = int(name)
-        elif isinstance(node, dict):
-            key = str(name)
-        elif node is UNREADABLE:
+            name = int(name)
+        elif not isinstance(node, dict):
+            if node is not UNREADABLE:
+                source.note(override.place, _dead_end(node, ".".join(map(str, found)), str(name)))
             return
-        else:
-            source.note(override.place, _dead_end(node, ".".join(map(str, path[:index])), str(name)))
-            return
-        if index == len(path) - 1:
-            put(node, key, override.value, override.place, override.value_place)
-        elif isinstance(node, dict) and node.get(str(key)) is None:
-            put(node, key, PlacedDict(), override.place, override.place)
-        node = node[key]
+        found = (*found, name)
+        if index == len(given) - 1:
+            source.put(found, override.value, override.place, override.value_place)
+        elif isinstance(node, dict) and node.get(name) is None:
+            source.put(found, {}, override.place, override.place)
+        node = node[name]  # type: ignore[index]
 
 
 def _dead_end(node: Any, shown: str, name: str) -> str:
@@ -160,9 +158,8 @@ def _include(source: Source, job: Path, own: dict[str, Any]) -> Included | None:
         return None
     content, included = read_with_content(found, _shown(found))
     source.mistakes += included.mistakes
-    material, at = included.data, included.place
-    if isinstance(material, dict) and list(material) == ["material"]:
-        material, at = material["material"], included.locate(MATERIAL).place
+    start = MATERIAL if isinstance(included.data, dict) and list(included.data) == ["material"] else ()
+    material, at = included.data["material"] if start else included.data, included.locate(start).place
     if not isinstance(material, dict):
         if material is not UNREADABLE:
             source.note(at, "must be one mapping with the keys of a material")
@@ -171,10 +168,15 @@ def _include(source: Source, job: Path, own: dict[str, Any]) -> Included | None:
     if hidden := [key for key in own if key in material and key in beside]:
         sentence = f"has no effect on {', '.join(hidden)}, which the job gives itself"
         source.note(place, f"{sentence}; use --set material={{include: {name}}} to replace the material")
-    for key, value in beside.items():
-        at_key = source.locate((*MATERIAL, key))
-        put(material, key, value, at_key.key_place, at_key.place)
-    put(source.data, "material", material, source.locate(MATERIAL).key_place, at)
+    items = included.places.items()
+    places = {(*MATERIAL, *key[len(start) :]): known for key, known in items if key != start}
+    for key in beside:
+        own_place = source.locate((*MATERIAL, key))
+        places = {path: known for path, known in places.items() if path[1] != key}
+        places[*MATERIAL, key] = own_place.key_place, own_place.place
+    places |= {path: known for path, known in source.places.items() if path[:1] == MATERIAL and len(path) > 2}
+    source.put(MATERIAL, material | beside, source.locate(MATERIAL).key_place, at)
+    source.places |= places
     return Included(found.absolute(), hashlib.sha256(content).hexdigest())
 
 

@@ -1,8 +1,7 @@
-"""Plain data that remembers where each key and value was written, so that a mistake found later points at the text."""
+"""Plain data beside the places where they were written, so that a mistake found later points at the text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -39,71 +38,53 @@ UNREADABLE: Final = _Unreadable()  # stands for a value whose mistake is known a
 NOWHERE: Final = Place("")
 
 
-class PlacedDict(dict[str, Any]):
-    """A mapping with the places of its keys and of their values."""
-
-    def __init__(self, data: Iterable[tuple[str, Any]] = ()) -> None:
-        super().__init__(data)
-        self.keys_at: dict[str, Place] = {}
-        self.values_at: dict[str, Place] = {}
-
-
-class PlacedList(list[Any]):
-    """A list with the places of its values."""
-
-    def __init__(self, data: Iterable[Any] = (), values_at: Iterable[Place] = ()) -> None:
-        super().__init__(data)
-        self.values_at = dict(enumerate(values_at))
-
-
-def put(node: Any, key: str | int, value: Any, key_at: Place, value_at: Place) -> None:
-    """Set a value of a mapping or a list, and where it and its key were written."""
-    node[key] = value
-    if isinstance(node, PlacedDict | PlacedList):
-        node.values_at[key] = value_at  # type: ignore[index]
-    if isinstance(node, PlacedDict):
-        node.keys_at[str(key)] = key_at
-
-
 class Located(NamedTuple):
-    """The end of a path: the path as the user wrote it, the value, and the places of key and value.
+    """The end of a path: the path as the user wrote it, and the places of its value and of its key.
 
-    Where something is missing, place and value are those of what should hold it.
+    Where something is missing, both places are those of what should hold it.
     """
 
     path: Key
-    value: Any
     place: Place
     key_place: Place
-    readable: bool
+    readable: bool = True
 
 
 @dataclass
 class Source:
-    """The data of a file, of a mapping or of an override, where all of it was written, and the mistakes in it."""
+    """The data of a file, of a mapping or of an override, where all of it was written, and the mistakes in it.
+
+    `places` has the places of key and value by the way to them; what it lacks was written where its holder was.
+    """
 
     data: Any = None
     place: Place = NOWHERE
     mistakes: list[Mistake] = field(default_factory=list)
+    places: dict[Key, tuple[Place, Place]] = field(default_factory=dict)
 
     def note(self, place: Place, sentence: str) -> None:
         """Add a mistake."""
         self.mistakes.append(Mistake(place, sentence))
 
+    def put(self, path: Key, value: Any, key_place: Place, place: Place) -> None:
+        """Set a value of a mapping or a list that is there, and where its key and all of it were written."""
+        node = self.data
+        for step in path[:-1]:
+            node = node[step]
+        node[path[-1]] = value
+        self.places = {key: known for key, known in self.places.items() if key[: len(path)] != path}
+        self.places[path] = key_place, place
+
     def locate(self, path: Key) -> Located:
         """Follow a path; steps into a list that was given as one value are left out."""
-        node, place, key_place, steps = self.data, self.place, self.place, list[str | int]()
-        readable = node is not UNREADABLE
+        node, place, key_place, steps = self.data, self.place, self.place, Key()
         for step in path:
             if isinstance(node, dict | list) and (step in node if isinstance(node, dict) else step in range(len(node))):
-                place = getattr(node, "values_at", {}).get(step, place)
-                key_place = getattr(node, "keys_at", {}).get(step, place)
-                node = node[step]  # type: ignore[index]
-                steps.append(step)
-                readable = readable and node is not UNREADABLE
+                node, steps = node[step], (*steps, step)  # type: ignore[index]
+                key_place, place = self.places.get(steps, (place, place))
             elif isinstance(node, dict) and isinstance(step, str):
-                return Located((*steps, step), node, place, place, readable)
-        return Located(tuple(steps), node, place, key_place, readable and not _holds_unreadable(node))
+                return Located((*steps, step), place, place)
+        return Located(steps, place, key_place, not _holds_unreadable(node))
 
 
 def _holds_unreadable(node: Any) -> bool:

@@ -7,14 +7,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from .fault import quote, shorten
-from .places import NOWHERE, UNREADABLE, Key, Place, PlacedDict, PlacedList, Source
-from .yamltext import MAX_DEPTH
+from .places import NOWHERE, UNREADABLE, Key, Place, Source
 
 
 def source_of(data: Any, place: Place = NOWHERE) -> Source:
     """Return plain data as a `Source` all of which was written at one place."""
     source = Source(place=place)
-    source.data = _plain(data, (), source)
+    try:
+        source.data = _plain(data, (), source)
+    except RecursionError:
+        source.data = UNREADABLE
+        source.note(place, "is nested too deeply")
     return source
 
 
@@ -33,15 +36,14 @@ def _plain(value: Any, path: Key, source: Source) -> Any:
         value = os.fspath(value)
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    wrong = f"must be numbers, texts, lists or mappings, got {shorten(repr(value), 60)}"
-    if len(path) > MAX_DEPTH:
-        wrong = "is nested too deeply"
-    elif isinstance(value, Mapping):
-        if all(isinstance(key, str) for key in value):
-            return PlacedDict((key, _plain(item, (*path, key), source)) for key, item in value.items())
+    if isinstance(value, list | tuple | range):
+        return [_plain(item, (*path, index), source) for index, item in enumerate(value)]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(item, (*path, key), source) for key, item in value.items()}
+    if isinstance(value, Mapping):
         wrong = f"has a key that is no word, {quote(next(key for key in value if not isinstance(key, str)))}"
-    elif isinstance(value, list | tuple | range):
-        return PlacedList(_plain(item, (*path, index), source) for index, item in enumerate(value))
+    else:
+        wrong = f"must be numbers, texts, lists or mappings, got {shorten(repr(value), 60)}"
     source.note(source.place, f"{'.'.join(map(str, path)) or 'the job'} {wrong}")
     return UNREADABLE
 

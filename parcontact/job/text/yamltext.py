@@ -2,21 +2,20 @@
 
 Two things differ from PyYAML's own reading: `1e-3` is a number, and equal keys in one mapping are a mistake instead of
 the last one winning. Numbers are decimal: `12:30` and `010` are text. What a text may grow to is bounded: its own size,
-its values once all aliases are followed, and the depth of its nesting.
+and its values once all aliases are followed.
 """
 
 from __future__ import annotations
 
 import re
 import stat
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from .fault import shorten
-from .places import UNREADABLE, Key, Place, PlacedDict, PlacedList, Source, put
+from .places import UNREADABLE, Key, Place, Source
 
 YAML_TAG = "tag:yaml.org,2002:"
 RESOLVERS = (  # tag, what such a scalar looks like, first characters; tried in this order
@@ -32,8 +31,6 @@ SCALAR_TAGS = tuple(YAML_TAG + name for name in ("bool", "int", "float", "null",
 # Bounds against texts that a broken program has written; no job comes near them.
 MAX_BYTES = 2_000_000  # of a file
 MAX_VALUES = 100_000  # of a text, an alias counting as all that it stands for
-MAX_DEPTH = 60  # of values within values
-MAX_DIGITS = 50  # of a whole number
 
 
 def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
@@ -54,10 +51,6 @@ class JobDumper(yaml.SafeDumper):
     """PyYAML's safe dumper that quotes exactly the texts which `JobLoader` would take for something else."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
-
-
-JobDumper.add_representer(PlacedDict, yaml.SafeDumper.represent_dict)
-JobDumper.add_representer(PlacedList, yaml.SafeDumper.represent_list)
 
 
 def dump(data: Any) -> str:
@@ -105,25 +98,15 @@ def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
     except yaml.YAMLError as error:
         source.note(start, str(error))
     except RecursionError:
-        source.note(start, "cannot be read as YAML: it is nested too deeply")
+        source.note(start, "cannot be read as YAML: it is nested too deeply, or an alias holds itself")
     return source
 
 
-def _unwritable(text: str) -> str:
-    """Return what keeps a text from being written or being the name of a file, or ''."""
-    try:
-        text.encode()
-    except UnicodeEncodeError as error:
-        return f"this text is not UTF-8: {error.reason} at position {error.start}"
-    return "a text must not hold a null character" if "\0" in text else ""
-
-
 class _Reader:
-    """Turns YAML nodes into plain data with places; mistakes go into a `Source`."""
+    """Turns YAML nodes into plain data; places and mistakes go into a `Source`."""
 
     def __init__(self, source: Source, origin: str, whole: Place | None):
         self.source, self.origin, self.whole = source, origin, whole
-        self.open: list[int] = []  # the nodes that hold the current one: an alias to one of them would never end
         self.count = 0  # of values so far
 
     def place(self, mark: yaml.Mark | None) -> Place:
@@ -144,36 +127,25 @@ class _Reader:
         self.count += 1
         if self.count > MAX_VALUES:
             raise yaml.YAMLError(f"has more than {MAX_VALUES} values once its aliases are followed, which no job has")
-        if len(path) > MAX_DEPTH:
-            raise yaml.YAMLError(f"cannot be read as YAML: it is nested too deeply, by more than {MAX_DEPTH} levels")
-        if id(node) in self.open:
-            return self.refuse(node, "this alias holds itself")
-        self.open.append(id(node))
-        try:
-            if isinstance(node, yaml.MappingNode) and node.tag == YAML_TAG + "map":
-                return self.mapping(node, path)
-            if isinstance(node, yaml.SequenceNode) and node.tag == YAML_TAG + "seq":
-                places = [self.place(child.start_mark) for child in node.value]
-                return PlacedList((self.value(child, (*path, i)) for i, child in enumerate(node.value)), places)
-            return self.scalar(node)
-        finally:
-            self.open.pop()
-
-    def scalar(self, node: yaml.Node) -> Any:
+        if isinstance(node, yaml.MappingNode) and node.tag == YAML_TAG + "map":
+            return self.mapping(node, path)
+        if isinstance(node, yaml.SequenceNode) and node.tag == YAML_TAG + "seq":
+            return [self.item(child, child, (*path, index)) for index, child in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode) and node.tag in SCALAR_TAGS:
-            if node.tag == YAML_TAG + "int" and len(node.value) > MAX_DIGITS:
-                return self.refuse(node, f"a whole number of {len(node.value)} digits is too large")
-            if wrong := _unwritable(node.value):
-                return self.refuse(node, wrong)
             try:
                 return self.loader.construct_object(node)
-            except (ValueError, LookupError):  # !!int ''
+            except (ValueError, LookupError):  # !!int '', and more digits than Python reads
                 pass
         return self.refuse(node, f"{shorten(node.tag.replace(YAML_TAG, '!!'))} does not belong in a job")
 
-    def mapping(self, node: yaml.MappingNode, path: Key) -> PlacedDict:
-        """Return a mapping; what `<<` merges comes last, and only where the mapping has no such key."""
-        found = PlacedDict()
+    def item(self, key: yaml.Node, child: yaml.Node, path: Key) -> Any:
+        """Return the value of a mapping or a list, and note its place unless it is known from another mapping."""
+        self.source.places.setdefault(path, (self.place(key.start_mark), self.place(child.start_mark)))
+        return self.value(child, path)
+
+    def mapping(self, node: yaml.MappingNode, path: Key) -> dict[str, Any]:
+        """Return a mapping; what `<<` merges counts only where the mapping has no such key."""
+        found: dict[str, Any] = {}
         merged: list[yaml.Node] = []
         for key, child in node.value:
             if key.tag == YAML_TAG + "merge":
@@ -182,20 +154,13 @@ class _Reader:
                 got = repr(shorten(key.value)) if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
                 self.refuse(key, f"a key must be a word, got {got}")
             elif key.value in found:
-                name, line = ".".join(map(str, (*path, key.value))), found.keys_at[key.value].line
+                name, line = ".".join(map(str, (*path, key.value))), self.source.places[*path, key.value][0].line
                 self.refuse(key, f"{shorten(name)} is given twice" + f", first in line {line}" * bool(line))
             else:
-                value = self.value(child, (*path, key.value))
-                put(found, key.value, value, self.place(key.start_mark), self.place(child.start_mark))
-        for inherited in self.merged(merged, path):
-            for word in [word for word in inherited if word not in found]:
-                put(found, word, inherited[word], inherited.keys_at[word], inherited.values_at[word])
+                found[key.value] = self.item(key, child, (*path, key.value))
+        for other in merged:
+            if isinstance(inherited := self.value(other, path), dict):
+                found = inherited | found
+            else:
+                self.refuse(other, "<< takes a mapping, or a list of mappings")
         return found
-
-    def merged(self, nodes: list[yaml.Node], path: Key) -> Iterator[PlacedDict]:
-        for node in nodes:
-            inherited = self.value(node, path) if isinstance(node, yaml.MappingNode) else None
-            if isinstance(inherited, PlacedDict):
-                yield inherited
-            elif inherited is None:
-                self.refuse(node, "<< takes a mapping, or a list of mappings")
