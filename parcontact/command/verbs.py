@@ -236,9 +236,9 @@ def doctor(options: argparse.Namespace) -> int:
 
     for line in machine.describe_machine(world, Path.cwd()):
         tell(line)
-    results = [checks.run_check(check, Bench(world, options.precision)) for check in checks.CHECKS]
+    results = [(check, checks.run_check(check, Bench(world, options.precision))) for check in checks.CHECKS]
     tell("\n" + checks.markdown(results))
-    wrong = [f"{result.check.name}: {text}" for result in results for text in result.wrong]
+    wrong = [f"{check.name}: {text}" for check, bench in results for text in bench.wrong]
     wrong += filter(None, [machine.find_broken_files(world, Path.cwd())])
     tell("\n".join(wrong) or "all is well")
     return FAILED if wrong else DONE

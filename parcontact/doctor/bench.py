@@ -55,7 +55,17 @@ class Bench:
     def __init__(self, comm: "MPI.Intracomm", precision: str = "double") -> None:
         self.comm, self.precision = comm, precision
         self.findings: dict[str, Finding] = {}
-        self.residual, self.iterations = 0.0, 0
+        self.residual, self.iterations, self.failure = 0.0, 0, ""
+
+    @property
+    def wrong(self) -> list[str]:
+        """Sentences on what is not as it should be; none if all is well."""
+        return [*filter(None, [self.failure]), *(str(found) for found in self.findings.values() if not found.ok)]
+
+    @property
+    def nearest(self) -> str:
+        """The finding that is nearest to its limit, or beyond."""
+        return self.failure or str(max(self.findings.values(), key=lambda found: found.share))
 
     # -- running ------------------------------------------------------------------------------------------------------
 

@@ -1,31 +1,15 @@
-"""Contacts with exact answers: almost full and full ones, vanishing loads, sliding, unloading, many branches."""
+"""Contacts with exact answers: almost full and full ones, sliding, unloading."""
 
 import numpy as np
 
 from ..physics import prony as viscoelastic
-from ..theory import full_contact, hertz, lee_radok, persson, persson_rings, westergaard
+from ..theory import full_contact, lee_radok, persson, persson_rings, westergaard
 from .bench import Bench
-from .small_jobs import (
-    CELL,
-    GLASSY,
-    HEIGHT,
-    INTEGRATORS,
-    PRONY,
-    RADIUS,
-    RELAXATION,
-    WAVELENGTH,
-    K,
-    sphere,
-    wave,
-    zener,
-)
+from .small_jobs import GLASSY, HEIGHT, PRONY, RADIUS, RELAXATION, WAVELENGTH, K, sphere, wave, zener
 
 ITERATIONS = 60  # a contact may take this many at most
 RUBBER = zener(GLASSY, [], [])
 WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # and their heights
-SHARES = (300, 350, 220, 80, 24, 7, 2.4, 1, 0.5, 0.3, 0.2, 0.15)  # MPa
-TYRE = (1e6, [1e6 * share for share in SHARES], [5 * 10.0**exponent for exponent in range(-9, 3)])
-FULL = 5e7  # Pa, enough for full contact
 
 
 def nearly_full(bench: Bench) -> None:
@@ -40,26 +24,6 @@ def nearly_full(bench: Bench) -> None:
         area = float(westergaard.contact_fraction(mean, HEIGHT, WAVELENGTH, GLASSY))
         bench.expect("area", rows[-1].measures.contact_area, area, 2 / 256 if share <= 1 else 0.0, scale=1.0)
     bench.expect("iterations", bench.iterations, 0.0, ITERATIONS, scale=1.0)
-
-
-def vanishing_load(bench: Bench) -> None:
-    """Hertz's approach ~ W^(2/3) down to some points; then one cell carries all; no load is no pressure."""
-    for force in (0.15, 0.015):
-        size = 4 * float(hertz.contact_radius(force, RADIUS, GLASSY))
-        _, rows = bench.march(sphere([{"force": force}], points=32, size=size, material=RUBBER))
-        exact = float(hertz.approach(force, RADIUS, GLASSY))
-        bench.expect(f"approach, {force:g} N", rows[-1].measures.approach, exact, 1e-3)
-    cell = 1e-4
-    for force in (1e-6, 1e-12, 1e-38):
-        stages = [{"force": force}, {"force": 1e-39}, {"force": 1e-40}, {"force": 0.0}]
-        _, rows = bench.march(sphere(stages, points=8, size=8 * cell, material=RUBBER))
-        pressed, free = rows[1].measures, rows[-1].measures
-        bench.expect("points", 64 * pressed.contact_area, 1.0, 0.0)
-        bench.expect("peak", pressed.max_pressure, force / cell**2, 1e-12)
-        bench.expect("approach", pressed.approach, CELL * force / cell / GLASSY, 1e-9, scale=cell**2 / RADIUS)
-        bench.expect("friction", pressed.friction, 0.0, 0.0)
-        bench.expect("pressure without load", free.max_pressure, 0.0, 0.0)
-        bench.expect("friction without load", free.friction, 0.0, 0.0)
 
 
 def closed_by_load(bench: Bench) -> None:
@@ -101,29 +65,3 @@ def retraction(bench: Bench) -> None:
     bench.expect("lift-off", t[np.flatnonzero(force)[-1]], lift_off, rise / steps / lift_off)
     bench.expect("force after", force[t > lift_off].max(), 0.0, 0.0)
     bench.expect("area after", max(row.measures.contact_area for row in rows if row.time > lift_off), 0.0, 0.0)
-
-
-def many_decades(bench: Bench) -> None:
-    """Relaxation times from 5 ns to 500 s in one step: the modulus that 8 steps per period give, still settling."""
-    for omega in (1e4, 1e6):
-        dt = 2 * np.pi / 8 / omega
-        for integrator in INTEGRATORS:
-            stage = {"pressure": FULL, "velocity": omega / K, "duration": 16 * dt, "time_step": dt}
-            job = wave([stage], material=zener(*TYRE), numerics={"integrator": integrator})
-            march, rows = bench.march(job)
-            modulus = _settling(omega, dt, len(rows) - 2, integrator)
-            friction = K * HEIGHT * HEIGHT * K * modulus.imag / FULL
-            bench.expect("amplitude", bench.amplitude(march), 2 * K * HEIGHT * abs(modulus), 1e-9)
-            bench.expect("friction", rows[-1].measures.friction, friction, 1e-9)
-
-
-def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
-    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value."""
-    spring, moduli, times = TYRE
-    total = complex(spring)
-    for modulus, time in zip(moduli, times, strict=True):
-        share = complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator)) / modulus
-        z = dt / time
-        decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
-        total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)
-    return total

@@ -8,7 +8,8 @@ from mpi4py import MPI
 from parcontact import __main__
 from parcontact.doctor import checks, machine
 from parcontact.doctor.bench import Bench, Finding
-from parcontact.doctor.checks import CHECKS, Check, CheckResult, markdown, run_check
+from parcontact.doctor.checks import CHECKS, Check, markdown, run_check
+from parcontact.errors import RunError
 from parcontact.manual import texts
 from parcontact.run import runner
 from parcontact.run.run import Options
@@ -22,11 +23,16 @@ def test_a_case_that_goes_wrong_is_seen() -> None:
         bench.expect("force", float("nan"), 1.0, 0.1)
         bench.expect("peak", 1.0, 1.05, 0.1)
 
-    result = run_check(Check("name", "expected", wrong), Bench(MPI.COMM_SELF))
+    def stalled(bench: Bench) -> None:
+        raise RunError("the contact solve stalled")
+
+    check = Check("name", "expected", wrong)
+    result = run_check(check, Bench(MPI.COMM_SELF))
     assert result.wrong == ["area = 0.5 (0.6 +- 0.06)", "force = nan (1 +- 0.1)"]
-    assert "WRONG" in markdown([result])
-    failed = CheckResult(result.check, (), 0.0, 0, "the contact solve stalled")
+    assert "WRONG" in markdown([(check, result)])
+    failed = run_check(Check("name", "expected", stalled), Bench(MPI.COMM_SELF))
     assert failed.wrong == ["the contact solve stalled"]
+    assert failed.nearest == "the contact solve stalled"
     assert Finding("gap", 0.0, 0.0, 0.0).ok
     assert not Finding("gap", 1e-300, 0.0, 0.0).ok
 

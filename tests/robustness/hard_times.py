@@ -1,4 +1,4 @@
-"""Hard cases of time: steps far from the relaxation times, moduli far apart, branches that are none, recovery."""
+"""Hard cases of time: steps far from relaxation times, moduli far apart, odd and many branches, vanishing loads."""
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from parcontact.doctor.small_jobs import (
     INTEGRATORS,
     LONG_TERM,
     PRONY,
+    RADIUS,
     RELAXATION,
     WAVELENGTH,
     Json,
@@ -22,9 +23,14 @@ from parcontact.doctor.small_jobs import (
 )
 from parcontact.march.loop import March
 from parcontact.physics import prony as viscoelastic
+from parcontact.theory import hertz
 
 STIFF = 2 * K * HEIGHT  # pressure amplitude of the wave in full contact over the modulus
 FORCE = 0.15  # N
+RUBBER = zener(GLASSY, [], [])
+SHARES = (300, 350, 220, 80, 24, 7, 2.4, 1, 0.5, 0.3, 0.2, 0.15)  # MPa
+TYRE = (1e6, [1e6 * share for share in SHARES], [5 * 10.0**exponent for exponent in range(-9, 3)])
+FULL = 5e7  # Pa, enough for full contact
 
 
 def long_steps(bench: Bench) -> None:
@@ -128,3 +134,49 @@ def load_again(bench: Bench) -> None:
     bench.expect("area again over virgin", again.contact_area / virgin.contact_area, (0.537 / 0.470) ** 2, 0.1)
     _, rows = bench.march(sphere([press, long_rest, {"force": FORCE}], size=2e-3, numerics={"tolerance": 1e-6}))
     bench.expect("approach after a long rest", rows[-1].measures.approach, virgin.approach, 5 * np.exp(-10.0))
+
+
+def vanishing_load(bench: Bench) -> None:
+    """Hertz's approach ~ W^(2/3) down to some points; then one cell carries all; no load is no pressure."""
+    for force in (0.15, 0.015):
+        size = 4 * float(hertz.contact_radius(force, RADIUS, GLASSY))
+        _, rows = bench.march(sphere([{"force": force}], points=32, size=size, material=RUBBER))
+        exact = float(hertz.approach(force, RADIUS, GLASSY))
+        bench.expect(f"approach, {force:g} N", rows[-1].measures.approach, exact, 1e-3)
+    cell = 1e-4
+    for force in (1e-6, 1e-12, 1e-38):
+        stages = [{"force": force}, {"force": 1e-39}, {"force": 1e-40}, {"force": 0.0}]
+        _, rows = bench.march(sphere(stages, points=8, size=8 * cell, material=RUBBER))
+        pressed, free = rows[1].measures, rows[-1].measures
+        bench.expect("points", 64 * pressed.contact_area, 1.0, 0.0)
+        bench.expect("peak", pressed.max_pressure, force / cell**2, 1e-12)
+        bench.expect("approach", pressed.approach, CELL * force / cell / GLASSY, 1e-9, scale=cell**2 / RADIUS)
+        bench.expect("friction", pressed.friction, 0.0, 0.0)
+        bench.expect("pressure without load", free.max_pressure, 0.0, 0.0)
+        bench.expect("friction without load", free.friction, 0.0, 0.0)
+
+
+def many_decades(bench: Bench) -> None:
+    """Relaxation times from 5 ns to 500 s in one step: the modulus that 8 steps per period give, still settling."""
+    for omega in (1e4, 1e6):
+        dt = 2 * np.pi / 8 / omega
+        for integrator in INTEGRATORS:
+            stage = {"pressure": FULL, "velocity": omega / K, "duration": 16 * dt, "time_step": dt}
+            job = wave([stage], material=zener(*TYRE), numerics={"integrator": integrator})
+            march, rows = bench.march(job)
+            modulus = _settling(omega, dt, len(rows) - 2, integrator)
+            friction = K * HEIGHT * HEIGHT * K * modulus.imag / FULL
+            bench.expect("amplitude", bench.amplitude(march), 2 * K * HEIGHT * abs(modulus), 1e-9)
+            bench.expect("friction", rows[-1].measures.friction, friction, 1e-9)
+
+
+def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
+    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value."""
+    spring, moduli, times = TYRE
+    total = complex(spring)
+    for modulus, time in zip(moduli, times, strict=True):
+        share = complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator)) / modulus
+        z = dt / time
+        decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
+        total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)
+    return total

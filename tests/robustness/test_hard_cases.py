@@ -17,6 +17,7 @@ from .strict_bench import StrictBench
 CASES: tuple[Callable[[Bench], None], ...] = (
     *(check.run for check in CHECKS),
     *(hard_times.long_steps, hard_times.short_steps, hard_times.moduli_far_apart, hard_times.odd_branches),
+    *(hard_times.vanishing_load, hard_times.many_decades),
     *(hard_times.load_again, hard_sliding.single_point, hard_sliding.shortest_wave, hard_sliding.long_box),
     *(hard_sliding.reversal, hard_sliding.stop, hard_sliding.extreme_velocities),
     *(hard_sliding.two_waves, hard_sliding.flat_surface),
