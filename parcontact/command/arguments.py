@@ -6,7 +6,7 @@ import argparse
 import difflib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 from .. import __version__
 from ..errors import InputError
@@ -146,49 +146,25 @@ def _cite(add: Add) -> None:
     add("directory", metavar="OUT", type=Path, help="output directory of a run or curve")
 
 
-class Verb(NamedTuple):
-    """A verb: its function in `verbs`, what adds its arguments, and what it does in one line."""
-
-    name: str
-    act: Callable[[argparse.Namespace], int]
-    arguments: tuple[Callable[[Add], None], ...]
-    help: str
-
-
-VERBS = (
-    Verb("run", verbs.run, (_job, _run, _quiet), "run a job, or go on with it (the default verb)"),
-    Verb("steady", verbs.steady, (_job, _steady, _quiet), "solve steady sliding directly: a friction curve"),
-    Verb("check", verbs.check, (_job,), "list all mistakes of a job, or what it says with every default"),
-    Verb("plan", verbs.plan, (_job, _plan), "say what a job will do, and what it costs; writes nothing"),
-    Verb(
-        "theory",
-        verbs.theory,
-        (_job, _theory, _quiet),
-        "predict friction and area by Persson's theory, into theory.csv",
-    ),
-    Verb("fit", verbs.fit, (_fit,), "fit a compound to measured moduli: a material file and a picture"),
-    Verb(
-        "study",
-        verbs.study,
-        (_job, _quiet),
-        "run a job on finer and finer settings: what accuracy costs; goes on after a stop",
-    ),
-    Verb("surface", verbs.surface, (_surface,), "say what the surface of a job, or a measured map, is like; draw it"),
-    Verb(
-        "info",
-        verbs.info,
-        (_info,),
-        "describe checkpoints, files of fields and output directories, and check that they are sound",
-    ),
-    Verb("plot", verbs.plot, (_plot,), "draw pictures of runs and friction curves, compare them, make a movie"),
-    Verb("leak", verbs.leak, (_leak,), "calculate what leaks through the gaps of a run, into leak.csv; draw it"),
-    Verb("report", verbs.report, (_report,), "write one HTML file to send: what was asked, results, data, origin"),
-    Verb("doctor", verbs.doctor, (_doctor,), "check this installation: exact cases, ranks, files and times"),
-    Verb("manual", verbs.manual, (_manual,), "print a page of the manual, or say which there are"),
-    Verb("schema", verbs.schema, (), "print a JSON Schema of job files, for editors"),
-    Verb("cite", verbs.cite, (_cite,), "say what to cite for a run"),
-)
-NAMES = tuple(verb.name for verb in VERBS)
+VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ...]] = {  # and their arguments
+    verbs.run: (_job, _run, _quiet),
+    verbs.steady: (_job, _steady, _quiet),
+    verbs.check: (_job,),
+    verbs.plan: (_job, _plan),
+    verbs.theory: (_job, _theory, _quiet),
+    verbs.fit: (_fit,),
+    verbs.study: (_job, _quiet),
+    verbs.surface: (_surface,),
+    verbs.info: (_info,),
+    verbs.plot: (_plot,),
+    verbs.leak: (_leak,),
+    verbs.report: (_report,),
+    verbs.doctor: (_doctor,),
+    verbs.manual: (_manual,),
+    verbs.schema: (),
+    verbs.cite: (_cite,),
+}
+NAMES = tuple(verb.__name__ for verb in VERBS)
 
 
 def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
@@ -234,18 +210,22 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"parcontact {__version__}")
     found = parser.add_subparsers(dest="verb", required=True, metavar="verb")
     for verb in VERBS:
-        _add_arguments(found.add_parser(verb.name, help=verb.help), verb)
+        said = str(verb.__doc__)
+        _add_arguments(found.add_parser(verb.__name__, help=said[0].lower() + said[1:-1]), verb)
     return parser
 
 
-def _add_arguments(parser: argparse.ArgumentParser, verb: Verb) -> argparse.ArgumentParser:
-    for add_arguments in verb.arguments:
+def _add_arguments(parser: argparse.ArgumentParser, verb: Callable[[argparse.Namespace], int]) -> None:
+    for add_arguments in VERBS[verb]:
         add_arguments(parser.add_argument)
-    parser.set_defaults(act=verb.act, describe_verbs=describe_verbs)
-    return parser
+    parser.set_defaults(act=verb, describe_verbs=describe_verbs)
 
 
 def describe_verbs() -> str:
     """Return the help of each verb, for the manual."""
-    parsers = [_add_arguments(_Parser(prog=f"parcontact {verb.name}"), verb) for verb in VERBS]
-    return "\n".join(f"\n## `{own.prog.split()[1]}`\n\n```text\n{own.format_help().rstrip()}\n```" for own in parsers)
+    sections = []
+    for verb in VERBS:
+        own = _Parser(prog=f"parcontact {verb.__name__}")
+        _add_arguments(own, verb)
+        sections.append(f"\n## `{verb.__name__}`\n\n```text\n{own.format_help().rstrip()}\n```")
+    return "\n".join(sections)

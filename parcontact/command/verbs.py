@@ -21,6 +21,7 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: sto
 
 
 def run(options: argparse.Namespace) -> int:
+    """Run a job, or go on with it (the default verb)."""
     return each_case(options, ranks.start(), _run)
 
 
@@ -36,6 +37,7 @@ def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int
 
 
 def steady(options: argparse.Namespace) -> int:
+    """Solve steady sliding directly: a friction curve."""
     return each_case(options, ranks.start(), _curve)
 
 
@@ -55,6 +57,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
 
 @ranks.root_alone
 def check(options: argparse.Namespace) -> int:
+    """List all mistakes of a job, or what it says with every default."""
     from .. import job as jobs
     from ..history.chosen import describe_steps
     from ..run.sweep_warnings import doubts_of
@@ -92,6 +95,7 @@ def _doubts(job: Job) -> list[str]:
 
 
 def plan(options: argparse.Namespace) -> int:
+    """Say what a job will do, and what it costs; writes nothing."""
     from ..run import watch
 
     started = watch.age()
@@ -117,6 +121,7 @@ def plan(options: argparse.Namespace) -> int:
 
 
 def theory(options: argparse.Namespace) -> int:
+    """Predict friction and area by Persson's theory, into theory.csv."""
     return each_case(options, ranks.start(), _predict, runs=False)
 
 
@@ -131,6 +136,7 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
 
 @ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
+    """Fit a compound to measured moduli: a material file and a picture."""
     from .. import job as jobs
     from ..plotting import compound as files
     from ..rubber import compound
@@ -148,6 +154,7 @@ def fit(options: argparse.Namespace) -> int:
 
 
 def study(options: argparse.Namespace) -> int:
+    """Run a job on finer and finer settings: what accuracy costs; goes on after a stop."""
     world = ranks.start()
     from ..parallel.slab import Slab
     from ..study import study as whole_study
@@ -161,6 +168,7 @@ def study(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def surface(options: argparse.Namespace) -> int:
+    """Say what the surface of a job, or a measured map, is like; draw it."""
     from pathlib import Path
 
     from ..parallel.mpi import MPI
@@ -188,6 +196,7 @@ def surface(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def info(options: argparse.Namespace) -> int:
+    """Describe checkpoints, files of fields and output directories, and check that they are sound."""
     from ..summary import info as about
 
     text, sound = about.describe_all(options.file)
@@ -197,6 +206,7 @@ def info(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def plot(options: argparse.Namespace) -> int:
+    """Draw pictures of runs and friction curves, compare them, make a movie."""
     from ..plotting import plots
 
     names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
@@ -207,6 +217,7 @@ def plot(options: argparse.Namespace) -> int:
 
 
 def leak(options: argparse.Namespace) -> int:
+    """Calculate what leaks through the gaps of a run, into leak.csv; draw it."""
     world = ranks.start()
     from ..report.leak import write
 
@@ -217,6 +228,7 @@ def leak(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def report(options: argparse.Namespace) -> int:
+    """Write one HTML file to send: what was asked, results, data, origin."""
     from ..report import page
 
     print(f"report: {page.write(options.directories, options.out)}")
@@ -224,6 +236,7 @@ def report(options: argparse.Namespace) -> int:
 
 
 def doctor(options: argparse.Namespace) -> int:
+    """Check this installation: exact cases, ranks, files and times."""
     world = ranks.start()
     from pathlib import Path
 
@@ -246,6 +259,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def manual(options: argparse.Namespace) -> int:
+    """Print a page of the manual, or say which there are."""
     from ..manual import texts
 
     print(texts.plain(options.page, {"verbs": options.describe_verbs}) if options.page else texts.contents())
@@ -254,6 +268,7 @@ def manual(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def schema(options: argparse.Namespace) -> int:
+    """Print a JSON Schema of job files, for editors."""
     import json
     import sys
 
@@ -268,6 +283,7 @@ def schema(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def cite(options: argparse.Namespace) -> int:
+    """Say what to cite for a run."""
     from ..summary import citations
 
     print(citations.describe(options.directory))

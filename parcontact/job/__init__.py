@@ -3,7 +3,7 @@
 from ..errors import JobError
 from .model import Job, describe
 from .reading import Case, choose, load, load_cases
-from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
+from .sections.calculation import Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import (
     Cylinder,
     Flat,
@@ -20,46 +20,4 @@ from .sections.height_arrays import HeightArray
 from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .sections.part import Part
 from .sections.quantities import Positive, log_range
-from .sections.stages import AUTO, Control, GeometricStep, Initial, Ramp, Stage, Steady
-
-__all__ = [
-    "AUTO",
-    "Body",
-    "Case",
-    "Checkpoint",
-    "Control",
-    "Cylinder",
-    "Dma",
-    "Elastic",
-    "Flat",
-    "GeometricStep",
-    "Grid",
-    "HeightArray",
-    "HeightFile",
-    "Initial",
-    "Job",
-    "JobError",
-    "Numerics",
-    "OnOneMesh",
-    "Output",
-    "Part",
-    "Positive",
-    "PronyBranch",
-    "Ramp",
-    "Rough",
-    "RoughSpectrum",
-    "Spectral",
-    "Sphere",
-    "Stage",
-    "Steady",
-    "Study",
-    "Topography",
-    "Wave",
-    "Zener",
-    "ZenerBranch",
-    "choose",
-    "describe",
-    "load",
-    "load_cases",
-    "log_range",
-]
+from .sections.stages import AUTO, GeometricStep, Initial, Ramp, Stage, Steady

@@ -11,7 +11,8 @@ from typing import Any, NoReturn
 
 from ..effects.effect import columns_of
 from ..errors import InputError
-from ..job import Job, identity
+from ..job import Job
+from ..job.sections.listing import plain_job
 from ..job.text.yamltext import parse
 from ..march.loop import March
 from ..parallel.lockstep import wait_for_all
@@ -143,7 +144,7 @@ class Simulation:
         """
         file, march, slab = path_of(path), self._march, self._slab
         self._wait_for_all(f"saves {file}")
-        plain = on_root(self.comm, lambda: identity.plain_job(self.job))
+        plain = on_root(self.comm, lambda: plain_job(self.job))
         last = ",".join(tables.texts(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
         heights.store(self.job.surface, file.parent, slab)
@@ -169,7 +170,7 @@ class Simulation:
             job = job.of(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)
         slab = simulation._slab
-        plain = on_root(world, lambda: identity.plain_job(job))
+        plain = on_root(world, lambda: plain_job(job))
         found = restart.sound(file, job, plain, slab)
         if isinstance(found, str):
             raise InputError(found)

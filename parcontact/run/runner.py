@@ -8,7 +8,8 @@ from ..effects.effect import columns_of
 from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
-from ..job import Job, Rough, RoughSpectrum, identity
+from ..job import Job, Rough, RoughSpectrum
+from ..job.sections.listing import plain_job
 from ..march.loop import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -46,7 +47,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
     """Run a job, as `run`; returns what can be gone on from in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
-        plain = identity.plain_job(job) if slab.root else {}
+        plain = plain_job(job) if slab.root else {}
         origin, warnings, reason = _find_origin(job, plain, directory, options)
         saved = origin.contents if origin else None
         if reason:

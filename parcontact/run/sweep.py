@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TextIO
 
 from ..errors import InputError, InUseError, RunError
-from ..job import Case, Job, identity
+from ..job import Case, Job
 from ..job.reading import CASES
+from ..job.sections.listing import plain_job
 from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -163,7 +164,7 @@ def refuse_foreign(cases: Sequence[Case]) -> None:
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
     except (OSError, ValueError) as error:
         raise InputError(f"the output directory {directory} cannot be used: {error}") from error
-    refuse_other_jobs(directory, claims, identity.plain_job(first.job))
+    refuse_other_jobs(directory, claims, plain_job(first.job))
     if not claims and not {CASES, sweep_table.TABLE} & set(entries):
         refuse_files(directory, entries)
 

@@ -10,8 +10,9 @@ from typing import Any
 from .. import scene
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
-from ..job import Job, identity
+from ..job import Job
 from ..job.checks.cells import more_points
+from ..job.sections.listing import plain_job
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
@@ -122,7 +123,7 @@ def run(
 def _identity(job: Job, wanted: Request) -> dict[str, Any]:
     """Return what a curve is of, as plain data: of the `steady` section only what no point may differ in."""
     steady = {"direction": list(wanted.direction), "waves": wanted.waves}
-    return {**marker.kept(identity.plain_job(job)), "steady": steady}
+    return {**marker.kept(plain_job(job)), "steady": steady}
 
 
 def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:

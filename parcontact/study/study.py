@@ -5,7 +5,8 @@ import os
 from collections.abc import Callable, Sequence
 
 from ..errors import RunError
-from ..job import Job, identity
+from ..job import Job
+from ..job.sections.listing import plain_job
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..plotting import study as study_plots
@@ -29,7 +30,7 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     jobs = {case: make(overrides(job, refined.own, case)) for case in refined.combine()}
     directory = Directory(job.output.directory, slab, "study")
     with Signals().noted() as signals, directory.claimed():
-        plain = identity.plain_job(job) if slab.root else {}
+        plain = plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         study = _Study(refined, jobs, directory, quiet)

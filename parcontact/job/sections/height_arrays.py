@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from io import BytesIO
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
@@ -40,9 +41,8 @@ class Heights:
         values.flags.writeable = False
         self.values: NDArray[np.float64] | None = values
         self.shape: tuple[int, int] = values.shape
-        check = _Checksum()
-        np.save(check, values)
-        self.checksum = f"{check.value:08x}"
+        np.save(stored := BytesIO(), values)
+        self.checksum = f"{zlib.crc32(stored.getbuffer()):08x}"
 
     @property
     def name(self) -> str:
@@ -60,15 +60,6 @@ class Heights:
 
     def __repr__(self) -> str:
         return f"an array of shape {self.shape}"
-
-
-class _Checksum:
-    """The CRC-32 of a file that is not written."""
-
-    value = 0
-
-    def write(self, data: bytes) -> None:
-        self.value = zlib.crc32(data, self.value)
 
 
 def _heights(given: Any) -> Heights:

@@ -1,8 +1,9 @@
-"""A resolved job as text: YAML that loads again, and a table with units to read."""
+"""A resolved job as plain data: what YAML loads again, what tells it from other jobs, a table with units to read."""
 
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,20 @@ def plain(value: Any) -> Any:
 def items(part: Part) -> Iterator[tuple[str, Any]]:
     """Return the keys of a part that have a value, as they are written in a job."""
     return ((name, value) for name in type(part).model_fields if (value := getattr(part, name)) is not None)
+
+
+def plain_job(job: Any) -> dict[str, Any]:
+    """Return a job as plain data by which it is known; files that are read are known by what they hold."""
+    data: dict[str, Any] = plain(job)
+    for part, given in zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True):
+        for key in ("path", "spectrum"):
+            if isinstance(path := getattr(given, key, None), Path):
+                del part[key]
+                part["content"] = f"{zlib.crc32(path.read_bytes()):08x}"
+        if isinstance(given, HeightArray):
+            del part["path"]
+            part["content"] = given.heights.checksum
+    return data
 
 
 def unit(part: Part, key: str) -> str:

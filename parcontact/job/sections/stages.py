@@ -116,10 +116,7 @@ class Stage(Part):
     velocity: Velocity = (0.0, 0.0)
     duration: Positive | None = Field(default=None, description="a positive time [s]")
     distance: Positive | None = Field(default=None, description="a positive length [m]")
-    time_step: Annotated[
-        float | GeometricStep | Auto | None,
-        PlainValidator(_time_step, json_schema_input_type=Positive | GeometricStep | Auto),
-    ] = Field(
+    time_step: TimeStep | None = Field(
         default=None, description="a positive time step [s], {first, growth}, or auto"
     )  # auto where the stage lasts and does not give cells_per_step either
     cells_per_step: Positive | None = Field(

@@ -103,7 +103,8 @@ def _apply(source: Source, override: Override) -> None:
     """
     if not isinstance(source.data, dict):
         return
-    node, found, given = source.data, Key(), override.path
+    node: Any = source.data
+    found, given = Key(), override.path
     if given[:2] == ("surface", "0") and isinstance(node.get("surface"), dict):
         given = ("surface", *given[2:])
     for index, name in enumerate(given):
@@ -118,7 +119,7 @@ def _apply(source: Source, override: Override) -> None:
             source.put(found, override.value, override.place, override.value_place)
         elif isinstance(node, dict) and node.get(name) is None:
             source.put(found, {}, override.place, override.place)
-        node = node[name]  # type: ignore[index]
+        node = node[name]
 
 
 def _dead_end(node: Any, shown: str, name: str) -> str:
