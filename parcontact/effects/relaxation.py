@@ -14,28 +14,26 @@ Material = jobs.Elastic | jobs.Zener | jobs.Dma
 
 def relaxation_of(material: Material) -> Prony:
     """Return the relaxation function of a material [Pa, s]; one modulus and no terms if it is elastic."""
-    if isinstance(material, jobs.Elastic):
-        return Prony(material.shear_modulus, np.zeros(0), np.zeros(0))
-    if isinstance(material, jobs.Dma):
-        material = material.fitted
-    zener = [b for b in material.branches if isinstance(b, jobs.ZenerBranch)]
-    plain = [b for b in material.branches if isinstance(b, jobs.PronyBranch)]
+    body = material.fitted
+    if isinstance(body, jobs.Elastic):
+        return Prony(body.shear_modulus, np.zeros(0), np.zeros(0))
+    zener = [b for b in body.branches if isinstance(b, jobs.ZenerBranch)]
+    plain = [b for b in body.branches if isinstance(b, jobs.PronyBranch)]
     series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
-    prony = zener_to_prony(series, kelvin, viscosity, material.modulus_inf)
+    prony = zener_to_prony(series, kelvin, viscosity, body.modulus_inf)
     moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
-    all_times = [material.time_factor * time for time in (*prony.relaxation_times, *times)]
+    all_times = [body.time_factor * time for time in (*prony.relaxation_times, *times)]
     return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], all_times)
 
 
 def time_factor_of(material: Material) -> float:
     """Return by what factor relaxation times at a material's temperature are longer than at the reference, a_T [-]."""
-    body = material.fitted if isinstance(material, jobs.Dma) else material
-    return body.time_factor if isinstance(body, jobs.Zener) else 1.0
+    return material.fitted.time_factor
 
 
 def temperature_of(material: Material) -> float:
     """Return the temperature of a material [deg C]: its own, else the reference of its shift; NaN without a shift."""
-    body = material.fitted if isinstance(material, jobs.Dma) else material
+    body = material.fitted
     if not isinstance(body, jobs.Zener) or body.shift is None:
         return math.nan
     return body.shift.reference if body.temperature is None else body.temperature

@@ -71,8 +71,7 @@ def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -
     directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
     asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
-    body = scenery.material, scenery.history, scenery.initial, scenery.steady
-    contact = smallest_share(scenery.surface, wave, *body, box.lx * box.ly)
+    contact = smallest_share(scenery, wave, box.lx * box.ly)
     points = cells.choose(wave, box.size, directions, own, contact)
     dx, dy = (length / n for length, n in zip(box.size, points, strict=True))
     slides = " and ".join(f"({x:.3g}, {y:.3g})" for x, y in directions)

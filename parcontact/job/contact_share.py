@@ -14,9 +14,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from importlib.metadata import EntryPoint
-from typing import Any
+from typing import Any, Protocol
 
 from .sections.geometry import Rough, Spectral
+from .sections.materials import AnyMaterial
 from .sections.stages import Initial, Stage, Steady
 
 UNKNOWN = 0.1  # accuracy: where slopes or loads are not known
@@ -25,22 +26,24 @@ NODES = 400  # accuracy: of integrals over the spectrum, to 1e-4
 RELAXATION = EntryPoint("relaxation", "parcontact.effects.relaxation:relaxation_of", "")  # of materials of all kinds
 
 
-def smallest_share(
-    surface: Sequence[Any],
-    wave: float,
-    material: Any,
-    history: Sequence[Stage],
-    initial: Initial,
-    steady: Steady | None,
-    area: float,
-) -> float:
+class Loaded(Protocol):
+    """Sections of a job that say what touches."""
+
+    surface: tuple[Any, ...]
+    material: AnyMaterial
+    history: tuple[Stage, ...]
+    initial: Initial
+    steady: Steady | None
+
+
+def smallest_share(job: Loaded, wave: float, area: float) -> float:
     """Return the smallest share in contact of a job, whose shortest wave [m] and box [m^2] are these."""
-    slope = _slope(surface)
-    loads = [(p, v) for p, v in _loads(history, initial, steady, area) if p > 0.0]
+    slope = _slope(job.surface)
+    loads = [(p, v) for p, v in _loads(job, area) if p > 0.0]
     if not slope or not loads:
         return UNKNOWN
-    series = RELAXATION.load()(material)
-    return min(_share(p, _modulus(series, 2.0 * math.pi * v / wave), material.poisson, slope) for p, v in loads)
+    series, poisson = RELAXATION.load()(job.material), job.material.poisson
+    return min(_share(p, _modulus(series, 2.0 * math.pi * v / wave), poisson, slope) for p, v in loads)
 
 
 def _share(pressure: float, modulus: float, poisson: float, slope: float) -> float:
@@ -56,19 +59,17 @@ def _modulus(series: Any, omega: float) -> float:
     return float(abs(found) or sum(moduli))
 
 
-def _loads(
-    history: Sequence[Stage], initial: Initial, steady: Steady | None, area: float
-) -> Iterator[tuple[float, float]]:
+def _loads(job: Loaded, area: float) -> Iterator[tuple[float, float]]:
     """Yield mean pressures [Pa] and speeds [m/s]."""
     pressures = []
-    for stage in history:
+    for stage in job.history:
         if stage.control != "approach":
             pressures.append(max(stage.load.start, stage.load.end) / (area if stage.control == "force" else 1.0))
             yield pressures[-1], stage.speed
-    if initial.pressure is not None:
-        yield initial.pressure, math.hypot(*initial.velocity)
-    if steady is not None:
-        yield from ((p, v) for p in steady.pressures or pressures[:1] for v in steady.velocities)
+    if job.initial.pressure is not None:
+        yield job.initial.pressure, math.hypot(*job.initial.velocity)
+    if job.steady is not None:
+        yield from ((p, v) for p in job.steady.pressures or pressures[:1] for v in job.steady.velocities)
 
 
 def _slope(surface: Sequence[Any]) -> float:

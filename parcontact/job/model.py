@@ -19,7 +19,7 @@ from .checks import advice, cells, layer, limits, meaning, size
 from .sections import height_arrays, listing
 from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
-from .sections.materials import Dma, Elastic, Material, Zener, heated
+from .sections.materials import Dma, Material, Zener, heated
 from .sections.part import Instead, Origin, Part, Rule
 from .sections.stages import Initial, Stage, Steady
 from .text.overrides import Included
@@ -125,21 +125,14 @@ class Job(Part):
         return self._origin.included
 
     @property
-    def directory(self) -> Path:
-        """The directory of the job file; files named in the job are looked for from here."""
-        return self.path.parent
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about what is allowed but will probably disappoint; errors with `numerics.strict`."""
-        material = self.material.fitted if isinstance(self.material, Dma) else self.material
-        scene = self.grid, self.surface, material, self.history
         return (
             *(self.material.doubts if isinstance(self.material, Dma) else ()),
-            *advice.resolution(*scene, self.numerics, self.directions),
-            *meaning.warnings(*scene, self.initial, self.steady),
-            *layer.warnings(self.grid, self.surface, self.material.poisson, self.body, self.history),
-            *size.warnings(self.grid, limits.count_steps(self.grid, self.history), self.output),
+            *advice.resolution(self, self.directions),
+            *meaning.warnings(self),
+            *layer.warnings(self),
+            *size.warnings(self),
             *self._told("doubts"),
         )
 
@@ -162,7 +155,7 @@ class Job(Part):
     @property
     def measured(self) -> bool:
         """Whether the material says at which frequencies or temperatures it was measured."""
-        body = self.material.fitted if isinstance(self.material, Dma) else self.material
+        body = self.material.fitted
         return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
     def at_temperature(self, temperature: float) -> Job:
@@ -176,8 +169,7 @@ class Job(Part):
     @property
     def remembers(self) -> bool:
         """Whether the body has a memory, and time steps an error: an elastic one has neither, but where it sticks."""
-        branched = not isinstance(self.material, Elastic) and bool(getattr(self.material, "branches", True))
-        return branched or self.section("adhesion") is not None
+        return bool(self.material.fitted.branches) or self.section("adhesion") is not None
 
     def resolved(self) -> str:
         """YAML text with every default filled in; it loads back to an equal job, where the files that it names are."""

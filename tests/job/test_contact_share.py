@@ -22,7 +22,7 @@ def share(**sections: Any) -> float:
         **sections,
     }
     job = Job.model_validate({key: value for key, value in data.items() if value is not None})
-    return smallest_share(job.surface, 1e-5, job.material, job.history, job.initial, job.steady, 1e-6)
+    return smallest_share(job, 1e-5, 1e-6)
 
 
 def test_rms_slope_of_a_self_affine_surface() -> None:

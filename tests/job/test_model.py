@@ -84,7 +84,6 @@ def test_contract_loads(tmp_path: Path) -> None:
 def test_defaults(tmp_path: Path) -> None:
     job = job_of(tmp_path, SMALL, name="small.yaml")
     assert job.path == tmp_path / "small.yaml"
-    assert job.directory == tmp_path
     assert (job.title, job.grid.points, job.grid.size, job.grid.boundary) == ("", (64, 64), (1e-3, 1e-3), "periodic")
     assert job.surface[0].phase == 0.0
     assert job.material == Elastic(poisson=0.5, shear_modulus=1e6)

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ...printed import per_cent
-from ..sections.calculation import Accuracy, Grid, Numerics
+from ..sections.calculation import Accuracy, Grid
 from ..sections.geometry import Rough
-from ..sections.materials import Elastic, Zener
 from ..sections.stages import AUTO, GeometricStep, Stage
+from . import Sections
 from .cells import ASIDE, Vector, needed, one_cell
 
 LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)
@@ -27,22 +27,16 @@ SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
 SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
-def resolution(
-    grid: Grid,
-    surface: tuple[Any, ...],
-    material: Elastic | Zener,
-    history: tuple[Stage, ...],
-    numerics: Numerics,
-    directions: Sequence[Vector] = (),
-) -> Iterator[str]:
+def resolution(job: Sections, directions: Sequence[Vector] = ()) -> Iterator[str]:
     """Yield sentences, in the order of the sections; the surface slides along these directions (unit vectors)."""
+    grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
             yield from _waves(index, shape, grid, numerics.asked, directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
-    times = [branch.relaxation_time for branch in getattr(material, "branches", ())]
+    times = [branch.relaxation_time for branch in job.material.fitted.branches]
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
-    for index, stage in enumerate(history):
+    for index, stage in enumerate(job.history):
         yield from _steps(index, stage, grid, shortest if numerics.integrator == "backward-euler" else math.inf, short)
     if numerics.tolerance < ROUNDING:
         yield (

@@ -12,6 +12,7 @@ from typing import Any
 from ..sections.calculation import Grid
 from ..sections.geometry import Flat, Rough, Sphere, Wave
 from ..sections.stages import Stage
+from . import Sections
 from .cells import more_points
 
 THICKEST = 1 / 3  # physics: what presses into a layer over its thickness; beyond, strains are not small
@@ -20,10 +21,9 @@ LONGEST = 100.0  # physics: thicknesses; to longer waves rubber yields by its co
 NEARLY = 1e-4  # physics: below 1/2, of the Poisson's ratio of a rubber
 
 
-def warnings(
-    grid: Grid, surface: tuple[Any, ...], poisson: float, body: Any, history: tuple[Stage, ...]
-) -> Iterator[str]:
+def warnings(job: Sections) -> Iterator[str]:
     """Yield sentences about the `body` section of a job, which may be None."""
+    grid, surface, body, poisson = job.grid, job.surface, job.body, job.material.poisson
     if body is None:
         return
     cell = max(grid.dx, grid.dy)
@@ -35,7 +35,7 @@ def warnings(
         )
     if text := strained(2.0 * _rms_height(grid, surface), body.thickness):
         yield text
-    yield from _indented(surface, body.thickness, history)
+    yield from _indented(surface, body.thickness, job.history)
     longest = max(_wavelengths(grid, surface), default=0.0)
     if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
         yield (

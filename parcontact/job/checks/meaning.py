@@ -14,7 +14,8 @@ from typing import Any
 from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
-from ..sections.stages import Initial, Stage, Steady
+from ..sections.stages import Stage
+from . import Sections
 
 STEEP = 0.5  # physics: rms slope; some tenths are small
 STEEPEST = 1.0  # physics: radius of a contact over that of its sphere; beyond, slopes are not small
@@ -29,22 +30,16 @@ BEYOND = 100.0  # physics: times slower or faster than all branches: nothing rel
 MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6, or unit: um in a topography"
 
 
-def warnings(
-    grid: Grid,
-    surface: tuple[Any, ...],
-    material: Elastic | Zener,
-    history: tuple[Stage, ...],
-    initial: Initial,
-    steady: Steady | None,
-) -> Iterator[str]:
-    """Sentences, in the order of the sections."""
-    yield from _slopes(grid, surface)
+def warnings(job: Sections) -> Iterator[str]:
+    """Yield sentences, in the order of the sections."""
+    material = job.material.fitted
+    yield from _slopes(job.grid, job.surface)
     yield from _moduli(material)
-    yield from _pressures(grid, material, history, initial, steady)
-    yield from _band(surface, material, history, initial, steady)
-    yield from _imprints(grid, surface, material, history, initial)
-    if grid.boundary == "free":
-        yield from _room(grid, surface, material, history)
+    yield from _pressures(job, material)
+    yield from _band(job, material)
+    yield from _imprints(job, material)
+    if job.grid.boundary == "free":
+        yield from _room(job, material)
 
 
 def steep(slope: float) -> str:
@@ -103,14 +98,12 @@ def _mean(stage: Stage, load: float, grid: Grid) -> float:
     return load / (grid.lx * grid.ly) if stage.control == "force" else load
 
 
-def _pressures(
-    grid: Grid, material: Elastic | Zener, history: tuple[Stage, ...], initial: Initial, steady: Steady | None
-) -> Iterator[str]:
-    loads = [("initial.pressure", initial.pressure or 0.0, 0.0)]
-    loads.append(("steady.pressures", max((steady.pressures if steady else None) or (0.0,)), 0.0))
+def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+    loads = [("initial.pressure", job.initial.pressure or 0.0, 0.0)]
+    loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
     least, held = 0.0, 0.0
-    for index, stage in enumerate(history):
-        ends = [_mean(stage, load, grid) for load in (stage.load.start, stage.load.end)]
+    for index, stage in enumerate(job.history):
+        ends = [_mean(stage, load, job.grid) for load in (stage.load.start, stage.load.end)]
         least, held = (least, held + stage.seconds) if min(ends) == least else (min(ends), stage.seconds)
         loads += [(f"history.{index}.{stage.control}", *load) for load in ((max(ends), 0.0), (least, held))]
     found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
@@ -128,33 +121,26 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
 
     It is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t and the creep compliance J rises, so J(t) >= t/int_0^t E*.
     """
-    body = getattr(material, "fitted", material)
-    modulus, slower = body.instant_modulus, getattr(body, "time_factor", 1.0)
-    for branch in getattr(body, "branches", ()):
-        ratio = seconds / (slower * branch.relaxation_time) if branch.relaxation_time else math.inf
+    modulus = material.instant_modulus
+    for branch in material.branches:
+        ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
         kept = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
         modulus -= (branch.instant_modulus - branch.long_modulus) * (1.0 - kept)
-    return 2.0 * max(modulus, body.long_modulus, LEAST * body.instant_modulus) / (1.0 - body.poisson)
+    return 2.0 * max(modulus, material.long_modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
 
 
 # -- relaxation -------------------------------------------------------------------------------------------------------
 
 
-def _band(
-    surface: tuple[Any, ...],
-    material: Elastic | Zener,
-    history: tuple[Stage, ...],
-    initial: Initial,
-    steady: Steady | None,
-) -> Iterator[str]:
+def _band(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     """Sliding excites the angular frequencies q v of the surface's waves; branches answer around 1/relaxation time."""
-    branches = [one for one in getattr(material, "branches", ()) if isinstance(one, PronyBranch) or one.G0 > 0.0]
+    branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
     times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
-    rough = [shape for shape in surface if isinstance(shape, Rough)]
+    rough = [shape for shape in job.surface if isinstance(shape, Rough)]
     lengths = [length for shape in rough for length in (shape.long_wavelength, shape.short_wavelength)]
-    speeds = [stage.speed for stage in history if stage.speed and stage.seconds]
-    speeds += [math.hypot(*initial.velocity)] if any(initial.velocity) else []
-    speeds += steady.velocities if steady else ()
+    speeds = [stage.speed for stage in job.history if stage.speed and stage.seconds]
+    speeds += [math.hypot(*job.initial.velocity)] if any(job.initial.velocity) else []
+    speeds += job.steady.velocities if job.steady else ()
     if not (times and lengths and speeds) or getattr(material, "temperature", None) is not None:
         return  # at another temperature the branches relax at other rates
     low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
@@ -171,14 +157,14 @@ def _band(
 # -- isolated contacts ------------------------------------------------------------------------------------------------
 
 
-def _room(grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...]) -> Iterator[str]:
+def _room(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     """Judge a single sphere: the least radius its contact can have, where it goes, and whether the box holds that."""
-    if len(surface) != 1 or not isinstance(surface[0], Sphere) or min(grid.points) == 1:
+    grid, sphere = job.grid, job.surface[0]
+    if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
         return
-    sphere = surface[0]
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
     modulus, told = contact_modulus(material), set()
-    for index, stage in enumerate(history):
+    for index, stage in enumerate(job.history):
         x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
         radius = _hertz(stage, sphere.radius, modulus, grid)
         if radius / sphere.radius > STEEPEST and "steep" not in told:
@@ -208,22 +194,20 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
 # -- slides that come round -------------------------------------------------------------------------------------------
 
 
-def _imprints(
-    grid: Grid, surface: tuple[Any, ...], material: Elastic | Zener, history: tuple[Stage, ...], initial: Initial
-) -> Iterator[str]:
+def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     """Yield a sentence about each slide, of stages of one velocity, that goes over the imprint of its own beginning.
 
     Waves that fill the box repeat themselves on a shorter way, and mean it. A slide that begins in its own steady state
     finds no other imprint.
     """
-    branches = getattr(material, "branches", ())
-    times = [branch.relaxation_time for branch in branches if branch.relaxation_time < math.inf]
-    if grid.boundary != "periodic" or not times or all(isinstance(shape, Wave) for shape in surface):
+    grid, initial = job.grid, job.initial
+    times = [branch.relaxation_time for branch in material.branches if branch.relaxation_time < math.inf]
+    if grid.boundary != "periodic" or not times or all(isinstance(shape, Wave) for shape in job.surface):
         return
-    memory = max(times) * getattr(material, "time_factor", 1.0)
-    near = NEAR * max((shape.long_wavelength for shape in surface if isinstance(shape, Rough)), default=0.0)
+    memory = max(times) * material.time_factor
+    near = NEAR * max((shape.long_wavelength for shape in job.surface if isinstance(shape, Rough)), default=0.0)
     steady = (initial.velocity, initial.pressure) if initial.state == "steady" else None
-    for velocity, stages in groupby(enumerate(history), key=lambda stage: stage[1].velocity):
+    for velocity, stages in groupby(enumerate(job.history), key=lambda stage: stage[1].velocity):
         (index, first), *more = stages
         speed = math.hypot(*velocity)
         seconds = first.seconds + sum(stage.seconds for _, stage in more)

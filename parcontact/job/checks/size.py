@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..sections.calculation import Grid, Output
+from . import Sections
+from .limits import count_steps
 
 MAPS, MAPS_FREE = 9.0, 18.0  # tuning: of 8 bytes per point, which any run holds; free ones have padded transforms
 MOST_INSTANTS = 10**6  # tuning: of fields in one file; each has its place in it from the start
@@ -15,11 +17,13 @@ GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
-def warnings(grid: Grid, count: int, output: Output) -> Iterator[str]:
-    """Yield sentences: memory, and disk for about `count` steps."""
+def warnings(job: Sections) -> Iterator[str]:
+    """Yield sentences on memory and disk."""
+    grid, output = job.grid, job.output
     if text := beyond_memory(grid):
         yield text
     if output.fields:
+        count = count_steps(grid, job.history)
         saved = -(-count // output.every)
         needed, free = float(saved) * len(output.fields) * grid.nx * grid.ny * 8, _free(output.directory)
         if needed > free:

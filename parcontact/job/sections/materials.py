@@ -92,7 +92,14 @@ class Elastic(Part):
     shear_modulus: Positive = Field(description="a positive shear modulus [Pa]")
     hardness: Hardness = None
 
+    branches: ClassVar[tuple[()]] = ()
+    time_factor: ClassVar[float] = 1.0
     foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("shear_modulus"), ("shear_modulus",)))
+
+    @property
+    def fitted(self) -> Elastic:
+        """The body itself."""
+        return self
 
     @property
     def instant_modulus(self) -> float:
@@ -148,6 +155,11 @@ class Zener(Part):
 
     foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("each of modulus_inf and branches")))
     rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
+
+    @property
+    def fitted(self) -> Zener:
+        """The body itself."""
+        return self
 
     @property
     def time_factor(self) -> float:
@@ -218,7 +230,7 @@ class Dma(Part):
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
     """Return a material at another temperature [deg C]. Raises InputError where nothing says how it depends on it."""
-    body = material.fitted if isinstance(material, Dma) else material
+    body = material.fitted
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")
     if faults := list(shifted(body.shift, temperature)):
