@@ -12,10 +12,10 @@ Kinds = dict[str, tuple[str, list[int]]]  # the first text of each kind, and the
 
 
 class SweepWarnings:
-    """Warnings by kind. `told` are texts that were shown before; others are shown `at_once`, or only at the end."""
+    """Warnings by kind. Kinds of which texts were `told` before are not shown; others `at_once`, or only at the end."""
 
     def __init__(self, told: Sequence[str] = (), at_once: bool = True) -> None:
-        self._told, self._at_once, self._case = frozenset(told), at_once, -1
+        self._told, self._at_once, self._case = frozenset(map(_kind, told)), at_once, -1
         self.kinds: Kinds = {}
 
     def begin(self, case: int) -> None:
@@ -24,9 +24,9 @@ class SweepWarnings:
 
     def shows(self, text: str) -> bool:
         """Note a warning; whether it is to be shown now."""
-        if text in self._told:
+        if _kind(text) in self._told:
             return False
-        _, cases = self.kinds.setdefault(NUMBER.sub("#", text), (text, []))
+        _, cases = self.kinds.setdefault(_kind(text), (text, []))
         new = not cases
         if self._case not in cases:
             cases.append(self._case)
@@ -43,6 +43,10 @@ class SweepWarnings:
         return [f"{text} ({name_cases(cases)})" for text, cases in told]
 
 
+def _kind(text: str) -> str:
+    return NUMBER.sub("#", text)
+
+
 def doubts_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[str]]) -> list[str]:
     """Return the doubts about the jobs of cases, each kind once; of several with the cases that it holds for."""
     if len(cases) == 1:
@@ -56,18 +60,10 @@ def doubts_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[str]]) -> 
 
 
 def warn_once(cases: Sequence[Case]) -> list[str]:
-    """Warn of what is doubtful about the jobs of cases, each text once with the cases that it holds for; root only.
-
-    Returns the texts.
-    """
-    found: dict[str, list[int]] = {}
-    for case in cases:
-        for text in dict.fromkeys(case.job.warnings):
-            found.setdefault(text, []).append(case.number)
-    for text, numbers in found.items():
-        which = "all cases" if len(numbers) == len(cases) else name_cases(numbers)
-        print(f"warning: {text} ({which})", file=sys.stderr, flush=True)
-    return list(found)
+    """Warn of what is doubtful about the jobs of cases, each kind once; root only. Returns all texts."""
+    for text in doubts_of(cases, lambda job: job.warnings):
+        print(f"warning: {text}", file=sys.stderr, flush=True)
+    return [text for case in cases for text in case.job.warnings]
 
 
 def name_cases(numbers: Sequence[int]) -> str:

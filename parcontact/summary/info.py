@@ -4,7 +4,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -123,9 +123,11 @@ def describe_directory(directory: Path) -> tuple[str, bool]:
     if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
         raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
     lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
-    for part in (_chosen_mesh, _run, _theory, _curve, _saved_states, _saved_maps, _leakage, _sweep, _study):
+    logs = ("run.log", curve_points.LOG)
+    lines += dict.fromkeys(f"  {text}" for log in logs for text in meshes_of(directory / log))
+    for name, part in PARTS.items():
         try:
-            lines += part(directory, claims)
+            lines += part(directory / name, claims) if (directory / name).exists() else ()
         except InputError as error:
             problems.append(f"  {error}")
         except hdf5.FAILURES as error:
@@ -144,16 +146,7 @@ def _title(directory: Path) -> str:
     return "without a job"
 
 
-def _chosen_mesh(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    yield from dict.fromkeys(
-        f"  {text}" for log in ("run.log", curve_points.LOG) for text in meshes_of(directory / log)
-    )
-
-
-def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    table = directory / "measures.csv"
-    if not table.exists():
-        return
+def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     columns, claim = tables.read(table), claims.get("run")
     if not columns["step"]:
         yield "  run: no step yet"
@@ -167,8 +160,8 @@ def _run(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
     last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in LAST_ROW.items() if name in columns]
     yield f"  last row: {', '.join(last)}"
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
-    if (directory / RESOLVED).exists():
-        job = shown_job(directory / RESOLVED)
+    if (resolved := table.with_name(RESOLVED)).exists():
+        job = shown_job(resolved)
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
         yield from (f"  {text}" for text in describe_pull_off(columns, job.grid.lx * job.grid.ly))
 
@@ -183,24 +176,21 @@ def describe_pull_off(columns: Mapping[str, list[Any]], area: float) -> Iterator
         yield f"lowest load: {load}, at {where}"
 
 
-def _theory(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    table = directory / theory_settings.TABLE
-    if table.exists():
-        count = f"  Persson's theory: {len(tables.read(table)['time'])} rows, "
-        try:
-            settings = theory_settings.read(directory)
-        except InputError:
-            yield count + "of unknown settings"
-            raise
-        yield count + (settings.sentence if settings else "of unknown settings")
-        if (directory / RESOLVED).exists():
-            job = shown_job(directory / RESOLVED)
-            yield from (f"  {text}" for text in theory_beside.describe(directory, job.history))
+def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    count = f"  Persson's theory: {len(tables.read(table)['time'])} rows, "
+    try:
+        settings = theory_settings.read(table.parent)
+    except InputError:
+        yield count + "of unknown settings"
+        raise
+    yield count + (settings.sentence if settings else "of unknown settings")
+    if (resolved := table.with_name(RESOLVED)).exists():
+        yield from (f"  {text}" for text in theory_beside.describe(table.parent, shown_job(resolved).history))
 
 
-def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    table = directory / "steady.csv"
-    if table.exists() and (speeds := (columns := tables.read(table))["velocity"]):
+def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    columns = tables.read(table)
+    if speeds := columns["velocity"]:
         best = int(np.argmax(columns["friction"]))
         place = curve_points.Wanted(speeds[best], columns["pressure"][best])
         yield f"  friction curve: {len(speeds)} points from {min(speeds):.4g} to {max(speeds):.4g} m/s"
@@ -211,7 +201,7 @@ def _curve(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
             asked = f"; asked for: {_asked(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
-        yield from (f"  warning: {text}" for text in warnings_of(directory / curve_points.LOG))
+        yield from (f"  warning: {text}" for text in warnings_of(table.with_name(curve_points.LOG)))
 
 
 def _asked(accuracy: Any) -> str:
@@ -221,36 +211,41 @@ def _asked(accuracy: Any) -> str:
 
 
 def _saved_states(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    for path in sorted(directory.glob("checkpoint/step-*.h5")):
+    for path in sorted(directory.glob("step-*.h5")):
         contents = checkpoint.inspect(path)
         yield f"  checkpoint after step {contents.step}, t = {quantity(contents.time, 's', 4)}"
 
 
-def _saved_maps(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    path = directory / "fields.h5"
-    if path.exists():
-        with h5py.File(path, "r") as file:
-            layout = fields.SavedFields(file)
-        saved = np.isfinite(layout.times).sum()
-        yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
+def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    with h5py.File(path, "r") as file:
+        layout = fields.SavedFields(file)
+    saved = np.isfinite(layout.times).sum()
+    yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
 
 
-def _leakage(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    path = directory / "leak.csv"
-    if path.exists():
-        columns = tables.read(path)
-        closed = ", ".join(f"closed along {axis} at {columns[f'percolates_{axis}'].count(0.0)}" for axis in "xy")
-        yield f"  leakage: leak.csv, {len(columns['time'])} instants, {closed} of them"
+def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    columns = tables.read(path)
+    closed = ", ".join(f"closed along {axis} at {columns[f'percolates_{axis}'].count(0.0)}" for axis in "xy")
+    yield f"  leakage: leak.csv, {len(columns['time'])} instants, {closed} of them"
 
 
-def _sweep(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    path = directory / sweep_table.TABLE
-    if path.exists():
-        states = Counter(str(row["state"]) for row in sweep_table.read(path))
-        counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
-        yield f"  sweep of {states.total()} cases: {counts}"
+def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    states = Counter(str(row["state"]) for row in sweep_table.read(path))
+    counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
+    yield f"  sweep of {states.total()} cases: {counts}"
 
 
-def _study(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    if (directory / "study.txt").exists():
-        yield "  study: what settings cost is in study.txt"
+def _study(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
+    yield "  study: what settings cost is in study.txt"
+
+
+PARTS: dict[str, Callable[[Path, dict[str, Claim]], Iterator[str]]] = {  # of an output directory, by a file of each
+    "measures.csv": _run,
+    theory_settings.TABLE: _theory,
+    "steady.csv": _curve,
+    "checkpoint": _saved_states,
+    "fields.h5": _saved_maps,
+    "leak.csv": _leakage,
+    sweep_table.TABLE: _sweep,
+    "study.txt": _study,
+}
