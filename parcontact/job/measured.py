@@ -19,10 +19,6 @@ READER = EntryPoint("extent", "parcontact.road.extent:of", "")  # what reads map
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
 
-class MapError(InputError):
-    """A map that cannot be read: the mistake of the surface, not of the grid."""
-
-
 def take_grid(source: Source, origin: Origin) -> None:
     """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
@@ -37,9 +33,6 @@ def take_grid(source: Source, origin: Origin) -> None:
         grid.update({key: list(found[key] or ()) for key in wanted})
     except ValidationError:  # mistakes of the surface, which are told where it is read
         grid.update(dict.fromkeys(wanted, UNREADABLE))
-    except MapError as error:
-        source.note(source.locate(("surface",)).place, f"surface: {error}")
-        grid.update(dict.fromkeys(wanted, UNREADABLE))
     except InputError as error:
         names = " and ".join(f"grid.{key}" for key in wanted)
         source.note(source.locate(("grid", wanted[0])).place, f"{names}: {FROM_SURFACE}: {error}")
@@ -50,7 +43,8 @@ def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
     """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
     InputError."""
     shapes = surface if isinstance(surface, list) else [surface]
-    arrays = [shape for shape in (_heights(shape) for shape in shapes) if is_array(shape)]
+    heights = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
+    arrays = [given for given in heights if is_array(given)]
     maps = [shape for shape in shapes if isinstance(shape, dict) and shape.get("shape") == "topography"]
     if len(maps) + len(arrays) != 1:
         raise InputError(f"one measured map, shape: topography, is needed, and the surface has {len(maps) or 'none'}")
@@ -58,13 +52,5 @@ def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
         if arrays[0].ndim != 2:
             raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
         return tuple(arrays[0].shape[::-1]), None
-    part = Topography.model_validate(maps[0], context=origin)
-    try:
-        found: Extent = READER.load()(part, box)
-    except InputError as error:
-        raise MapError(str(error)) from error
+    found: Extent = READER.load()(Topography.model_validate(maps[0], context=origin), box)
     return found
-
-
-def _heights(shape: Any) -> Any:
-    return shape.get("heights") if isinstance(shape, dict) else shape

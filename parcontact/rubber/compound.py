@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # misfits of more than so many times the s
 SWAPPED = 0.5  # of the misfit: that of exchanged moduli, if they were
 WIDE_GAP = 1.0  # decades between sweeps as shifted, beyond which they say nothing of the shift
 DIGITS = 7  # of the numbers in a material file
+LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors"}
 
 
 @dataclass(frozen=True)
@@ -39,15 +40,14 @@ class Compound:
         """The material section of a job."""
         pairs = zip(self.series.moduli, self.series.times, strict=True)
         degrees = self.temperatures
-        low, high = (_rounded(rate / (2 * math.pi)) for rate in self.series.band)
         return {
             "model": "zener",
             "poisson": self.poisson,
             "modulus_inf": _rounded(self.series.modulus_inf),
-            "branches": [{"modulus": _rounded(g), "relaxation_time": _rounded(t)} for g, t in pairs],
+            "branches": [_rounded({"modulus": g, "relaxation_time": t}) for g, t in pairs],
             **({"shift": _shift_section(self.shift)} if self.shift is not None else {}),
-            "band": [low, high],
-            **({"temperatures": [_rounded(t) for t in (min(degrees), max(degrees))]} if self.shift and degrees else {}),
+            "band": _rounded([rate / (2 * math.pi) for rate in self.series.band]),
+            **({"temperatures": _rounded([min(degrees), max(degrees)])} if self.shift and degrees else {}),
         }
 
     @property
@@ -161,18 +161,16 @@ def fitted(
     return found
 
 
-def _shift_section(shift: Shift) -> dict[str, Any]:
-    if isinstance(shift, WLF):
-        return {"law": "wlf", "C1": _rounded(shift.C1), "C2": _rounded(shift.C2), "reference": shift.reference}
-    if isinstance(shift, Arrhenius):
-        return {"law": "arrhenius", "energy": _rounded(shift.energy), "reference": shift.reference}
-    assert isinstance(shift, Factors)
-    temperatures, logs = ([_rounded(value) for value in values] for values in (shift.temperatures, shift.logs))
-    return {"law": "factors", "temperatures": temperatures, "logs": logs, "reference": shift.reference}
+def _shift_section(shift: Any) -> dict[str, Any]:
+    numbers = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(shift).items()}
+    return {"law": LAWS[type(shift)], **_rounded(numbers)}
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def _rounded(value: Any) -> Any:
+    """Return a number, or all in a list or mapping, in the digits of a material file."""
+    if isinstance(value, dict):
+        return {key: _rounded(inner) for key, inner in value.items()}
+    return [_rounded(inner) for inner in value] if isinstance(value, list) else float(f"{value:.{DIGITS}g}")
 
 
 def _flow(value: Any) -> str:

@@ -18,7 +18,6 @@ from .cells import ASIDE, Vector, needed, one_cell
 
 LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)
 STEPS_PER_WAVE = 4  # accuracy: fewer skip over the shortest waves while sliding
-ROUNDING = 4.0 * 2.0**-52  # accuracy: of a number in a certificate
 SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
 
 # Standard deviations over 8 to 12 seeds, times the longest waves along a side; found with six steady states of 2 to
@@ -38,11 +37,6 @@ def resolution(job: Sections, directions: Sequence[Vector] = ()) -> Iterator[str
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
     for index, stage in enumerate(job.history):
         yield from _steps(index, stage, grid, shortest if numerics.integrator == "backward-euler" else math.inf, short)
-    if numerics.tolerance < ROUNDING:
-        yield (
-            f"numerics.tolerance: {numerics.tolerance:g} is below {ROUNDING:.1g}, about the smallest error that double "
-            "precision reaches; use a larger tolerance"
-        )
 
 
 def _directions(grid: Grid) -> list[tuple[str, float, float]]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, PlainValidator
 
@@ -23,31 +23,34 @@ Celsius = Annotated[
 ]
 
 
-class WlfShift(Part):
+class ShiftLaw(Part):
+    """Base of the laws of a shift; `kind` is what computes with the same numbers."""
+
+    kind: ClassVar[Callable[..., Law]]
+
+    @property
+    def made(self) -> Law:
+        """The law itself."""
+        return self.kind(**self.model_dump(exclude={"law"}))
+
+
+class WlfShift(ShiftLaw):
     """`log10 a_T = -C1 (T - reference)/(C2 + T - reference)` (Williams, Landel and Ferry)."""
 
+    kind = WLF
     law: Literal["wlf"] = "wlf"
     C1: Positive = Field(description="a positive number, the first constant of Williams, Landel and Ferry [-]")
     C2: Positive = Field(description="a positive number, the second constant of Williams, Landel and Ferry [K]")
     reference: Celsius
 
-    @property
-    def made(self) -> Law:
-        """The law itself."""
-        return WLF(self.C1, self.C2, self.reference)
 
-
-class ArrheniusShift(Part):
+class ArrheniusShift(ShiftLaw):
     """`log10 a_T = energy/(R ln 10) (1/T - 1/reference)`, temperatures in K."""
 
+    kind = Arrhenius
     law: Literal["arrhenius"] = "arrhenius"
     energy: Positive = Field(description="a positive energy of activation [J/mol]")
     reference: Celsius
-
-    @property
-    def made(self) -> Law:
-        """The law itself."""
-        return Arrhenius(self.energy, self.reference)
 
 
 def _rising(temperatures: tuple[float, ...], logs: tuple[float, ...], reference: float) -> Iterator[Fault]:
@@ -59,20 +62,16 @@ def _rising(temperatures: tuple[float, ...], logs: tuple[float, ...], reference:
         yield Fault(f"must be within {temperatures[0]:g} and {temperatures[-1]:g} C, got {reference:g}", ("reference",))
 
 
-class FactorsShift(Part):
+class FactorsShift(ShiftLaw):
     """log10 of a_T at given temperatures, linear between them."""
 
+    kind = Factors
     law: Literal["factors"] = "factors"
     temperatures: tuple[Celsius, ...] = Field(description="a list of rising temperatures [deg C]")
     logs: tuple[Real, ...] = Field(description="a list of numbers, log10 of a_T at each temperature")
     reference: Celsius
 
     rules = (Rule(("temperatures", "logs", "reference"), _rising),)
-
-    @property
-    def made(self) -> Law:
-        """The law itself."""
-        return Factors(self.temperatures, self.logs, self.reference)
 
 
 LAWS = {"wlf": WlfShift, "arrhenius": ArrheniusShift, "factors": FactorsShift}

@@ -11,21 +11,12 @@ from typing import Any, NamedTuple
 from .fault import quote, shorten
 from .places import UNREADABLE, Key, Place, Source
 from .python_data import source_of
-from .sweep_cases import SWEEP, Sweep, refuse_overrides, take
+from .sweep_cases import SWEEP, Setting, Sweep, refuse_overrides, take
 from .yamltext import parse, read, read_with_content
 
 MATERIAL: Key = ("material",)
 INCLUDE: Key = ("material", "include")
 OURS = Path(__file__).parents[2] / "materials"  # compounds that come with the program
-
-
-class Override(NamedTuple):
-    """A value for a key, from the command line, from Python, or of a case of a sweep; `place` is that of the key."""
-
-    path: Key
-    value: Any
-    value_place: Place
-    place: Place
 
 
 class Included(NamedTuple):
@@ -64,9 +55,8 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
     if sweep is None:
         source.data = UNREADABLE
     elif sweep:
-        refuse_overrides(sweep, [(".".join(map(str, one.path)), one.place) for one in overrides], source)
-        settings = sweep.case(min(max(case, 0), len(sweep) - 1))
-        overrides += [Override(tuple(one.name.split(".")), one.value, one.place, one.key_place) for one in settings]
+        refuse_overrides(sweep, overrides, source)
+        overrides += sweep.case(min(max(case, 0), len(sweep) - 1))
     own = _material(source)
     own = {} if "include" in own else dict(own)
     for override in overrides:
@@ -79,24 +69,24 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
     return Reading(source, included, sweep)
 
 
-def _parse(change: str | tuple[str, Any], source: Source) -> Override | None:
-    """Return a change as an override; None if it has mistakes, which `source` then holds."""
+def _parse(change: str | tuple[str, Any], source: Source) -> Setting | None:
+    """Return a change as a setting; None if it has mistakes, which `source` then holds."""
     if isinstance(change, str):
         place = Place(f"--set {shorten(change)}")
         name, equals, value = change.partition("=")
-        keys = [key.strip() for key in name.split(".")]
-        if not equals or not all(keys):
+        name = ".".join(key.strip() for key in name.split("."))
+        if not equals or not all(name.split(".")):
             source.note(place, "must have the form key.path=value, like grid.points=512")
             return None
         parsed = parse(value, str(place), whole=place)
     else:
-        place, keys = Place(f"set {shorten(change[0])}"), change[0].split(".")
+        name, place = change[0], Place(f"set {shorten(change[0])}")
         parsed = source_of(change[1], place)
     source.mistakes += parsed.mistakes
-    return None if parsed.mistakes else Override(tuple(keys), parsed.data, place, place)
+    return None if parsed.mistakes else Setting(name, parsed.data, place, place)
 
 
-def _apply(source: Source, override: Override) -> None:
+def _apply(source: Source, override: Setting) -> None:
     """Put the value of an override where its path leads, making the mappings on the way.
 
     `surface.0` is also a surface that is one mapping instead of a list.
@@ -112,13 +102,13 @@ def _apply(source: Source, override: Override) -> None:
             name = int(name)
         elif not isinstance(node, dict):
             if node is not UNREADABLE:
-                source.note(override.place, _dead_end(node, ".".join(map(str, found)), str(name)))
+                source.note(override.key_place, _dead_end(node, ".".join(map(str, found)), str(name)))
             return
         found = (*found, name)
         if index == len(given) - 1:
-            source.put(found, override.value, override.place, override.value_place)
+            source.put(found, override.value, override.key_place, override.place)
         elif isinstance(node, dict) and node.get(name) is None:
-            source.put(found, {}, override.place, override.place)
+            source.put(found, {}, override.key_place, override.key_place)
         node = node[name]
 
 

@@ -21,12 +21,17 @@ FIXED = ("sweep", "output.directory")  # keys that are the same in all cases
 
 
 class Setting(NamedTuple):
-    """One value that one key has in some cases, and where both were written."""
+    """A value for a key, of a case of a sweep, from the command line or from Python, and where both were written."""
 
     name: str
     value: Any
     key_place: Place
     place: Place
+
+    @property
+    def path(self) -> Key:
+        """The way to the key."""
+        return tuple(self.name.split("."))
 
     def __str__(self) -> str:
         return f"{self.name} = {self.value}"
@@ -113,10 +118,10 @@ def _overlap(one: str, other: str) -> bool:
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 
-def refuse_overrides(sweep: Sweep, overrides: list[tuple[str, Place]], source: Source) -> None:
+def refuse_overrides(sweep: Sweep, overrides: list[Setting], source: Source) -> None:
     """Note a mistake for each override of a key that is swept."""
     names = {setting.name for axis in sweep.axes for setting in axis[0]}
-    for name, place in overrides:
-        if found := next((swept for swept in names if _overlap(swept, name)), ""):
+    for override in overrides:
+        if found := next((swept for swept in names if _overlap(swept, override.name)), ""):
             advice = f"change the sweep instead, like --set 'sweep=[{{{shorten(found)}: [...]}}]'"
-            source.note(place, f"{shorten(found)} is swept; {advice}")
+            source.note(override.place, f"{shorten(found)} is swept; {advice}")
