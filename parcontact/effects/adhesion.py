@@ -44,7 +44,7 @@ class Adhesion(Part):
 
 def modulus_of(material: Any) -> float:
     """Return E* = 2 G/(1 - nu) of the relaxed body [Pa]."""
-    return float(2.0 * material.long_modulus / (1.0 - material.poisson))
+    return float(2.0 * material.fitted.long_modulus / (1.0 - material.poisson))
 
 
 def law_of(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
@@ -67,15 +67,15 @@ def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
         return
     if material.hardness is not None:
         yield Fault("does not go with adhesion: leave one of them out", ("material", "hardness"))
-    if adhesion.range == AUTO and material.long_modulus == 0.0:
+    if adhesion.range == AUTO and material.fitted.long_modulus == 0.0:
         yield Fault("must be a length [m] for a body without long-term modulus, got auto", ("adhesion", "range"))
 
 
 def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any) -> Iterator[Fault]:
     """Refuse what would depend on rates that the mesh cannot tell."""
-    if adhesion is None or grid is None or not getattr(material, "branches", getattr(material, "fitted", ())):
+    if adhesion is None or grid is None or not material.fitted.branches:
         return
-    if adhesion.range == AUTO or material.long_modulus == 0.0:
+    if adhesion.range == AUTO or material.fitted.long_modulus == 0.0:
         return
     cell, modulus = cell_of(grid), modulus_of(material)
     least = smallest_range(adhesion.work, modulus, cell, 1.0 / MOST_CELLS)
@@ -105,7 +105,7 @@ def _facts(job: Any) -> Iterator[str]:
         f"adhesion: range {law.range:.4g} m, strength {law.strength:.4g} Pa, process zone l = {zone:.4g} m, "
         f"cell h = {cell / zone:.3g} l; what counts of a rate is velocity times relaxation time over l"
     )
-    at_once = float(2.0 * job.material.instant_modulus / (1.0 - job.material.poisson))
+    at_once = float(2.0 * job.material.fitted.instant_modulus / (1.0 - job.material.poisson))
     for index, shape in enumerate(job.surface):
         if isinstance(shape, Sphere):
             slow, fast = law.tabor(modulus, shape.radius), law.tabor(at_once, shape.radius)

@@ -43,7 +43,7 @@ def _first_and_last(span: Span) -> tuple[float, float]:
     """The first and the last step of a stage [s]; those that it chooses lie between the shortest and the longest."""
     if isinstance(span.ends, ChosenEnds):
         return span.ends.limits.least, span.ends.limits.most
-    first, last = (span.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
+    first, last = (span.ends.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
     return first, last
 
 

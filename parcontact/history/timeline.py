@@ -10,7 +10,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from ..job.sections.calculation import Grid
-from ..job.sections.stages import GeometricStep, Ramp, Stage
+from ..job.sections.stages import GeometricStep, Stage
 from .chosen import ChosenEnds, ChosenSteps, MadeStep, Planned, reached
 from .given import GivenEnds, divide
 
@@ -77,10 +77,6 @@ class Span:
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
         return free and not any(self.stage.velocity) and self.stage.load.constant
 
-    def interval(self, index: int, since: int | None = None) -> float:
-        """Return how long the step `index` takes, or all steps `since` another one have taken with it [s]."""
-        return self.ends.interval(index, since)
-
     def time(self, index: int) -> float:
         """Return when the step `index` of those that last ends [s]."""
         return self.start + self.ends.elapsed(index)
@@ -91,33 +87,25 @@ class Span:
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
-    @cached_property
-    def load(self) -> Ramp:
-        return self.stage.load
-
-    @cached_property
-    def facts(self) -> tuple[tuple[float, float], str]:
-        """Velocity and control of all steps."""
-        return self.stage.velocity, self.stage.control
-
     def place(self, number: int) -> int:
         """Return which of those that last the step of this number is; 0 is the jump."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:
         """Return the steps from one number to another as one."""
-        dt = self.interval(self.place(target), since=self.place(number) - 1)
+        dt = self.ends.interval(self.place(target), since=self.place(number) - 1)
         return self.step(target)._replace(dt=dt, growth=0.0, passed=target - number)
 
     def step(self, number: int) -> Step:
         """Return the step of this number of the history."""
-        index = self.place(number)
+        index, stage = self.place(number), self.stage
+        facts = stage.velocity, stage.control
         if index == 0:
-            return Step(number, self.index, self.start, 0.0, self.origin, *self.facts, self.load.start, 0.0)
-        dt = self.interval(index)
-        growth = dt / self.interval(index - 1) if index > 1 else 0.0
-        load = self.load.at(min(self.ends[index], 1.0))
-        return Step(number, self.index, self.time(index), dt, self.position(index), *self.facts, load, growth)
+            return Step(number, self.index, self.start, 0.0, self.origin, *facts, stage.load.start, 0.0)
+        dt = self.ends.interval(index)
+        growth = dt / self.ends.interval(index - 1) if index > 1 else 0.0
+        load = stage.load.at(min(self.ends[index], 1.0))
+        return Step(number, self.index, self.time(index), dt, self.position(index), *facts, load, growth)
 
 
 class Timeline:

@@ -43,7 +43,7 @@ def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
     """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
     InputError."""
     shapes = surface if isinstance(surface, list) else [surface]
-    heights = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
+    heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
     arrays = [given for given in heights if is_array(given)]
     maps = [shape for shape in shapes if isinstance(shape, dict) and shape.get("shape") == "topography"]
     if len(maps) + len(arrays) != 1:

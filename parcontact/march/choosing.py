@@ -180,8 +180,9 @@ class StepChooser:
             span.start + end,
             dt,
             (x + along_x * end, y + along_y * end),
-            *span.facts,
-            span.load.at(min(end / span.stage.seconds, 1.0)),
+            span.stage.velocity,
+            span.stage.control,
+            span.stage.load.at(min(end / span.stage.seconds, 1.0)),
             dt / last if last > 0.0 else 0.0,
         )
         return step._replace(judge=partial(self.judge, span, step, end, rejected))

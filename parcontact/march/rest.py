@@ -53,7 +53,7 @@ def _is_relaxed(scene: Scene, state: State, span: Span, number: int) -> bool:
         return True
     if index == 1:  # a jump of the load has just been: branches that have no map have not relaxed yet
         return False
-    change = remaining(scene, state, scene.material.branched, span.interval(span.count, since=index - 1))
+    change = remaining(scene, state, scene.material.branched, span.ends.interval(span.count, since=index - 1))
     return scene.slab.agree(change <= SHARE * scene.choices.numerics.tolerance)
 
 

@@ -93,7 +93,7 @@ def _make_profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.P
 
 def _find_moduli(run: Run) -> list[tuple[str, float]]:
     """Return the shear moduli [Pa] of the elastic bodies to compare with."""
-    material = run.job.material
+    material = run.job.material.fitted
     if isinstance(material, Elastic):
         return [("Hertz", material.shear_modulus)]
     ends = ("Hertz, G(0)", material.instant_modulus), ("Hertz, G(∞)", material.long_modulus)

@@ -44,7 +44,7 @@ def section(job: Job) -> Section:
 
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
-    found = job.material.fitted if isinstance(job.material, Dma) else job.material
+    found = job.material.fitted
     if isinstance(job.material, Dma):
         yield "fitted to", str(job.material.path)
     if not isinstance(found, Zener):

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import h5py
 
+from ..job import Job
+from ..job.sections.listing import plain
 from ..physics.budget import exceeds
-from ..storage import hdf5, provenance
+from ..storage import hdf5, provenance, references
 from ..storage.tables import read as read_table
 from ..summary.slide import ERRORS
 from . import log
@@ -114,6 +116,6 @@ def section(directory: Path, found: log.Log) -> Section:
     return Section("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
 
 
-def list_citations() -> Section:
-    """Return what a paper that uses the results should cite."""
-    return Section("What to cite", [f"{provenance.PROGRAM}", *provenance.REFERENCES])
+def list_citations(job: Job) -> Section:
+    """Return what a paper that uses the results of a job should cite."""
+    return Section("What to cite", [f"{provenance.PROGRAM}", *references.lines(plain(job))])

@@ -259,5 +259,5 @@ def _leg(job: Job, span: Span) -> Leg:
     """Return a stage: the jump of its load, if it begins with one, and its steps."""
     fractions = np.array([*([0.0] if span.jumps else []), *(span.ends[index] for index in range(1, span.count + 1))])
     area = job.grid.lx * job.grid.ly if span.stage.control == "force" else 1.0
-    pressures = np.array([span.load.at(min(fraction, 1.0)) for fraction in fractions]) / area
+    pressures = np.array([span.stage.load.at(min(fraction, 1.0)) for fraction in fractions]) / area
     return Leg(span.stage.velocity, span.stage.seconds, fractions * span.stage.seconds, pressures)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Step, Timeline
 from ..job import Job, Stage
+from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..storage import checkpoint, marker
 from ..storage.checkpoint import Contents
@@ -43,18 +45,17 @@ def choose(
     if restart == "never":
         return None, []
     given = None if restart == "auto" else Path(restart)
-    candidates = [given] if given else [path for _, path in slab.agree(directory.saved() if slab.root else [])]
+    candidates = [given] if given else [path for _, path in on_root(slab.comm, directory.saved)]
     problems: list[str] = []
     for path in candidates:
         found = sound(path, job, plain, slab)
         if isinstance(found, Contents):
-            own = slab.agree(_is_own(found, directory) if slab.root else False)
-            _refuse(slab, _would_mix(directory, path) if slab.root and not own else "")
+            own = on_root(slab.comm, partial(_is_own, found, directory))
             return Origin(found, own), [f"passed over: {text}" for text in problems]
         problems.append(found)
     if problems:
         raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
-    _refuse(slab, _would_lose(directory, plain) if slab.root else "")
+    on_root(slab.comm, lambda: _refuse_loss(directory, plain))
     return None, []
 
 
@@ -80,7 +81,7 @@ def finished_before(
             return ""
         return f"finished before, at t = {at:g} s, without a checkpoint (--restart never: run it afresh)"
 
-    return slab.agree(look() if slab.root else "")
+    return on_root(slab.comm, look)
 
 
 def detached_at(contents: Contents, job: Job) -> float | None:
@@ -96,51 +97,45 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
 
     Raises InputError for a job whose history was another one up to there.
     """
-    found = slab.agree(_attempt(path, plain) if slab.root else "")
-    problem = found if isinstance(found, str) else checkpoint.verify(found, slab)
-    if isinstance(found, str) or problem:
+    found = on_root(slab.comm, lambda: _attempt(path, plain))
+    if isinstance(found, str):
+        return found
+    if problem := checkpoint.verify(found, slab):
         return problem
-    if difference := slab.agree(find_changed_step(found, job) if slab.root else ""):
+    if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
         raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
     return found
 
 
-def _refuse(slab: Slab, problem: str) -> None:
-    """Raise what root says stands in the way; collective."""
-    if problem := slab.agree(problem):
-        raise InputError(problem)
-
-
 def _is_own(contents: Contents, directory: Directory) -> bool:
-    """Return whether a checkpoint is of the run in the directory: by its id, or as one of its files under any name."""
+    """Return whether a checkpoint is of the run in the directory: by its id, or as one of its files under any name.
+
+    Raises InputError for that of another run, if the directory holds results; root only.
+    """
     if directory.claim is not None and contents.run:
-        return contents.run == directory.claim.id
-    return any(contents.path.samefile(path) for _, path in directory.saved())
+        own = contents.run == directory.claim.id
+    else:
+        own = any(contents.path.samefile(path) for _, path in directory.saved())
+    if not own and (found := directory.results()):
+        there = f"{directory.path}, which holds {', '.join(found[:3])}"
+        raise InputError(f"{contents.path} is of another run than {there}; --out chooses another directory")
+    return own
 
 
-def _would_mix(directory: Directory, path: Path) -> str:
-    """Return why a run may not go on from the checkpoint of another run in a directory; root only."""
-    if found := directory.results():
-        there = ", ".join(found[:3])
-        return f"{path} is of another run than {directory.path}, which holds {there}; --out chooses another directory"
-    return ""
-
-
-def _would_lose(directory: Directory, plain: Mapping[str, Any]) -> str:
-    """Return which results a new run would replace, though no checkpoint says that it can make them; root only.
+def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
+    """Raise InputError for results that a new run would replace, though no checkpoint can make them; root only.
 
     A run of this job that ended before its first checkpoint has nothing that this one does not make again.
     """
     claim, found = directory.claim, directory.results()
     if claim is None or not found:
-        return ""
+        return
     there = f"{directory.path} holds {', '.join(found)}"
     if different := "; ".join(marker.differences(claim.job, plain, SAME)):
-        return f"{there} of another job: {different}; {ADVICE}"
+        raise InputError(f"{there} of another job: {different}; {ADVICE}")
     if claim.saved:
         how = f"a run that has finished at t = {claim.finished[1]:g} s" if claim.finished else "a run"
-        return f"{there} of {how}, but its checkpoints are missing; {ADVICE}"
-    return ""
+        raise InputError(f"{there} of {how}, but its checkpoints are missing; {ADVICE}")
 
 
 def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:

@@ -9,13 +9,13 @@ from ..errors import InputError, RunError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
 from ..job import Job, Rough, RoughSpectrum
-from ..job.sections.listing import plain_job
+from ..job.sections import listing
 from ..march.loop import March
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
-from ..storage import header, heights, row, wisdom
+from ..storage import header, heights, references, row, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.console import Console
 from ..storage.directory import Directory
@@ -47,7 +47,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
     """Run a job, as `run`; returns what can be gone on from in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
-        plain = plain_job(job) if slab.root else {}
+        plain = listing.plain_job(job) if slab.root else {}
         origin, warnings, reason = _find_origin(job, plain, directory, options)
         saved = origin.contents if origin else None
         if reason:
@@ -143,7 +143,8 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
     link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extended(saved.chain if saved else (), link)
-    return Provenance(chain, seeds, str(job.included) if job.included else "", doubts)
+    included = str(job.included) if job.included else ""
+    return Provenance(chain, seeds, included, doubts, references=references.lines(listing.plain(job)))
 
 
 def _open_files(

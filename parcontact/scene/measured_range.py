@@ -7,7 +7,7 @@ from typing import NamedTuple
 from ..effects.folded_branches import bands, phases
 from ..effects.relaxation import time_factor_of
 from ..history.timeline import Timeline
-from ..job import Dma, Job, Zener
+from ..job import Job, Zener
 
 NEAR = 0.5  # accuracy: decades beyond the measured band that pass, as a surface has little of its last waves
 
@@ -81,5 +81,4 @@ def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[st
 
 def _body(job: Job) -> Zener | None:
     """Return the material as springs and branches; None of an elastic one."""
-    material = job.material.fitted if isinstance(job.material, Dma) else job.material
-    return material if isinstance(material, Zener) else None
+    return job.material.fitted if isinstance(job.material.fitted, Zener) else None

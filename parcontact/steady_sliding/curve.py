@@ -12,12 +12,12 @@ from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job
 from ..job.checks.cells import more_points
-from ..job.sections.listing import plain_job
+from ..job.sections import listing
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import sanity
-from ..storage import curve_points, hdf5, marker, stopfile
+from ..storage import curve_points, hdf5, marker, references, stopfile
 from ..storage.console import always
 from ..storage.curve_points import Wanted
 from ..storage.directory import ADVICE, Directory
@@ -123,7 +123,7 @@ def run(
 def _identity(job: Job, wanted: Request) -> dict[str, Any]:
     """Return what a curve is of, as plain data: of the `steady` section only what no point may differ in."""
     steady = {"direction": list(wanted.direction), "waves": wanted.waves}
-    return {**marker.kept(plain_job(job)), "steady": steady}
+    return {**marker.kept(listing.plain_job(job)), "steady": steady}
 
 
 def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
@@ -147,7 +147,8 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
     """Make the file for the maps that the job asks for, if it does; collective."""
     if not job.output.fields:
         return None
-    provenance = Provenance((Link(job.resolved(), slab.comm.size),))
+    cited = references.lines(listing.plain(job))
+    provenance = Provenance((Link(job.resolved(), slab.comm.size),), references=cited)
     points = [point if wanted.temperatures else point[:2] for point in wanted.points]
     return SteadyMaps(directory.path / "steady.h5", slab, job.grid.size, job.output.fields, points, provenance)
 

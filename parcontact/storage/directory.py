@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, InUseError
-from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from . import checkpoint, curve_points, files, hdf5, marker, stopfile
 from .marker import SCENE, VERBS, Claim
@@ -175,14 +174,7 @@ class Directory:
 
     def _on_root(self, act: Callable[[], None]) -> None:
         """Act on root; collective. Raises InputError on all ranks if that fails."""
-
-        def attempt() -> None:
-            try:
-                act()
-            except hdf5.FAILURES as error:
-                raise InputError(f"the output directory {self.path} cannot be written: {hdf5.reason(error)}") from error
-
-        on_root(self.slab.comm, attempt)
+        hdf5.on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
 
     # -- the lock -----------------------------------------------------------------------------------------------------
 

@@ -12,16 +12,18 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..errors import InputError, RunError
+from ..errors import RunError
+from ..parallel import root
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 
+T = TypeVar("T")
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
@@ -84,18 +86,16 @@ def _read_at(handle: int, data: memoryview, position: int) -> int:
     return os.preadv(handle, [data], position)
 
 
-def on_root(slab: Slab, action: Callable[[], Any], what: str, kind: type[Exception] = RunError) -> None:
-    """Do something on root; collective. Its failure is an error of this kind on every rank, beginning with `what`."""
-    problem = ""
-    if slab.root:
+def on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
+    """Return what root does; collective. Its failure is an error of this kind on every rank, beginning with `what`."""
+
+    def attempt() -> T:
         try:
-            action()
-        except (InputError, RunError) as error:
-            problem = str(error)
+            return action()
         except FAILURES as error:
-            problem = f"{what}: {reason(error)}"
-    if problem := slab.agree(problem):
-        raise kind(problem)
+            raise kind(f"{what}: {reason(error)}") from error
+
+    return root.on_root(slab.comm, attempt)
 
 
 def raise_first(slab: Slab, problem: str) -> None:

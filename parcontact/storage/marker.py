@@ -14,7 +14,6 @@ from . import files
 
 MARKER = ".parcontact"
 FORMAT = 1
-MAX_BYTES = 1 << 24
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
 SCENE = ("grid", "surface", "material", "body")  # sections in which all that shares a directory must agree
 SECTIONS = (*SCENE, "initial", "numerics", "steady")  # what a marker keeps of a job
@@ -41,8 +40,7 @@ def read(directory: Path) -> dict[str, Claim]:
     """Read the claims of a directory by verb, none where there is no marker; raises OSError, or ValueError."""
     path = directory / MARKER
     try:
-        with path.open("rb") as file:
-            text = file.read(MAX_BYTES)
+        text = path.read_bytes()
     except FileNotFoundError:
         return {}
     try:

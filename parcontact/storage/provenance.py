@@ -16,12 +16,6 @@ from .. import __version__
 
 PROGRAM = f"parcontact {__version__}"
 LIBRARIES = ("numpy", "pyfftw", "mpi4py", "h5py", "numba")
-REFERENCES = (
-    "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space (method, state variables)",
-    "I. A. Polonsky, L. M. Keer, Wear 231 (1999) 206 (conjugate gradients for contact)",
-    "A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377 (pressure constant on a cell)",
-    "M. Frigo, S. G. Johnson, Proc. IEEE 93 (2005) 216 (FFTW)",
-)
 BUDGET = "error_budget"
 LEFT_OUT = "(too long to be kept)"
 WARNING_BYTES = 4_000
@@ -44,13 +38,15 @@ class Link:
 @dataclass(frozen=True)
 class Provenance:
     """The origin of a file: the chain of runs up to the present one, the seeds of its roughness, the
-    file that its job includes, the warnings about its scene, and the error budget of the run so far, as plain data."""
+    file that its job includes, the warnings about its scene, the error budget of the run so far, as plain data, and
+    what to cite."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
     included: str = ""
     warnings: tuple[str, ...] = ()
     budget: Mapping[str, Any] = field(default_factory=dict)
+    references: tuple[str, ...] = ()
 
     def write(self, file: h5py.File) -> None:
         """Write the attributes of the file: program, resolved job (YAML), chain (JSON), error budget (JSON), ranks,
@@ -68,7 +64,7 @@ class Provenance:
         versions = {name: metadata.version(name) for name in LIBRARIES}
         versions = {"python": platform.python_version(), "hdf5": h5py.version.hdf5_version, **versions}
         file.attrs["libraries"] = json.dumps(versions)
-        file.attrs["references"] = "\n".join(REFERENCES)
+        file.attrs["references"] = "\n".join(self.references)
 
     def renew(self, file: h5py.File) -> None:
         """Put the longer chain, and what else has changed, into a file that has one; nothing changes its place."""

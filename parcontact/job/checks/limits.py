@@ -107,7 +107,7 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
 
 
 def steady_at_rest(initial: Initial, material: AnyMaterial) -> Iterator[Fault]:
-    if initial.state == "steady" and not any(initial.velocity) and material.long_modulus == 0:
+    if initial.state == "steady" and not any(initial.velocity) and material.fitted.long_modulus == 0:
         sentence = "must not be zero: the material has no long-term modulus, and a fluid at rest no steady contact"
         yield Fault(sentence, ("initial", "velocity"))
 

@@ -103,13 +103,10 @@ class Elastic(Part):
 
     @property
     def instant_modulus(self) -> float:
-        """Modulus at a sudden strain [Pa]."""
+        """Modulus at a sudden strain, and after all relaxation (`long_modulus`) [Pa]."""
         return self.shear_modulus
 
-    @property
-    def long_modulus(self) -> float:
-        """Modulus after all relaxation [Pa]."""
-        return self.shear_modulus
+    long_modulus = instant_modulus
 
 
 def _positive_band(band: tuple[float, float]) -> tuple[float, float]:
@@ -216,16 +213,6 @@ class Dma(Part):
     def fitted(self) -> Zener:
         """The compound as springs and Maxwell branches."""
         return self._fitted
-
-    @property
-    def instant_modulus(self) -> float:
-        """Modulus at a sudden strain [Pa]."""
-        return self._fitted.instant_modulus
-
-    @property
-    def long_modulus(self) -> float:
-        """Modulus after all relaxation [Pa]."""
-        return self._fitted.long_modulus
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
