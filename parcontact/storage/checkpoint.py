@@ -11,7 +11,7 @@ which it may not survive. The file has another name until all of it is on the di
 import json
 import os
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from operator import itemgetter
@@ -32,7 +32,6 @@ FORMAT = 1
 TITLE = "parcontact checkpoint, format "
 SEAL = 4096  # bytes set aside for it
 SUMS = "checksums"
-PIECE = 1 << 16  # bytes read at a time
 
 
 @dataclass(frozen=True)
@@ -184,18 +183,15 @@ def _broken(path: Path) -> str:
 
 def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> int:
     """Return the CRC-32 of all bytes that are neither in the seal nor in a map."""
-    total = 0
-    for start, stop in pieces_outside(size, regions, SEAL):
-        total = zlib.crc32(os.pread(file.fileno(), stop - start, start), total)
+    total, start = 0, SEAL
+    for first, last in [*regions, (size, size)]:
+        total, start = zlib.crc32(os.pread(file.fileno(), first - start, start), total), last
     return total
 
 
 def find_regions(file: h5py.File) -> list[tuple[int, int]]:
     """Return where in a file its maps are, from byte to byte, in order; those next to each other as one."""
-    names: list[str] = []
-    file.visit(names.append)
-    items = (file[name] for name in names)
-    maps = [item for item in items if isinstance(item, h5py.Dataset) and item.ndim > 1]
+    maps = [item for item in _datasets(file).values() if item.ndim > 1]
     places = [(item.id.get_offset(), item.nbytes) for item in maps if item.id.get_offset() is not None]
     merged: list[tuple[int, int]] = []
     for start, length in sorted(place for place in places if place[1]):
@@ -203,17 +199,9 @@ def find_regions(file: h5py.File) -> list[tuple[int, int]]:
     return merged
 
 
-def pieces_outside(size: int, found: Iterable[Sequence[int]], start: int = 0) -> Iterator[tuple[int, int]]:
-    """Yield all that is not in these regions of a file of `size` bytes, from `start` on, in pieces."""
-    for first, last in [*found, (size, size)]:
-        for position in range(start, first, PIECE):
-            yield position, min(position + PIECE, first)
-        start = last
-
-
 def _contents(path: Path, file: h5py.File) -> Contents:
-    maps = {item.name[1:]: item.dtype for item in _datasets(file, 2)}
-    numbers = {item.name[1:]: item[()] for item in [*_datasets(file, 0), *_datasets(file, 1)]}
+    found = {name: item for name, item in _datasets(file).items() if not name.startswith(SUMS)}
+    maps = {name: item.dtype for name, item in found.items() if item.ndim == 2}
     shape = next((file[name].shape for name in maps), (0, 0))
     table = json.loads(file.attrs.get("table", "{}"))
     return Contents(
@@ -225,8 +213,8 @@ def _contents(path: Path, file: h5py.File) -> Contents:
         Table(table.get("rows", 0), table.get("last", "")),
         read_chain(file),
         shape,
-        {name: float(file[name].attrs["unit"]) for name in [*maps, *numbers]},
-        numbers,
+        {name: float(item.attrs["unit"]) for name, item in found.items()},
+        {name: item[()] for name, item in found.items() if item.ndim < 2},
         maps,
         {name: file[f"{SUMS}/{name}"][...] for name in maps},
     )
@@ -257,9 +245,8 @@ def read(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
             rows *= contents.units[name] / entries[name].unit
 
 
-def _datasets(file: h5py.File, dimensions: int) -> list[h5py.Dataset]:
-    """Return all datasets of so many dimensions but the checksums, by name."""
+def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
+    """Return all datasets by their names."""
     names: list[str] = []
     file.visit(names.append)
-    items = (file[name] for name in sorted(names) if not name.startswith(SUMS))
-    return [item for item in items if isinstance(item, h5py.Dataset) and item.ndim == dimensions]
+    return {name: file[name] for name in sorted(names) if isinstance(file[name], h5py.Dataset)}

@@ -1,11 +1,10 @@
 """The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal."""
 
-import logging
 import re
 import sys
 import time
 from contextlib import suppress
-from io import TextIOWrapper
+from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
@@ -16,7 +15,7 @@ from . import files
 from .row import Row
 
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
-STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
+STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d[.,]\d+ ")
 WARNING, MESH = "warning: ", "mesh: "
 EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
 LEFT_SECONDS = 30.0  # between two lines with the time left, where there is no terminal for a bar
@@ -51,27 +50,12 @@ def always(text: str) -> bool:
     return True
 
 
-class LogFile(logging.FileHandler):
-    """A log with the time of each line, which no run ends for."""
-
-    def __init__(self, path: Path) -> None:
-        """Continue the file or begin it; raises OSError."""
-        super().__init__(path, encoding="utf-8")
-        self.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
-
-    def _open(self) -> TextIOWrapper:
-        return TextIOWrapper(files.open_to_append(Path(self.baseFilename)), encoding="utf-8", write_through=True)
-
-    def handleError(self, record: logging.LogRecord) -> None:  # the name is that of the library
-        """Go on without the line."""
-
-
 class Console:
     """Messages of root to the user and to the log. The console of another rank, without a log, does not speak, so that
-    no caller asks who it is."""
+    no caller asks who it is. Making one with a log raises OSError where that cannot be written."""
 
     def __init__(self, log: Path | None = None, quiet: bool = True, total: int = 0, speaks: bool = True) -> None:
-        self._log = LogFile(log) if log is not None else None
+        self._log = files.open_to_append(log) if log is not None else None
         self._quiet, self._total, self._speaks = quiet, total, speaks
         self._first, self._began, self._last_time_left = 0, 0.0, 0.0
         self._bar: tqdm[None] | None = None
@@ -83,9 +67,10 @@ class Console:
             self._write(text)
 
     def log(self, text: str) -> None:
-        """Write a message to the log only."""
+        """Write a message to the log only, with the time; no run ends for a line that cannot be written."""
         if self._log is not None:
-            self._log.emit(logging.makeLogRecord({"msg": printable(text)}))
+            with suppress(OSError):
+                self._log.write(f"{datetime.now().isoformat(' ', 'milliseconds')} {printable(text)}\n".encode())
 
     def warn(self, text: str, shown: bool = True) -> None:
         """Log a warning, and show it even to those who asked for quiet if it is to be `shown`."""

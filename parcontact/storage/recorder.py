@@ -49,15 +49,11 @@ class Recorder:
         self._recording = recording
         self.console = Console(speaks=False)
         self._measures: MeasuresFile | None = None
-        self.warnings: list[str] = []
         table, log = self.path / "measures.csv", self.path / "run.log"
-        kept, columns = Table(), (recording.branches, recording.added)
+        columns = recording.branches, recording.added
 
-        def cut_back() -> None:
-            nonlocal kept
-            if saved is not None:
-                kept, lost = cut_back_table(table, saved.step, saved.table, *columns)
-                self.warnings += lost
+        def cut_back() -> tuple[Table, list[str]]:
+            return cut_back_table(table, saved.step, saved.table, *columns) if saved is not None else (Table(), [])
 
         def begin_log() -> None:
             self.console = Console(log, quiet, recording.total)
@@ -65,7 +61,7 @@ class Recorder:
         def begin_table() -> None:
             self._measures = MeasuresFile(table, kept, *columns)
 
-        hdf5.on_root(self.slab, cut_back, f"cannot write {table}", InputError)
+        kept, self.warnings = hdf5.on_root(self.slab, cut_back, f"cannot write {table}", InputError)
         self._fields = self._begin_fields(provenance, saved)
         hdf5.on_root(self.slab, begin_log, f"cannot write {log}", InputError)
         hdf5.on_root(self.slab, begin_table, f"cannot write {table}", InputError)
