@@ -14,7 +14,7 @@ from ..job.text import yamltext
 from ..storage import files
 
 JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps
-MANY_POINTS = 2**20  # of a job to start from, at most
+MANY_POINTS = 2**20  # tuning: of a job to start from, at most
 UNSAID = ("give unit", "give size")  # in messages about maps that do not say all
 HOW = "on the command line: --set surface.unit=um --set surface.size=[1e-3,1e-3]"
 LOAD = {"pressure": 1.0e5}

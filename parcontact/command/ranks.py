@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Verb = Callable[[argparse.Namespace], int]
 
 BLANK = " \0"  # what may follow the name of an MPI library
-LEAST_FILES, LEAST_MEMORY = 32, 520e6  # open files and bytes without which MPI and the libraries do not even start
+LEAST_FILES, LEAST_MEMORY = 32, 520e6  # tuning: open files and bytes without which MPI does not start
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # say which rank a process is
 LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # how many were started
 

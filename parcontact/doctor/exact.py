@@ -7,7 +7,7 @@ from ..theory import full_contact, lee_radok, persson, persson_rings, westergaar
 from .bench import Bench
 from .small_jobs import GLASSY, HEIGHT, PRONY, RADIUS, RELAXATION, WAVELENGTH, K, sphere, wave, zener
 
-ITERATIONS = 60  # a contact may take this many at most
+ITERATIONS = 60  # tuning: a contact may take this many at most
 RUBBER = zener(GLASSY, [], [])
 WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # and their heights
 

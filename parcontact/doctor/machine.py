@@ -24,11 +24,11 @@ from .small_jobs import GLASSY, crossed, zener
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-POINTS = 512  # along each side of the contact that is timed
-SLOW = 4.0  # times the usual time of an operator call
-SLOW_DISK = 50e6  # bytes per second
-SAME = 1e-6  # of the largest pressure
-STEPS = 4  # of the run whose files are read again
+POINTS = 512  # tuning: along each side of the contact that is timed
+SLOW = 4.0  # tuning: times the usual time of an operator call
+SLOW_DISK = 50e6  # tuning: bytes per second
+SAME = 1e-6  # accuracy: of the largest pressure
+STEPS = 4  # tuning: of the run whose files are read again
 
 
 def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:

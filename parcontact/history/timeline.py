@@ -68,12 +68,12 @@ class Span:
 
     @property
     def moves(self) -> bool:
-        """Whether the surface slides."""
+        """True if the surface slides."""
         return self.count > 0 and any(self.stage.velocity)
 
     @cached_property
     def rests(self) -> bool:
-        """Whether it stands under a constant load, and its steps may be as long as what happens allows."""
+        """True if it stands under a constant load, and its steps may be as long as what happens allows."""
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
         return free and not any(self.stage.velocity) and self.stage.load.constant
 
@@ -211,17 +211,17 @@ class Timeline:
 
     @property
     def end(self) -> float:
-        """When the last step ends [s]."""
+        """The end of the last step [s]."""
         return self[len(self)].time if len(self) else 0.0
 
     @property
     def lasts(self) -> bool:
-        """Whether there is more than jumps."""
+        """True if there is more than jumps."""
         return any(span.count for span in self.spans)
 
     @property
     def moves(self) -> bool:
-        """Whether the surface leaves its place."""
+        """True if the surface leaves its place."""
         return any(span.moves for span in self.spans)
 
     def first_reaching(self, time: float) -> int:

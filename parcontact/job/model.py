@@ -105,7 +105,7 @@ class Job(Part):
 
     @property
     def origin(self) -> Origin:
-        """Where the job comes from."""
+        """The origin of the job."""
         return self._origin
 
     def of(self, origin: Origin) -> Job:
@@ -154,7 +154,7 @@ class Job(Part):
 
     @property
     def measured(self) -> bool:
-        """Whether the material says at which frequencies or temperatures it was measured."""
+        """True if the material says at which frequencies or temperatures it was measured."""
         body = self.material.fitted
         return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
@@ -168,7 +168,7 @@ class Job(Part):
 
     @property
     def remembers(self) -> bool:
-        """Whether the body has a memory, and time steps an error: an elastic one has neither, but where it sticks."""
+        """True if the body has a memory, and time steps an error: an elastic one has neither, but where it sticks."""
         return bool(self.material.fitted.branches) or self.section("adhesion") is not None
 
     def resolved(self) -> str:

@@ -20,8 +20,8 @@ from .text.places import NOWHERE, UNREADABLE, Mistake, Place, Source
 from .text.python_data import source_of
 from .text.sweep_cases import Sweep
 
-MANY_MISTAKES = 40  # more are not shown one by one
-SHOWN_MISTAKES = 20  # of so many
+MANY_MISTAKES = 40  # tuning: more are not shown one by one
+SHOWN_MISTAKES = 20  # tuning: of so many
 STRICT = "an error with numerics.strict"
 Given = str | os.PathLike[str] | Mapping[str, Any]
 Changes = Sequence[str] | Mapping[str, Any]

@@ -16,12 +16,12 @@ from ..parallel.slab import Array
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may say the others too
 PLAIN = (".npy", ".txt", ".xyz")  # formats without units
-LARGEST_FILE = 4_000_000_000  # bytes
-IRREGULAR = 1e-3  # of a step: positions of a .xyz file further from a grid than this are on none
-FEWEST = 4  # points along a direction
-MOST_POSITIONS = 10**6  # along a direction
-MOST_MISSING = 2  # times as many points of the grid as of the file
-LOWEST, HIGHEST = 1e-70, 1e70  # of the largest height: its fourth power is a number of double precision
+LARGEST_FILE = 4_000_000_000  # tuning: bytes
+IRREGULAR = 1e-3  # accuracy: of a step: positions of a .xyz file further from a grid than this are on none
+FEWEST = 4  # tuning: points along a direction
+MOST_POSITIONS = 10**6  # tuning: along a direction
+MOST_MISSING = 2  # tuning: times as many points of the grid as of the file
+LOWEST, HIGHEST = 1e-70, 1e70  # accuracy: of the largest height: its fourth power is a number of double precision
 
 
 @dataclass(frozen=True)

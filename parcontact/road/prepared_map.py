@@ -12,7 +12,7 @@ from ..printed import per_cent
 from . import map_files, treatment
 from .treatment import Treated
 
-SLACK = 1e-6  # of a length: a box this much longer than the map is as long
+SLACK = 1e-6  # accuracy: of a length: a box this much longer than the map is as long
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,10 @@ from ..parallel.slab import Array
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
-FEWEST = 3  # rows of numbers
-ABEL_NODES = 12  # of Gauss' rule, in each piece of Abel's integral
-ABEL_DECADES = 4.0  # beyond the last point, where C1D' has fallen by more than 8
-EDGE = 1e-9  # relative: wavelengths that differ by this are the same
+FEWEST = 3  # accuracy: rows of numbers
+ABEL_NODES = 12  # accuracy: of Gauss' rule, in each piece of Abel's integral
+ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
+EDGE = 1e-9  # accuracy: relative: wavelengths that differ by this are the same
 COLUMN = re.compile(r"^(q|C1D|C2D)\[([^\]]+)\]$")
 FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
 

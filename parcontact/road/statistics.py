@@ -15,12 +15,12 @@ from scipy import fft
 
 from ..parallel.slab import Array
 
-BINS = 12  # per decade of wavenumbers
-FEWEST = 5  # bins that a Hurst exponent is fitted to
-WHOLE = 0.99  # share of the square slope up to which waves belong to a surface
+BINS = 12  # tuning: per decade of wavenumbers
+FEWEST = 5  # accuracy: bins that a Hurst exponent is fitted to
+WHOLE = 0.99  # accuracy: share of the square slope up to which waves belong to a surface
 NARROWEST = math.log(3.0)  # of a range of wavenumbers
-STEADY = 0.3  # rms of the logarithm around a power law above which a range is not self-affine
-FLAT, STEEP = -2.0, -4.2  # slopes of a Hurst exponent of 0, and of 1 with some scatter: beyond, nothing is self-affine
+STEADY = 0.3  # accuracy: rms of the logarithm around a power law above which a range is not self-affine
+FLAT, STEEP = -2.0, -4.2  # physics: slopes of Hurst exponents 0, and 1 with scatter; beyond, nothing is self-affine
 
 
 @dataclass(frozen=True)

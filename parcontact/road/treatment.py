@@ -15,9 +15,9 @@ from ..parallel.slab import Array
 
 Detrend = Literal["none", "mean", "tilt", "curvature"]
 Periodic = Literal["none", "smooth", "window", "mirror"]
-OUTLIER = 16.0  # times the median deviation of heights from their neighbours: further off is told
-TAPER = 0.1  # share of each side over which a window falls to 0
-SWEEPS = 200  # of relaxation that fill holes smoothly, on each of the coarser maps
+OUTLIER = 16.0  # accuracy: times the median deviation of heights from their neighbours: further off is told
+TAPER = 0.1  # tuning: share of each side over which a window falls to 0
+SWEEPS = 200  # accuracy: of relaxation that fill holes smoothly, on each of the coarser maps
 
 
 @dataclass(frozen=True)

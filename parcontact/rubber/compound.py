@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from .series import Weigh
 
 TITLE = "# Fitted by parcontact fit to"  # with which material files of fits begin
-POOR, HOPELESS = 0.2, 1.0  # rms errors of fits that are warned of, and refused
-CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # misfits of more than so many times the scatter, and so much, are told
-SWAPPED = 0.5  # of the misfit: that of exchanged moduli, if they were
-WIDE_GAP = 1.0  # decades between sweeps as shifted, beyond which they say nothing of the shift
-DIGITS = 7  # of the numbers in a material file
+POOR, HOPELESS = 0.2, 1.0  # accuracy: rms errors of fits that are warned of, and refused
+CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # accuracy: misfits of more than so many times the scatter, and so much, are told
+SWAPPED = 0.5  # accuracy: of the misfit: that of exchanged moduli, if they were
+WIDE_GAP = 1.0  # accuracy: decades between sweeps as shifted, beyond which they say nothing of the shift
+DIGITS = 7  # accuracy: of the numbers in a material file
 LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors"}
 
 

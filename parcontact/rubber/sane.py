@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 Array = NDArray[np.float64]
-MOST_DECADES = 40.0  # of frequencies or times in one table
-COLDEST = -150.0  # deg C: rubbers are not measured below
-SOFTEST, HARDEST = 3e3, 1e13  # Pa: of the largest modulus of a table; a soft gel, ten times diamond
-GLASS, SOFT = 4e9, 1e5  # Pa: shear moduli of no rubber's glass are larger, and of none's glass transition smaller
-RISE = 0.1  # of a relaxation modulus from its first to its last time, beyond scatter
+MOST_DECADES = 40.0  # tuning: of frequencies or times in one table
+COLDEST = -150.0  # physics [deg C]: rubbers are not measured below
+SOFTEST, HARDEST = 3e3, 1e13  # physics [Pa]: of the largest modulus of a table; a soft gel, ten times diamond
+GLASS, SOFT = 4e9, 1e5  # physics [Pa]: no rubber is stiffer as a glass, and none has a softer glass transition
+RISE = 0.1  # accuracy: of a relaxation modulus from its first to its last time, beyond scatter
 
 
 def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: Array | None) -> None:

@@ -27,18 +27,18 @@ from .tables import Measurement, Set
 
 Array = NDArray[np.float64]
 Weigh = Literal["both", "storage", "loss"]
-DENSE = 3  # times per decade of the best series that is looked for
-MOST = 48  # branches
+DENSE = 3  # accuracy: times per decade of the best series that is looked for
+MOST = 48  # tuning: branches
 NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out
-SPARE = 0.5  # decades of times beyond the data, to either side
-ENDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # decades beyond the data that are tried for a short series
-WIDEST = 8.0  # decades: the largest shift between neighbouring temperatures that is looked for
-MOST_DECADES = 30.0  # of shift between the coldest and the warmest set
+SPARE = 0.5  # accuracy: decades of times beyond the data, to either side
+ENDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # accuracy: decades beyond the data that are tried for a short series
+WIDEST = 8.0  # tuning: decades: the largest shift between neighbouring temperatures that is looked for
+MOST_DECADES = 30.0  # tuning: of shift between the coldest and the warmest set
 Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
-WLF_CONSTANTS: Ranges = ((2.0, 60.0, 24), (20.0, 600.0, 24))  # C1 [-], C2 [K]
-ENERGIES: Ranges = ((1e4, 1e6, 60),)  # J/mol
-APART = 0.1  # rms of the differences of the logarithms of two sets that do not overlap
-SHORTEST = 0.3  # share of a sweep that must overlap with its neighbour's
+WLF_CONSTANTS: Ranges = ((2.0, 60.0, 24), (20.0, 600.0, 24))  # physics: C1 [-], C2 [K]
+ENERGIES: Ranges = ((1e4, 1e6, 60),)  # physics: J/mol
+APART = 0.1  # accuracy: rms of the differences of the logarithms of two sets that do not overlap
+SHORTEST = 0.3  # accuracy: share of a sweep that must overlap with its neighbour's
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from typing import Protocol
 from ..datafiles import read_lines
 from ..errors import InputError
 
-GAS = 8.314462618  # J/(mol K)
-ENERGY = 1e3, 1e7  # J/mol: energies of activation are some 1e5
-CONSTANT = 1e-3, 1e4  # C1 [-] and C2 [K] of WLF
-ZERO = 273.15  # K at 0 deg C
+GAS = 8.314462618  # physics: J/(mol K)
+ENERGY = 1e3, 1e7  # physics: J/mol: energies of activation are some 1e5
+CONSTANT = 1e-3, 1e4  # physics: C1 [-] and C2 [K] of WLF
+ZERO = 273.15  # physics: K at 0 deg C
 
 
 class Shift(Protocol):

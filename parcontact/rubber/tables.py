@@ -28,8 +28,8 @@ from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
 Kind = Literal["frequency", "time"]
-LEAST_ROWS = 3  # of a set: fewer say nothing about a spectrum
-NEAR = 1.5  # degrees: measured temperatures of one set vary by less
+LEAST_ROWS = 3  # accuracy: of a set: fewer say nothing about a spectrum
+NEAR = 1.5  # accuracy: degrees: measured temperatures of one set vary by less
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
 RATES_OF = {"f", "omega"}  # one of them is needed
 RATES = {"Hz": 2 * math.pi, "rad/s": 1.0}

@@ -1,4 +1,4 @@
-"""Where a run begins: at the start, or after the newest sound checkpoint that belongs to its job."""
+"""The beginning of a run: at the start, or after the newest sound checkpoint that belongs to its job."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -22,7 +22,7 @@ from ..storage.marker import Claim
 
 NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
 SAME = ("grid", "surface", "material", "body", "initial", *NUMERICS)  # sections and keys that must not change
-SAME_STEP = 1e-9  # relative: steps of two histories this close are the same
+SAME_STEP = 1e-9  # accuracy: relative: steps of two histories this close are the same
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Why a run stops early, and when it saves: signals, a stop file, limits of wall time.
+"""Reasons to stop a run early, or to save: signals, a stop file, limits of wall time.
 
 Every rank may be sent a signal; all else is known to root. One small message per step decides for all.
 """
@@ -18,7 +18,7 @@ from ..storage import stopfile
 from ..storage.stopfile import StopFile
 
 LOOK_SECONDS = 0.2  # tuning: between two looks for the stop file
-RESERVE_SECONDS = 5.0  # of wall time for what is not measured: ending MPI, closing files
+RESERVE_SECONDS = 5.0  # tuning: of wall time for what is not measured: ending MPI, closing files
 FIRST_WRITE = 50e6  # tuning: bytes per second: how fast the first checkpoint is expected to be written
 RECENT = 50  # tuning: steps whose longest is expected of the next one
 

@@ -30,7 +30,7 @@ from .provenance import Link, Provenance, read_chain
 
 FORMAT = 1
 TITLE = "parcontact checkpoint, format "
-SEAL = 4096  # bytes set aside for it
+SEAL = 4096  # tuning: bytes set aside for it
 SUMS = "checksums"
 
 

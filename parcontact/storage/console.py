@@ -17,8 +17,8 @@ from .row import Row
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d[.,]\d+ ")
 WARNING, MESH = "warning: ", "mesh: "
-EVERY_SECONDS = 0.5  # a bar is redrawn, and lines are shortened to a bar, at most this often
-LEFT_SECONDS = 30.0  # between two lines with the time left, where there is no terminal for a bar
+EVERY_SECONDS = 0.5  # tuning: a bar is redrawn, and lines are shortened to a bar, at most this often
+LEFT_SECONDS = 30.0  # tuning: between two lines with the time left, where there is no terminal for a bar
 
 
 def line(row: Row) -> str:

@@ -6,7 +6,7 @@ from itertools import product
 from typing import NamedTuple
 
 LOG = "steady.log"  # beside its table: what was said of it
-CLOSE = 1e-6  # relative: speeds and pressures that are the same but for rounding
+CLOSE = 1e-6  # accuracy: relative: speeds and pressures that are the same but for rounding
 
 Place = tuple[float, float, float]  # of a point: speed, mean pressure, temperature
 

@@ -21,7 +21,7 @@ from ..parallel.slab import Slab
 from . import checkpoint, curve_points, files, hdf5, marker, stopfile
 from .marker import SCENE, VERBS, Claim
 
-MAX_SECONDS_TO_RELEASE = 3.0  # seconds: a run that was killed may need a moment to let go
+MAX_SECONDS_TO_RELEASE = 3.0  # tuning: seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
     "steady": ("steady.csv", "steady_waves.csv", "steady.h5", "steady_theory.csv", curve_points.LOG),
@@ -34,13 +34,13 @@ COPIES = {  # of the job: as given, and with every default
 }
 LOCK = ".lock"
 BESIDE = (stopfile.NAME, "theory.csv", "theory.yaml")  # may be there before the first run
-SHOWN = 4  # names of files that a message lists
+SHOWN = 4  # tuning: names of files that a message lists
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 ADVICE = "give --restart never to start afresh, or --out for another directory"
 
 
 class Directory:
-    """Where a verb writes. Only root touches it; methods whose docstring says "collective" tell all ranks."""
+    """A directory of results. Only root touches it; methods whose docstring says "collective" tell all ranks."""
 
     def __init__(self, path: Path, slab: Slab, verb: str = "run") -> None:
         self.path, self.slab, self.verb = path, slab, verb

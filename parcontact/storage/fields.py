@@ -20,7 +20,7 @@ from .provenance import Provenance
 
 UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m", "temperature": "K"}
 KIND = "parcontact fields"
-XDMF_SECONDS = 10.0  # at least between two versions of fields.xdmf, which grows with every instant
+XDMF_SECONDS = 10.0  # tuning: at least between two versions of fields.xdmf, which grows with every instant
 
 
 class FieldsFile:

@@ -26,9 +26,9 @@ from ..parallel.slab import Array, Slab
 T = TypeVar("T")
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
-FULL = 1 << 16  # bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
+FULL = 1 << 16  # tuning: bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
 DOUBLE = 8  # bytes of a number in a map
-RESERVE = 1 << 20  # bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
+RESERVE = 1 << 20  # tuning: bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
 
 
 class Part(NamedTuple):

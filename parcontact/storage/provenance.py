@@ -18,9 +18,9 @@ PROGRAM = f"parcontact {__version__}"
 LIBRARIES = ("numpy", "pyfftw", "mpi4py", "h5py", "numba")
 BUDGET = "error_budget"
 LEFT_OUT = "(too long to be kept)"
-WARNING_BYTES = 4_000
-BUDGET_BYTES = 1_000
-CHAIN_BYTES = 50_000  # of the text of a chain: an attribute of fixed size can be renewed in place
+WARNING_BYTES = 4_000  # tuning
+BUDGET_BYTES = 1_000  # tuning
+CHAIN_BYTES = 50_000  # tuning: of the text of a chain: an attribute of fixed size can be renewed in place
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What to cite for a run: this program, and the references of its job (`storage.references`)."""
+"""References to cite for a run: this program, and the references of its job (`storage.references`)."""
 
 from contextlib import suppress
 from pathlib import Path

@@ -24,7 +24,7 @@ from ..storage.provenance import Link, read_budget, read_chain
 from . import slide, sweep_table, theory_beside, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
-SHOWN = 20  # numbers of one name at most
+SHOWN = 20  # tuning: numbers of one name at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
 
 

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..job import Initial, Ramp, Stage
 from ..printed import per_cent, quantity, with_error
 
-DYNAMIC = 0.75  # share of the distance, counted from its end, over which friction is averaged
-SAME_INSTANT = 1e-9  # relative: instants this close are the same
+DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over which friction is averaged
+SAME_INSTANT = 1e-9  # accuracy: relative: instants this close are the same
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
 

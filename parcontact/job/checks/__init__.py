@@ -1,4 +1,4 @@
-"""What a job means as a whole: rules that it must keep, and warnings about what will probably disappoint."""
+"""Rules that a job as a whole must keep, and warnings about what will probably disappoint."""
 
 from typing import Any, Protocol
 

@@ -1,4 +1,4 @@
-"""How many cells the shortest wave of a surface needs along and across the sliding.
+"""Cells that the shortest wave of a surface needs along and across the sliding.
 
 Friction comes from slopes along the sliding: the mesh makes its error along it, and little across. The contact area
 wants both directions alike. With c cells per shortest wave along the sliding and c' across it the relative errors are
@@ -37,8 +37,8 @@ LEAST_CELLS = 2.1  # accuracy: per shortest wave; the grid has no waves shorter 
 LONG = 1.2  # accuracy: cells with such sides are no squares
 LONGEST = 8.0  # accuracy: the longer side of a cell over the shorter, in the experiments
 MOST_CELLS = 400.0  # tuning: per shortest wave
-MULTIPLE = 16  # of which points along a side are, so that there are coarser grids to start from
-SAME = 1e-9  # relative: numbers this close are the same
+MULTIPLE = 16  # tuning: of which points along a side are, so that there are coarser grids to start from
+SAME = 1e-9  # accuracy: relative: numbers this close are the same
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:

@@ -133,7 +133,7 @@ def _accuracy(value: Any, info: ValidationInfo) -> float | Accuracy:
 
 
 class Numerics(Part):
-    """How the equations are solved; `accuracy` chooses the tolerance and what branches may be folded, where these are
+    """Settings of the solution; `accuracy` chooses the tolerance and what branches may be folded, where these are
     not given, and says how fine the mesh should be."""
 
     accuracy: Annotated[float | Accuracy, PlainValidator(_accuracy, json_schema_input_type=Fraction | Accuracy)] = (
@@ -167,7 +167,7 @@ class Numerics(Part):
 
     @property
     def tolerance_is_chosen(self) -> bool:
-        """Whether the tolerance is that which belongs to the accuracy."""
+        """True if the tolerance is that which belongs to the accuracy."""
         return self.tolerance == TOLERANCE_SHARE * self.asked.strictest
 
     @property
@@ -201,7 +201,7 @@ class Output(Part):
 
 
 class Checkpoint(Part):
-    """When the state is saved, by steps or by wall time, and how many of the last ones are kept."""
+    """Times at which the state is saved, by steps or by wall time, and how many of the last ones are kept."""
 
     every: Count | None = Field(default=None, description="a positive whole number of steps")
     minutes: Positive | None = Field(default=None, description="a positive wall time in minutes [min]")

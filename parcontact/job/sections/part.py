@@ -31,7 +31,7 @@ from .quantities import from_home
 
 
 class Origin(NamedTuple):
-    """Where a job comes from: its absolute path, and the file of its material if it includes one; `mesh` says which
+    """Origin of a job: its absolute path, and the file of its material if it includes one; `mesh` says which
     points were chosen for it.
 
     `numbers_as_texts`: PyYAML's own `safe_load` leaves texts for some numbers, 1.0e6 and 1e-3. `names_directory`: the

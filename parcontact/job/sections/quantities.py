@@ -15,7 +15,7 @@ FROM_SURFACE = "from surface"  # of a grid: what its measured map has
 AUTO_POINTS = "auto"  # of a grid: what the accuracy asks for
 MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
 SMALLEST, LARGEST = 1e-60, 1e60  # accuracy: of numbers, so that double precision holds what follows from them
-LONGEST_NUMBER = 400  # characters of a number that is given as a text
+LONGEST_NUMBER = 400  # tuning: characters of a number that is given as a text
 LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
 
 MOST_OF_A_RANGE = 100_000  # tuning

@@ -33,7 +33,7 @@ class Ramp:
 
     @property
     def constant(self) -> bool:
-        """Whether the load does not change."""
+        """True if the load does not change."""
         return self.start == self.end
 
     def at(self, fraction: float) -> float:
@@ -139,12 +139,12 @@ class Stage(Part):
 
     @property
     def chooses(self) -> bool:
-        """Whether it chooses its own time steps."""
+        """True if it chooses its own time steps."""
         return self.time_step == AUTO
 
     @property
     def control(self) -> Control:
-        """Which load is prescribed."""
+        """The load that is prescribed."""
         return next(name for name in CONTROLS if getattr(self, name) is not None)
 
     @property
@@ -160,7 +160,7 @@ class Stage(Part):
 
     @property
     def seconds(self) -> float:
-        """How long the stage lasts [s]; 0 for an instantaneous one."""
+        """The duration of the stage [s]; 0 for an instantaneous one."""
         if self.distance is not None:
             return self.distance / self.speed
         return self.duration or 0.0

@@ -15,8 +15,8 @@ from ..text.fault import Fault
 from .part import Part, Rule, chosen
 from .quantities import Positive, Real
 
-LOWEST, HIGHEST = -273.15, 5000.0  # deg C
-LARGEST_SHIFT = 60.0  # log10 of a_T, either way: relaxation times remain numbers that can be computed with
+LOWEST, HIGHEST = -273.15, 5000.0  # physics: deg C
+LARGEST_SHIFT = 60.0  # accuracy: log10 of a_T, either way: relaxation times remain numbers that can be computed with
 Celsius = Annotated[
     Real,
     Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000"),

@@ -12,7 +12,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from .places import Key
 
-MAX_WORD = 40  # characters of a word that may be a misspelt one
+MAX_WORD = 40  # tuning: characters of a word that may be a misspelt one
 BOUNDED = reprlib.Repr()  # a `repr` that never writes out all of something large
 BOUNDED.maxlist = BOUNDED.maxtuple = BOUNDED.maxset = 60
 BOUNDED.maxstring = BOUNDED.maxlong = BOUNDED.maxother = 500

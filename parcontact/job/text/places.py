@@ -9,7 +9,7 @@ Key = tuple[str | int, ...]  # the way to a value: ("history", 0, "pressure")
 
 
 class Place(NamedTuple):
-    """Where something was written. `line` 0 means that `origin` says it all (a command-line override)."""
+    """A place where something was written. `line` 0 means that `origin` says it all (a command-line override)."""
 
     origin: str
     line: int = 0

@@ -16,7 +16,7 @@ from .fault import quote, shorten
 from .places import Key, Place, Source
 
 SWEEP: Key = ("sweep",)
-MAX_CASES = 1000
+MAX_CASES = 1000  # tuning
 FIXED = ("sweep", "output.directory")  # keys that are the same in all cases
 
 

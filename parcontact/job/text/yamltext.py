@@ -29,8 +29,8 @@ RESOLVERS = (  # tag, what such a scalar looks like, first characters; tried in 
 )
 SCALAR_TAGS = tuple(YAML_TAG + name for name in ("bool", "int", "float", "null", "str"))
 # Bounds against texts that a broken program has written; no job comes near them.
-MAX_BYTES = 2_000_000  # of a file
-MAX_VALUES = 100_000  # of a text, an alias counting as all that it stands for
+MAX_BYTES = 2_000_000  # tuning: of a file
+MAX_VALUES = 100_000  # tuning: of a text, an alias counting as all that it stands for
 
 
 def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
