@@ -85,7 +85,7 @@ class Facts:
         self.provenance.write(file)
 
 
-def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in_turn: bool = False) -> None:
+def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) -> None:
     """Write a checkpoint; collective. On an error nothing of it is left, and what had the name before still has it."""
     maps = _maps(entries)
     part = slab.agree(files.unused(path))
@@ -108,7 +108,7 @@ def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry], in
     try:
         size = sum(rows.itemsize for rows in maps.values()) * slab.nx * slab.ny
         hdf5.lay_out(part, slab, build, size, SEAL)
-        hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()], in_turn)
+        hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()])
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.on_root(slab, finish, f"cannot write {part}")
         hdf5.sync(part, slab)

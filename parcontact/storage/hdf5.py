@@ -24,6 +24,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 
 T = TypeVar("T")
+MPI_IO = h5py.get_config().mpi  # else ranks act in turn
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
 FULL = 1 << 16  # tuning: bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
@@ -39,14 +40,14 @@ class Part(NamedTuple):
     rows: Array
 
 
-def write(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
-    """Write the rows of every rank; collective. `in_turn` forgoes MPI-IO."""
-    _move(path, slab, list(parts), True, in_turn)
+def write(path: Path, slab: Slab, parts: Iterable[Part]) -> None:
+    """Write the rows of every rank; collective."""
+    _move(path, slab, list(parts), True)
 
 
-def read(path: Path, slab: Slab, parts: Iterable[Part], in_turn: bool = False) -> None:
-    """Read the rows of every rank into `part.rows`; collective. `in_turn` forgoes MPI-IO."""
-    _move(path, slab, list(parts), False, in_turn)
+def read(path: Path, slab: Slab, parts: Iterable[Part]) -> None:
+    """Read the rows of every rank into `part.rows`; collective."""
+    _move(path, slab, list(parts), False)
 
 
 def sync(path: Path, slab: Slab) -> None:
@@ -114,7 +115,7 @@ def reason(error: BaseException) -> str:
     return text.splitlines()[0] if text else type(error).__name__
 
 
-def _move(path: Path, slab: Slab, parts: Sequence[Part], writes: bool, in_turn: bool) -> None:
+def _move(path: Path, slab: Slab, parts: Sequence[Part], writes: bool) -> None:
     """Write or read the rows at their places; collective. One rank that cannot take part is an error of all before."""
     what, problem, places = f"cannot {'write' if writes else 'read'} {path}", "", list[int]()
     try:
@@ -126,8 +127,7 @@ def _move(path: Path, slab: Slab, parts: Sequence[Part], writes: bool, in_turn: 
     except FAILURES as error:
         problem = f"{what}: {reason(error)}"
     raise_first(slab, problem)
-    together = h5py.get_config().mpi and not in_turn and slab.comm.size > 1
-    if problem := (_together if together else _by_turns)(path, slab, parts, places, writes):
+    if problem := (_together if MPI_IO and slab.comm.size > 1 else _by_turns)(path, slab, parts, places, writes):
         space = os.statvfs(path)
         full = writes and space.f_bavail * space.f_frsize < FULL
         problem = f"{what}: {os.strerror(errno.ENOSPC) if full else problem}"

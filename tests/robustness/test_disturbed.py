@@ -200,12 +200,12 @@ def test_full_disk_while_maps_are_written(
     """The map that had no room is saved by the run that goes on."""
     write, maps = hdf5.write, []
 
-    def full(path: Path, slab: Any, parts: Any, in_turn: bool = False) -> None:
+    def full(path: Path, slab: Any, parts: Any) -> None:
         if path.name == "fields.h5":
             maps.append(path)
             if len(maps) == 3:
                 raise RunError(f"cannot write {path}: No space left on device")
-        write(path, slab, parts, in_turn)
+        write(path, slab, parts)
 
     with monkeypatch.context() as patch:
         patch.setattr(hdf5, "write", full)

@@ -33,33 +33,41 @@ def make(path: Path, slab: Slab, names: tuple[str, ...] = ("a", "group/b")) -> N
 
 
 @pytest.mark.parametrize("ny", [1, 2, 7, 16])  # with 3 and 4 ranks, some have no rows
-@pytest.mark.parametrize(("writes", "reads"), [(False, False), (False, True), (True, False)])
+@pytest.mark.parametrize(("writes", "reads"), [(True, True), (True, False), (False, True)])
 def test_both_ways_are_interchangeable(
-    communicators: list[MPI.Intracomm], shared_path: Path, ny: int, writes: bool, reads: bool
+    communicators: list[MPI.Intracomm],
+    shared_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    ny: int,
+    writes: bool,
+    reads: bool,
 ) -> None:
-    """`in_turn` or not, on any number of ranks: what one writes, all others read."""
+    """Together by MPI-IO or in turn, on any number of ranks: what one writes, all others read."""
     for writer in communicators:
         slab = Slab(writer, 5, ny)
         path = shared_path / f"{writer.size}.h5"
         make(path, slab)
         a, b = field(slab, 1), field(slab, 2)
-        hdf5.write(path, slab, [Part("a", (), a), Part("group/b", (), b), Part("stack", (2,), a)], in_turn=writes)
+        monkeypatch.setattr(hdf5, "MPI_IO", writes)
+        hdf5.write(path, slab, [Part("a", (), a), Part("group/b", (), b), Part("stack", (2,), a)])
+        monkeypatch.setattr(hdf5, "MPI_IO", reads)
         for reader in communicators:
             if reader.size > writer.size:
                 continue  # ranks that have not come to this file yet
             other = Slab(reader, 5, ny)
             found = [np.full(other.shape, np.nan) for _ in range(3)]
             names: tuple[tuple[str, tuple[int, ...]], ...] = (("a", ()), ("group/b", ()), ("stack", (2,)))
-            hdf5.read(path, other, [Part(*n, rows) for n, rows in zip(names, found, strict=True)], in_turn=reads)
+            hdf5.read(path, other, [Part(*n, rows) for n, rows in zip(names, found, strict=True)])
             for rows, seed in zip(found, (1, 2, 1), strict=True):
                 assert np.array_equal(rows, field(other, seed))
 
 
-def test_same_bytes(comm: MPI.Intracomm, shared_path: Path) -> None:
+def test_same_bytes(comm: MPI.Intracomm, shared_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     slab = Slab(comm, 6, 9)
-    for name, in_turn in (("together.h5", False), ("in turn.h5", True)):
+    for name, together in (("together.h5", True), ("in turn.h5", False)):
+        monkeypatch.setattr(hdf5, "MPI_IO", together)
         make(shared_path / name, slab)
-        hdf5.write(shared_path / name, slab, [Part("a", (), field(slab)), Part("stack", (1,), field(slab))], in_turn)
+        hdf5.write(shared_path / name, slab, [Part("a", (), field(slab)), Part("stack", (1,), field(slab))])
     comm.Barrier()
     assert (shared_path / "together.h5").read_bytes() == (shared_path / "in turn.h5").read_bytes()
 
@@ -81,14 +89,17 @@ def test_writing_leaves_all_else_alone(comm: MPI.Intracomm, shared_path: Path) -
     assert before[start + length :] == after[start + length :]
 
 
-@pytest.mark.parametrize("in_turn", [False, True])
-def test_one_error_for_all(comm: MPI.Intracomm, shared_path: Path, in_turn: bool) -> None:
+@pytest.mark.parametrize("together", [False, True])
+def test_one_error_for_all(
+    comm: MPI.Intracomm, shared_path: Path, monkeypatch: pytest.MonkeyPatch, together: bool
+) -> None:
+    monkeypatch.setattr(hdf5, "MPI_IO", together)
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     with pytest.raises(RunError, match=r"cannot open .*absent\.h5: No such file"):
-        hdf5.write(shared_path / "absent.h5", slab, [Part("a", (), field(slab))], in_turn)
+        hdf5.write(shared_path / "absent.h5", slab, [Part("a", (), field(slab))])
     make(path, slab)
     with pytest.raises(RunError, match=r"cannot write .*file\.h5"):
-        hdf5.write(path, slab, [Part("a", (), field(slab)), Part("absent", (), field(slab))], in_turn)
+        hdf5.write(path, slab, [Part("a", (), field(slab)), Part("absent", (), field(slab))])
     with pytest.raises(RunError, match=r"cannot make .*: No such file"):
         make(shared_path / "absent" / "file.h5", slab)
 
