@@ -1,8 +1,9 @@
-"""`grid: {points: auto}`: the mesh of fewest points on which the errors are those of `numerics.accuracy`.
+"""Words that stand for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
 
-It follows from the shortest wave of the surface, from the directions of sliding (`checks.cells`) and from a guess of
-the share in contact (`contact_share`). The mesh may make
-MESH_SHARE of the error of a march, whose time steps make the rest, and STEADY_SHARE of that of a friction curve.
+`auto` is the mesh of fewest points on which the errors are those of `numerics.accuracy`. It follows from the shortest
+wave of the surface, from the directions of sliding (`checks.cells`) and from a guess of the share in contact
+(`contact_share`). The mesh may make MESH_SHARE of the error of a march, whose time steps make the rest, and
+STEADY_SHARE of that of a friction curve.
 """
 
 from __future__ import annotations
@@ -16,19 +17,22 @@ from pydantic import Field, ValidationError
 from ..errors import InputError
 from .checks import cells
 from .contact_share import smallest_share
-from .measured import extent_of
 from .model import Job, prepared
 from .sections.calculation import Accuracy, Grid, Numerics
 from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
 from .sections.materials import Material
 from .sections.part import Origin, Part
-from .sections.quantities import AUTO_POINTS
+from .sections.quantities import AUTO_POINTS, FROM_SURFACE
 from .sections.stages import Initial, Stage, Steady
 from .text.places import UNREADABLE, Source
+from .text.python_data import is_array
 
 MESH_SHARE, STEADY_SHARE = 0.7, 0.9  # accuracy: of numerics.accuracy
 SPECTRUM = EntryPoint("spectrum", "parcontact.road.spectrum:of", "")  # reads tables; jobs that name none do without
+READER = EntryPoint("extent", "parcontact.road.map_files:extent_of", "")  # of the grid of a map
 MAP = EntryPoint("map", "parcontact.scene.rigid_surface:shortest_of", "")  # the same of maps
+KEYS = ("points", "size")  # of a grid, which a measured map has
+Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
 
 class Scenery(Part):
@@ -104,3 +108,43 @@ def _on_its_own_mesh(data: dict[str, Any], origin: Origin) -> Job:
     points, _ = extent_of(data["surface"], data["grid"].get("size"), origin)
     grid = {**data["grid"], "points": list(points)}
     return Job.model_validate({**data, "grid": grid}, context=origin)
+
+
+# -- the grid of a measured map ----------------------------------------------------------------------------------------
+
+
+def take_grid(source: Source, origin: Origin) -> None:
+    """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
+    grid = source.data.get("grid") if isinstance(source.data, dict) else None
+    wanted = [key for key in KEYS if isinstance(grid, dict) and grid.get(key) == FROM_SURFACE]
+    if not isinstance(grid, dict) or not wanted:
+        return
+    try:
+        points, size = extent_of(source.data.get("surface"), None if "size" in wanted else grid.get("size"), origin)
+        if size is None and "size" in wanted:
+            raise InputError("a measured map is needed; an array has points, but no size")
+        found = {"points": points, "size": size}
+        grid.update({key: list(found[key] or ()) for key in wanted})
+    except ValidationError:  # mistakes of the surface, which are told where it is read
+        grid.update(dict.fromkeys(wanted, UNREADABLE))
+    except InputError as error:
+        names = " and ".join(f"grid.{key}" for key in wanted)
+        source.note(source.locate(("grid", wanted[0])).place, f"{names}: {FROM_SURFACE}: {error}")
+        grid.update(dict.fromkeys(wanted, UNREADABLE))
+
+
+def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
+    """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
+    InputError."""
+    shapes = surface if isinstance(surface, list) else [surface]
+    heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
+    arrays = [given for given in heights if is_array(given)]
+    maps = [shape for shape in shapes if isinstance(shape, dict) and shape.get("shape") == "topography"]
+    if len(maps) + len(arrays) != 1:
+        raise InputError(f"one measured map, shape: topography, is needed, and the surface has {len(maps) or 'none'}")
+    if arrays:
+        if arrays[0].ndim != 2:
+            raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
+        return tuple(arrays[0].shape[::-1]), None
+    found: Extent = READER.load()(Topography.model_validate(maps[0], context=origin), box)
+    return found

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from ..errors import InputError, JobError
-from .chosen_mesh import choose_points
-from .measured import take_grid
+from .chosen_mesh import choose_points, take_grid
 from .model import Job
 from .sections.part import Origin
 from .text.fault import faults_of, shorten

@@ -9,8 +9,8 @@ from typing import Any
 
 import yaml
 
-from ..job import keys as job_keys
-from ..job.keys import Key, Section
+from ..job import schema
+from ..job.schema import Key, Section
 from ..job.sections.part import kind_key
 
 MEANINGS = Path(__file__).parent / "keys.yaml"
@@ -25,7 +25,7 @@ def meanings() -> dict[str, dict[str, Any]]:
 
 def keys() -> str:
     """All sections of a job and their keys, as Markdown."""
-    return "\n".join(line for section in job_keys.sections() for line in _section(section))
+    return "\n".join(line for section in schema.sections() for line in _section(section))
 
 
 def heading(section: Section) -> str:

@@ -10,7 +10,7 @@ import h5py
 from ..job import Job
 from ..job.sections.listing import plain
 from ..physics.budget import exceeds
-from ..storage import hdf5, provenance, references
+from ..storage import hdf5, provenance
 from ..storage.tables import read as read_table
 from ..summary.slide import ERRORS
 from . import log
@@ -118,4 +118,4 @@ def section(directory: Path, found: log.Log) -> Section:
 
 def list_citations(job: Job) -> Section:
     """Return what a paper that uses the results of a job should cite."""
-    return Section("What to cite", [f"{provenance.PROGRAM}", *references.lines(plain(job))])
+    return Section("What to cite", [f"{provenance.PROGRAM}", *provenance.cite_lines(plain(job))])

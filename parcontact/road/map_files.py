@@ -4,13 +4,16 @@ Heights point up, out of the road: what sticks out touches first.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import datafiles
 from ..errors import InputError
+from ..job import Topography
 from ..parallel.slab import Array
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
@@ -172,3 +175,26 @@ def _scale(path: Path, unit: object) -> float:
     if factor is None:
         raise InputError(f"{path}: its unit {unit} is no length")
     return float(factor)
+
+
+def extent_of(part: Topography, box: Any = None) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Points along x and y and size (lx, ly) [m] of a map, or of the part of it that is as large as a `box` [m]; a
+    mirrored map is twice as long. Raises InputError."""
+    points, size = _extent(part.path, part.path.stat().st_mtime_ns, part.unit, part.size, part.channel)
+    copies = 2 if part.periodic == "mirror" else 1
+    size = copies * size[0], copies * size[1]
+    lengths = box if isinstance(box, list | tuple) and len(box) == 2 else (box, box)
+    x, y = (
+        max(1, round(copies * n * (length / whole if isinstance(length, int | float) and length > 0 else 1.0)))
+        for n, length, whole in zip(points, lengths, size, strict=True)
+    )
+    return (x, y), size
+
+
+@lru_cache(maxsize=4)  # the cases of a sweep have the same map
+def _extent(
+    path: Path, _: int, unit: str | None, size: tuple[float, float] | None, channel: str | None
+) -> tuple[tuple[int, int], tuple[float, float]]:
+    found = read(path, unit, size, channel)
+    ny, nx = found.heights.shape
+    return (nx, ny), found.size

@@ -15,12 +15,12 @@ from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
-from ..storage import header, heights, references, row, wisdom
+from ..storage import header, heights, row, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.console import Console
 from ..storage.directory import Directory
 from ..storage.marker import Claim
-from ..storage.provenance import Link, Provenance, extended
+from ..storage.provenance import Link, Provenance, cite_lines, extended
 from ..storage.recorder import Recorder, Recording
 from . import half_mesh, restart, watch
 from .half_mesh import HalfMesh
@@ -144,7 +144,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extended(saved.chain if saved else (), link)
     included = str(job.included) if job.included else ""
-    return Provenance(chain, seeds, included, doubts, references=references.lines(listing.plain(job)))
+    return Provenance(chain, seeds, included, doubts, references=cite_lines(listing.plain(job)))
 
 
 def _open_files(

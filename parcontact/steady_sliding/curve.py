@@ -17,11 +17,11 @@ from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import sanity
-from ..storage import curve_points, hdf5, marker, references, stopfile
+from ..storage import curve_points, hdf5, marker, stopfile
 from ..storage.console import always
 from ..storage.curve_points import Wanted
 from ..storage.directory import ADVICE, Directory
-from ..storage.provenance import Link, Provenance
+from ..storage.provenance import Link, Provenance, cite_lines
 from ..storage.steady_maps import SteadyMaps
 from ..storage.stopfile import StopFile
 from .sliding import SteadySliding
@@ -147,7 +147,7 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
     """Make the file for the maps that the job asks for, if it does; collective."""
     if not job.output.fields:
         return None
-    cited = references.lines(listing.plain(job))
+    cited = cite_lines(listing.plain(job))
     provenance = Provenance((Link(job.resolved(), slab.comm.size),), references=cited)
     points = [point if wanted.temperatures else point[:2] for point in wanted.points]
     return SteadyMaps(directory.path / "steady.h5", slab, job.grid.size, job.output.fields, points, provenance)

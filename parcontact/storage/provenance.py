@@ -1,11 +1,12 @@
-"""The origin of a file: what an HDF5 file says about the runs that made it."""
+"""The origin of a file: what an HDF5 file says about the runs that made it, and what to cite for them."""
 
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -16,6 +17,7 @@ from .. import __version__
 
 PROGRAM = f"parcontact {__version__}"
 LIBRARIES = ("numpy", "pyfftw", "mpi4py", "h5py", "numba")
+REFERENCES = Path(__file__).with_name("references.txt")  # the method, and the work of others
 BUDGET = "error_budget"
 LEFT_OUT = "(too long to be kept)"
 WARNING_BYTES = 4_000  # tuning
@@ -109,3 +111,30 @@ def _chain_text(chain: Sequence[Link], job: str) -> str:
     while len(text := json.dumps(links)) > CHAIN_BYTES:
         links.pop(0)
     return text
+
+
+def cite_lines(job: dict[str, Any]) -> tuple[str, ...]:
+    """Return the references of a job, as plain data, with what they stand for, one a line."""
+    return tuple(f"{reference} ({what})" for reference, what in cite(job))
+
+
+def cite(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str, str]]:
+    """Return references of a resolved job, as plain data, and what they stand for; with those of further `features`.
+
+    Raises KeyError or TypeError for what is no whole job.
+    """
+    material, numerics = job["material"], job["numerics"]
+    shift = material.get("shift", "")
+    used = {
+        *("", *features),
+        f"kernel {numerics['kernel']}",
+        f"boundary {job['grid']['boundary']}",
+        f"shift {shift['law'] if isinstance(shift, dict) else shift}",
+        *(f"shape {shape['shape']}" for shape in job["surface"]),
+        *(f"interface {key}" for key in job.get("interface") or {}),
+    }
+    if material["model"] != "elastic":
+        used |= {"viscoelastic", f"integrator {numerics['integrator']}" if job.get("history") else ""}
+    lines = REFERENCES.read_text(encoding="utf-8").splitlines()[1:]
+    table = ([cell.strip() for cell in line.split("|")] for line in lines)
+    return [(reference, what) for feature, reference, what in table if feature in used]

@@ -10,7 +10,7 @@ import yaml
 from marching import ROOT
 
 from parcontact import __main__
-from parcontact.job import keys, schema
+from parcontact.job import schema
 from parcontact.job.text import yamltext
 
 JOBS = sorted(path for path in (ROOT / "jobs").rglob("*.yaml") if path.name != "rubber.yaml")
@@ -88,7 +88,7 @@ def test_a_job_needs_its_sections(validator: jsonschema.Draft202012Validator) ->
 
 def test_every_key_is_in_it(validator: jsonschema.Draft202012Validator) -> None:
     text = json.dumps(validator.schema)
-    assert not [key.word for section in keys.sections() for key in section.keys if f'"{key.word}":' not in text]
+    assert not [key.word for section in schema.sections() for key in section.keys if f'"{key.word}":' not in text]
 
 
 def test_nothing_is_left_open(validator: jsonschema.Draft202012Validator) -> None:

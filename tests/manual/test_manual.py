@@ -23,7 +23,7 @@ from parcontact.effects.adhesion import AdhesionColumns
 from parcontact.effects.interface import InterfaceColumns
 from parcontact.effects.leakage import LeakageColumns
 from parcontact.effects.thermal import ThermalColumns
-from parcontact.job import keys
+from parcontact.job import schema
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
 from parcontact.report import leak, prediction
@@ -106,11 +106,11 @@ def test_the_page_on_python_is_text() -> None:
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
     written = {part: set(known) for part, known in reference.meanings().items()}
-    assert written == {section.part.__name__: {key.word for key in section.keys} for section in keys.sections()}
+    assert written == {section.part.__name__: {key.word for key in section.keys} for section in schema.sections()}
 
 
 def examples() -> Iterator[Any]:
-    for section in keys.sections():
+    for section in schema.sections():
         for key in section.keys:
             yield pytest.param(section.part, key.word, id=f"{section.part.__name__}.{key.word}")
 
