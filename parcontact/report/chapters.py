@@ -29,7 +29,7 @@ def describe_directory(directory: Path) -> Chapter:
     if not there:
         raise InputError(f"{directory} holds no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
-    found, title, cited = log.read(directory), "", list[Section]()
+    found, title, cited = log.read(directory), "", origin.list_citations(None)
     jobs_there = [*(directory / name for name in JOBS), *sorted(directory.glob(f"cases/*/{RESOLVED}"))]
     if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
         job, warnings = _read_job(resolved)
@@ -38,11 +38,11 @@ def describe_directory(directory: Path) -> Chapter:
         sections += [asked, material.section(job), road.section(job)]
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job.numerics.asked.both)
-        cited = [origin.list_citations(job)]
+        cited = origin.list_citations(job)
         sections.append(Section("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
     said = "The tables, in SI units and with all digits, are inside this file:"
-    sections += [origin.section(directory, found), *cited, Section("Data", [said], downloads=data)]
+    sections += [origin.section(directory, found), cited, Section("Data", [said], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
     return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if one])
 

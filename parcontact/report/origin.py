@@ -116,6 +116,6 @@ def section(directory: Path, found: log.Log) -> Section:
     return Section("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
 
 
-def list_citations(job: Job) -> Section:
+def list_citations(job: Job | None) -> Section:
     """Return what a paper that uses the results of a job should cite."""
-    return Section("What to cite", [f"{provenance.PROGRAM}", *provenance.cite_lines(plain(job))])
+    return Section("What to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain(job)) if job else ())])

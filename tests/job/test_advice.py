@@ -37,17 +37,6 @@ def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
     assert "cells_per_step up to 2)" in warning
 
 
-def test_warning_of_a_tolerance_below_rounding(tmp_path: Path) -> None:
-    """Of the maps, which are in double precision with `mixed`, too."""
-    low = 8e-16
-    for precision in ("double", "mixed"):
-        chosen = f"numerics.precision={precision}"
-        (warning,) = job_of(tmp_path, SMALL, chosen, f"numerics.tolerance={low:e}").warnings
-        assert "that double precision reaches" in warning
-        assert warning.endswith("use a larger tolerance")
-        assert job_of(tmp_path, SMALL, chosen, f"numerics.tolerance={1.3 * low:e}").warnings == ()
-
-
 def test_warning_of_velocity_without_duration(tmp_path: Path) -> None:
     (warning,) = job_of(tmp_path, SMALL, "history.0.velocity=3").warnings
     assert warning == "history.0: nothing slides in a stage without duration or distance; its velocity has no effect"
