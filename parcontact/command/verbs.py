@@ -66,7 +66,7 @@ def check(options: argparse.Namespace) -> int:
     job = chosen[0].job
     print(jobs.describe(job))
     steps = describe_steps(job)
-    steps = steps and f"stages that choose their time steps: {steps}"
+    steps = steps and f"chosen time steps: {steps}"
     for text in filter(None, (job.included, job.origin.mesh, steps, *job.facts)):
         print(f"\n{text}")
     for warning in doubts_of(chosen, _doubts):

@@ -209,8 +209,8 @@ def describe_steps(job: Planned) -> str:
     if not names:
         return ""
     if not job.remembers:
-        return f"{names}: one cell of sliding per step and one step at rest, as an elastic body has no error of time"
+        return f"{names}, one cell of sliding per step and one step at rest, as an elastic body has no error of time"
     cells = most_cells(job)
     slides = any(stage.chooses and stage.speed for stage in job.history)
     limits = f", at most {cells} cell{'s' * (cells > 1)} of sliding" * slides
-    return f"{names}: by their estimated error, for numerics.accuracy {job.numerics.asked.of_steps:g}{limits}"
+    return f"{names}, by their estimated error, for numerics.accuracy {job.numerics.asked.of_steps:g}{limits}"

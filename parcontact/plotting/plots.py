@@ -152,6 +152,8 @@ def _draw_directory(directory: Path, options: Options) -> Figure:
         titles.append(_wrap(sweep.title(directory) or directory.absolute().name))
         groups += [options.to_panels([chart]) for chart in options.choose(sweep.charts(directory))]
     if not (has_run or has_curve or has_sweep):
+        if not directory.exists():
+            raise InputError(f"{directory} is no directory")
         lacking = f"it has no {MEASURES} and no {steady.TABLE}{_suggest(directory)}"
         raise InputError(f"{directory} holds no run and no friction curve: {lacking}")
     if options.panels and not any(groups):

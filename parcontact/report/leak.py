@@ -47,7 +47,10 @@ class Gaps:
 
     def __init__(self, directory: Path, at: str = "") -> None:
         if not (directory / "measures.csv").is_file():
-            raise InputError(f"{directory} is no output directory of a run; those of a sweep are in its cases/")
+            what = (
+                "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
+            )
+            raise InputError(f"{directory} is no {what}")
         job = shown_job(directory / RESOLVED)
         self.directory, self.sticks = directory, job.section("adhesion") is not None
         self.size, self.periodic = job.grid.size, job.grid.boundary == "periodic"

@@ -221,7 +221,7 @@ def describe_scene(scene: Scene) -> Iterator[str]:
     yield from describe_folded_branches(scene.folded, scene.choices.prony)
     yield from scene.job.facts
     if steps := describe_steps(scene.job):
-        yield f"stages that choose their time steps: {steps}"
+        yield f"chosen time steps: {steps}"
     if found := scene.setup.roughness:
         yield (
             f"surface: rms height {quantity(found.rms_height, 'm', 4)}, rms slope {found.rms_slope:.4g}, Nayak's "

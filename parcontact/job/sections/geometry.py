@@ -26,7 +26,8 @@ def _ordered(name: str, than: str) -> Rule:
 
     def check(shorter: float, longer: float) -> Iterator[Fault]:
         if shorter > longer:
-            yield Fault(f"must not be longer than {than} = {longer:g} m, got {shorter!r}", (name,))
+            limit = " and ".join(dict.fromkeys(("long_wavelength", than)))  # the latter may be the former by default
+            yield Fault(f"must not be longer than {limit}, {longer:g} m, got {shorter!r}", (name,))
 
     return Rule((name, than), check)
 

@@ -92,7 +92,8 @@ def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
     except yaml.MarkedYAMLError as error:
         began = f" ({error.context} in line {error.context_mark.line + 1})" if error.context_mark else ""
         mark = error.problem_mark or error.context_mark
-        source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}")
+        tabs = "; indent by blanks, not by tabs" if "\\t" in str(error.problem) else ""
+        source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}{tabs}")
     except yaml.reader.ReaderError as error:
         source.note(start, f"is not a text file in UTF-8: {error.reason} at position {error.position}")
     except yaml.YAMLError as error:
