@@ -27,7 +27,7 @@ FEWEST = 3  # accuracy: rows of numbers
 ABEL_NODES = 12  # accuracy: of Gauss' rule, in each piece of Abel's integral
 ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
 EDGE = 1e-9  # accuracy: relative: wavelengths that differ by this are the same
-COLUMN = re.compile(r"^(q|C1D|C2D)\[([^\]]+)\]$")
+HEADER = re.compile(r"q\[1/([^\]]+)\] (C1D|C2D)\[([^\]^]+)\^(\d)\]")
 FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
 
 
@@ -82,25 +82,22 @@ def _read(path: Path) -> tuple[Array, Array, int]:
 
 
 def _header(path: Path, number: int, cells: list[str]) -> tuple[tuple[float, float], int]:
-    found = [COLUMN.match(cell) for cell in cells]
-    if len(cells) != 2 or not (found[0] and found[1]) or found[0][1] != "q" or found[1][1] == "q":
+    """Factors that make SI units of both columns, and the power of m in that of the spectrum."""
+    found = HEADER.fullmatch(" ".join(cells))
+    if not found or not {found[1], found[3]} <= LENGTHS.keys() or int(found[4]) != POWERS[found[2]]:
         raise InputError(f"{path}, line {number}: {FORMS} were expected, got {' '.join(cells)[:60]!r}")
-    (_, rate), (name, unit) = found[0].groups(), found[1].groups()
-    power = POWERS[name]
-    length, raised = rate.removeprefix("1/"), unit.partition("^")[0]
-    if not rate.startswith("1/") or length not in LENGTHS or raised not in LENGTHS or unit != f"{raised}^{power}":
-        raise InputError(f"{path}, line {number}: units of {FORMS} were expected, got [{rate}] and [{unit}]")
-    return (1.0 / LENGTHS[length], LENGTHS[raised] ** power), power
+    power = POWERS[found[2]]
+    return (1.0 / LENGTHS[found[1]], LENGTHS[found[3]] ** power), power
 
 
 def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:
     try:
         q, value = map(float, cells)
+        if 0.0 < q < np.inf and 0.0 < value < np.inf:
+            return q, value
     except ValueError:
-        raise InputError(f"{path}, line {number}: two numbers were expected, got {' '.join(cells)[:60]!r}") from None
-    if not (0.0 < q < np.inf and 0.0 < value < np.inf):
-        raise InputError(f"{path}, line {number}: positive numbers were expected, got {' '.join(cells)[:60]!r}")
-    return q, value
+        pass
+    raise InputError(f"{path}, line {number}: two positive numbers were expected, got {' '.join(cells)[:60]!r}")
 
 
 def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tuple[Array, Array]:

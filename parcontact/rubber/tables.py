@@ -102,16 +102,13 @@ def _split(line: str) -> list[str]:
 def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column], int]:
     """The columns, and how many lines name them."""
     number, head = lines[0]
-    if worded := _with_units(head):
-        return worded, 1
+    cells = _split(re.sub(r"\s+(?=[\[(])", "", head))
+    with_units = [_with_unit(cell) for cell in cells]
+    if any(column and column.unit for column in with_units) and all(with_units):
+        return [column for column in with_units if column], 1
     if "[" in head:
-        spaced = re.sub(r"\s+\[", "[", head)
-        parts = [part for part in re.split(r"[,;\s]+", spaced) if part]
-        found = [re.fullmatch(r"([^\[]+)\[([^\]]*)\]", part) for part in parts]
-        if not all(found):
-            wrong = parts[found.index(None)]
-            raise InputError(f"{path}:{number}: {wrong!r} must be a name with its unit in brackets, such as f[Hz]")
-        return [_Column(_name(match[1]), match[2].strip()) for match in found if match], 1
+        wrong = cells[with_units.index(None)]
+        raise InputError(f"{path}:{number}: {wrong!r} must be a name with its unit in brackets, such as f[Hz]")
     names = [_name(name) for name in _split(head)]
     units = _split(lines[1][1]) if len(lines) > 1 else []
     units += [""] * (len(names) - len(units))
@@ -123,16 +120,12 @@ def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column
     return [_Column(*pair) for pair in zip(names, units, strict=False)], 2
 
 
-def _with_units(head: str) -> list[_Column]:
-    """The columns of a header of several words each, all of which name their units, but for tan delta; else none."""
-    columns = []
-    for part in _split(head) if re.search(r"[;\t,]", head) else ():
-        match = WITH_UNIT.fullmatch(part)
-        if match is None and _name(part) != "tan_del":
-            return []
-        unit = (match[2] or match[3] or "").strip() if match else ""
-        columns.append(_Column(_name(match[1]) if match else "tan_del", unit))
-    return columns
+def _with_unit(cell: str) -> _Column | None:
+    """The column of a cell that names its unit, which tan delta need not; None of another cell."""
+    if _name(cell) == "tan_del":
+        return _Column("tan_del", "")
+    match = WITH_UNIT.fullmatch(cell)
+    return _Column(_name(match[1]), (match[2] or match[3] or "").strip()) if match else None
 
 
 def _name(text: str) -> str:

@@ -107,7 +107,7 @@ def test_sweeps_that_do_not_overlap(tmp_path: Path) -> None:
     path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=(-20.0, 60.0))
     (text,) = compound.fitted(path, 0.5, None, "wlf", 0.05).doubts()
     assert text.startswith("the sweeps at -20 and 60 C do not overlap")
-    assert "measure at a temperature between" in text
+    assert "measure at a temperature in between" in text
     known = WLF(measured.C1, measured.C2, measured.REFERENCE)
     assert compound.fitted(path, 0.5, None, known, 0.05).doubts() == []
     whole = measured.write_sweeps(tmp_path / "whole.csv")
