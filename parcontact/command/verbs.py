@@ -260,9 +260,12 @@ def doctor(options: argparse.Namespace) -> int:
 @ranks.root_alone
 def manual(options: argparse.Namespace) -> int:
     """Print a page of the manual, or say which there are."""
+    import shutil
+
     from ..manual import texts
 
-    print(texts.plain(options.page, {"verbs": options.describe_verbs}) if options.page else texts.contents())
+    width = min(shutil.get_terminal_size().columns, 100)
+    print(texts.plain(options.page, {"verbs": options.describe_verbs}, width) if options.page else texts.contents())
     return DONE
 
 

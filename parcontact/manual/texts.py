@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..errors import InputError
-from . import docstrings, reference
+from . import docstrings, reference, terminal
 
 PAGES = Path(__file__).parent / "pages"
 MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
@@ -44,12 +44,13 @@ def page(name: str, writers: Writers | None = None) -> str:
     return MARK.sub(lambda found: known[found.group(1)](), text)
 
 
-def plain(name: str, writers: Writers | None = None) -> str:
-    """A page to be read in a terminal: without the marks of the web site."""
+def plain(name: str, writers: Writers | None = None, width: int = 80) -> str:
+    """A page to be read in a terminal of so many letters: without the marks of the web site."""
     text = FENCE.sub("", docstrings.written(page(name, writers)))
     text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
     text = re.sub(r"^\(.+\)=\n", "", text, flags=re.MULTILINE)
-    return re.sub(r"\n{3,}", "\n\n", re.sub(r"^```\{(\w+)\}", r"```\1", text, flags=re.MULTILINE))
+    text = re.sub(r"^```\{(\w+)\}", r"```\1", text, flags=re.MULTILINE)
+    return re.sub(r"\n{3,}", "\n\n", terminal.wrapped(text, width))
 
 
 def _reference(found: re.Match[str]) -> str:
