@@ -6,11 +6,9 @@ error on one rank is raised on all, as a RunError in one sentence.
 """
 
 import errno
-import io
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -67,24 +65,6 @@ def sync_one(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def overwrite(handle: int, data: bytes | memoryview, position: int) -> None:
-    """Write all of `data` to its place in a file."""
-    _transfer(partial(os.pwrite, handle), memoryview(data), position)
-
-
-def _transfer(act: Callable[[memoryview, int], int], rest: memoryview, position: int) -> None:
-    """Write or read all of `rest` at a position: the system may take less at a time."""
-    while rest:
-        done = act(rest, position)
-        if not done:
-            raise ValueError("it ends early")
-        rest, position = rest[done:], position + done
-
-
-def _read_at(handle: int, data: memoryview, position: int) -> int:
-    return os.preadv(handle, [data], position)
 
 
 def on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
@@ -151,10 +131,11 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[in
     for rank in range(slab.comm.size):
         if rank == slab.comm.rank and slab.shape[0]:
             try:
-                with io.FileIO(path, "r+" if writes else "r") as file:
-                    act = partial(os.pwrite if writes else _read_at, file.fileno())
+                with path.open("r+b") if writes else path.open("rb") as file:
                     for part, place in zip(parts, places, strict=True):
-                        _transfer(act, part.rows.data.cast("B"), place)
+                        file.seek(place)
+                        if (file.write if writes else file.readinto)(part.rows.data.cast("B")) < part.rows.nbytes:
+                            raise ValueError("it ends early")
             except FAILURES as error:
                 problem = reason(error)
         slab.comm.Barrier()
@@ -220,7 +201,8 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
         types = {name: file[name].dtype for name in values}
     with path.open("r+b") as target:
         for name, numbers in values.items():
-            overwrite(target.fileno(), numbers.astype(types[name]).tobytes(), places[name])
+            target.seek(places[name])
+            target.write(numbers.astype(types[name]).tobytes())
 
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
