@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..parallel.root import on_root
@@ -40,11 +41,11 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     afresh = getattr(options, "restart", "") == "never" or not runs
     groups = Groups(world, on_root(world, lambda: count_side_by_side(sweep.to_do(chosen, afresh), world.size)))
     limit = watch.limit(getattr(options, "wall", None))
-    manner = sweep.Manner(options.quiet, limit, told, runs)
     own = argparse.Namespace(**vars(options))
     stop = on_root(world, lambda: sweep.stop_file(cases))
     own.quiet, own.others_file = options.quiet or groups.count > 1, stop
-    return sweep.run(cases, chosen, groups, lambda job, slab, shows: act(own, job, slab, shows), stop, manner)
+    whole = sweep.Sweep(cases, groups, partial(act, own), stop, options.quiet, limit, told, runs)
+    return whole.run(chosen)
 
 
 def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TextIO
 
@@ -31,61 +32,55 @@ Act = Callable[[Job, Slab, Shows], int]
 
 
 @dataclass(frozen=True)
-class Manner:
-    """Manner of a sweep: `quiet`; until when at most, `limit` in the time of `time.monotonic`; `told`, the warnings
-    that were shown before. Unless it `runs` its cases, their failures are not noted."""
-
-    quiet: bool = False
-    limit: float | None = None
-    told: Sequence[str] = ()
-    runs: bool = True
-
-
-def run(
-    cases: Sequence[Case], chosen: Sequence[Case], groups: Groups, act: Act, stop: StopFile, manner: Manner = Manner()
-) -> int:
-    """Do `act` with each of the chosen cases, and collect what all have come to; collective. Returns the exit code.
+class Sweep:
+    """A sweep of `cases`, with each of which `act` is done; making one and its methods are collective.
 
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
-    and what says whether a warning is shown.
-
-    A case that fails does not stop the others: the code is 1 in the end. One that another program runs is skipped, like
-    those that have finished; if it is the only one, InUseError is raised. One that stops early with a checkpoint stops
-    the sweep, with its code, and the cases beside it, but no other program: the same command goes on with them. So do
-    the file `stop`, which stops other programs too, and the end of the wall time. The file stays: others may not have
-    seen it yet, and it stops no later one.
+    and what says whether a warning is shown. `limit` is until when at most, in the time of `time.monotonic`; `told` are
+    the warnings that were shown before. Unless it `runs` its cases, their failures are not noted.
     """
-    doubts = SweepWarnings(manner.told, at_once=groups.count == 1)
-    code = _Turns(cases, groups, act, stop, manner, doubts).take(_deal(chosen, groups))
-    with Signals().noted():  # one that ends the ranks that wait here would end the others with them
-        found = groups.from_all((code, doubts.kinds))
-    codes = [one for one, _ in found]
-    if groups.root:
-        stop.forget_own()
-        for text in doubts.summary([kinds for _, kinds in found]):
-            print_line(f"warning: {text}", sys.stderr)
-        if STOPPED_EARLY not in codes and not manner.quiet:
-            print_line(f"results of all cases: {_directory(cases) / sweep_table.TABLE}")
-    return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
-
-
-@dataclass(frozen=True)
-class _Turns:
-    """Turns of one group of ranks in a sweep of `cases`."""
 
     cases: Sequence[Case]
     groups: Groups
     act: Act
     stop: StopFile
-    manner: Manner
-    doubts: SweepWarnings
+    quiet: bool = False
+    limit: float | None = None
+    told: Sequence[str] = ()
+    runs: bool = True
 
-    def take(self, own: Sequence[Case]) -> int:
+    @cached_property
+    def doubts(self) -> SweepWarnings:
+        """The warnings of this group of ranks."""
+        return SweepWarnings(self.told, at_once=self.groups.count == 1)
+
+    def run(self, chosen: Sequence[Case]) -> int:
+        """Do the chosen cases, and collect what all have come to. Returns the exit code.
+
+        A case that fails does not stop the others: the code is 1 in the end. One that another program runs is skipped,
+        like those that have finished; if it is the only one, InUseError is raised. One that stops early with a
+        checkpoint stops the sweep, with its code, and the cases beside it, but no other program: the same command goes
+        on with them. So do the file `stop`, which stops other programs too, and the end of the wall time. The file
+        stays: others may not have seen it yet, and it stops no later one.
+        """
+        code = self._take(_deal(chosen, self.groups))
+        with Signals().noted():  # one that ends the ranks that wait here would end the others with them
+            found = self.groups.from_all((code, self.doubts.kinds))
+        codes = [one for one, _ in found]
+        if self.groups.root:
+            self.stop.forget_own()
+            for text in self.doubts.summary([kinds for _, kinds in found]):
+                print_line(f"warning: {text}", sys.stderr)
+            if STOPPED_EARLY not in codes and not self.quiet:
+                print_line(f"results of all cases: {_directory(self.cases) / sweep_table.TABLE}")
+        return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
+
+    def _take(self, own: Sequence[Case]) -> int:
         """Do the cases of the group; returns the exit code. If it stops early, so do the others."""
         code, side_by_side = DONE, self.groups.count > 1
         for case in own:
             slab = Slab(self.groups.comm, *case.job.grid.points)
-            speaks = slab.root and not self.manner.quiet
+            speaks = slab.root and not self.quiet
             if reason := slab.agree(self._reason_to_stop() if slab.root else ""):
                 if speaks:
                     print_line(f"stopped before case {case.number}: {reason}; run again to go on")
@@ -105,8 +100,7 @@ class _Turns:
         return code
 
     def _reason_to_stop(self) -> str:
-        limit = self.manner.limit
-        if limit is not None and time.monotonic() + watch.RESERVE_SECONDS > limit:
+        if self.limit is not None and time.monotonic() + watch.RESERVE_SECONDS > self.limit:
             return watch.REASONS[watch.WALL]
         return watch.REASONS[watch.FILE] if self.stop.asks else ""
 
@@ -124,7 +118,7 @@ class _Turns:
             return ELSEWHERE
         except (InputError, RunError) as error:
             code, reason = FAILED, str(error)
-        if slab.root and self.manner.runs:
+        if slab.root and self.runs:
             sweep_table.fail(case, reason or ("some points have failed" if code == FAILED else ""))
         if slab.root and reason:
             print_line(f"parcontact: case {case.number}: {reason}", sys.stderr)

@@ -54,7 +54,7 @@ def cases_in_groups(directory: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[t
 
 def go(cases: tuple[Case, ...], act: Callable[[Job, Slab], int]) -> int:
     groups, stop = Groups(MPI.COMM_SELF), sweep.stop_file(cases)
-    return sweep.run(cases, cases, groups, lambda job, slab, _: act(job, slab), stop, sweep.Manner(quiet=True))
+    return sweep.Sweep(cases, groups, lambda job, slab, _: act(job, slab), stop, quiet=True).run(cases)
 
 
 def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, list[int]]:
@@ -92,8 +92,8 @@ def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys
         return 0
 
     for seconds, code in ((1.0, 3), (60.0, 0)):
-        manner = sweep.Manner(limit=watch.limit(watch.age() + seconds, {}))
-        assert sweep.run(cases[:2], cases[:2], Groups(MPI.COMM_SELF), act, sweep.stop_file(cases), manner) == code
+        limit, alone = watch.limit(watch.age() + seconds, {}), Groups(MPI.COMM_SELF)
+        assert sweep.Sweep(cases[:2], alone, act, sweep.stop_file(cases), limit=limit).run(cases[:2]) == code
         assert len(begun) == (0 if code else 2)
     said = capsys.readouterr().out.splitlines()[0]
     assert said == "stopped before case 0: the wall time is nearly used up; run again to go on"
@@ -118,7 +118,7 @@ def test_groups_of_ranks_take_cases_by_turns(
             raise RunError("it fell over")
         return 0
 
-    assert sweep.run(cases, cases, groups, act, sweep.stop_file(cases)) == 1
+    assert sweep.Sweep(cases, groups, act, sweep.stop_file(cases)).run(cases) == 1
     assert groups.from_all(begun) == [list(range(6))[number :: groups.count] for number in range(groups.count)]
     said = capsys.readouterr()
     told = "".join(world.allgather(said.err)).splitlines()
@@ -133,7 +133,7 @@ def test_groups_of_ranks_take_cases_by_turns(
     if world.rank == 0:
         stop.path.touch()
     world.Barrier()
-    assert sweep.run(cases, cases, groups, act, stop) == 3
+    assert sweep.Sweep(cases, groups, act, stop).run(cases) == 3
     assert begun == list(range(6))[groups.number :: groups.count]
     assert stop.path.exists()
 

@@ -50,14 +50,14 @@ def test_a_stop_file_ends_all_that_run(tmp_path: Path, monkeypatch: pytest.Monke
         return 3
 
     for chosen, stop in zip((cases, cases, cases[2:3]), stops, strict=True):
-        assert sweep.run(cases, chosen, Groups(MPI.COMM_SELF), act, stop) == 3
+        assert sweep.Sweep(cases, Groups(MPI.COMM_SELF), act, stop).run(chosen) == 3
     assert begun == ["000"]
     later = sweep.stop_file(cases)
-    assert sweep.run(cases, cases[1:3], Groups(MPI.COMM_SELF), lambda *_: 0, later) == 0
+    assert sweep.Sweep(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases[1:3]) == 0
     asked = [later.asks]
     os.utime(later.path, ns=(1, 1))
     assert [*asked, later.asks] == [False, True]
-    assert sweep.run(cases, cases, Groups(MPI.COMM_SELF), lambda *_: 0, later) == 3
+    assert sweep.Sweep(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases) == 3
 
 
 @pytest.mark.mpi
@@ -76,6 +76,6 @@ def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.M
         asked.append(other.asks)
         return 3 if groups.number == groups.count - 1 else 0
 
-    assert sweep.run(cases, cases, groups, act, stop) == 3
+    assert sweep.Sweep(cases, groups, act, stop).run(cases) == 3
     assert groups.from_all(begun) == [[number] for number in range(groups.count)]
     assert (any(asked), stop.path.exists(), stop.own.exists()) == (False, False, False)
