@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..scene import set_up
 from ..steady_sliding import curve
 from ..steady_sliding.point import Point
 from ..steady_sliding.sliding import SteadySliding
-from ..steady_sliding.table import describe_missed
+from ..steady_sliding.table import describe_missed, value_of
 from ..storage.curve_points import Wanted
 from .given_jobs import Given, all_ranks, read, warn_of
 
@@ -64,9 +64,6 @@ class Curve:
     flash_temperature: Array
     max_temperature: Array
     failures: tuple[str, ...] = ()
-
-
-MEASURED = ("contact_area", "contact_area_corrected", "force_x", "force_y", "approach", "mean_gap", "max_pressure")
 
 
 def steady(
@@ -115,29 +112,14 @@ def steady(
 
 
 def _curve(wanted: Sequence[Wanted], points: Sequence[Point | None], failures: tuple[str, ...]) -> Curve:
-    def each(value: Callable[[Point], float]) -> Array:
-        return np.array([math.nan if point is None else value(point) for point in points])
-
-    def all_of(name: str) -> Array:
-        return each(lambda point: getattr(point.measures, name))
-
+    """Return the columns of steady.csv by their names, as arrays; where a point is, it was asked for."""
+    places = {"velocity": "speed", "pressure": "pressure", "temperature": "temperature"}
+    found = {name: np.array([getattr(at, place) for at in wanted]) for name, place in places.items()}
+    for name in (each.name for each in fields(Curve) if each.name not in (*places, "power", "failures")):
+        found[name] = np.array([math.nan if point is None else value_of(point, name) for point in points])
     branches = max((len(point.dissipated) for point in points if point), default=0)
-    return Curve(
-        np.array([at.speed for at in wanted]),
-        np.array([at.pressure for at in wanted]),
-        **{name: all_of(name) for name in MEASURED},
-        friction=each(lambda point: point.friction),
-        friction_slopes=all_of("friction"),
-        error_friction=each(lambda point: point.error_friction),
-        error_area=each(lambda point: point.errors.area.total),
-        residual=each(lambda point: point.certificate.worst),
-        power=np.array([(math.nan,) * branches if point is None else point.dissipated for point in points]),
-        temperature=np.array([at.temperature for at in wanted]),
-        shift_factor=np.array([math.nan if point is None else point.shift_factor for point in points]),
-        flash_temperature=each(lambda point: point.flash.mean if point.flash else math.nan),
-        max_temperature=each(lambda point: point.flash.highest if point.flash else math.nan),
-        failures=failures,
-    )
+    power = np.array([(math.nan,) * branches if point is None else point.dissipated for point in points])
+    return Curve(**found, power=power, failures=failures)
 
 
 def _numbers(name: str, values: Values, ranges: bool = True) -> tuple[float, ...]:

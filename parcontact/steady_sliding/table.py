@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,30 @@ HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 QUARTILES = ("lower_temperature", "upper_temperature")  # of the rise over the contact, with `thermal`
 FEEDBACK = ("friction_cold", "flash_shift", "rounds")  # with the feedback of `thermal`
 WAVES = ("velocity", "pressure", "wavelength", "share")
+FOUND: dict[str, Callable[[Point], float]] = {  # columns that are neither of the point nor of its measures by name
+    "velocity": lambda point: point.speed,
+    "pressure": lambda point: point.measures.pressure,
+    "friction_x": lambda point: point.friction * (point.velocity[0] / point.speed),
+    "friction_slopes": lambda point: point.measures.friction,
+    "friction_viscous": lambda point: point.friction - point.measures.friction_interface,
+    "residual": lambda point: point.certificate.worst,
+    "penetration": lambda point: point.certificate.penetration,
+    "operator_calls": lambda point: round(point.operator_calls, 2),
+    "seconds": lambda point: round(point.seconds, 3),
+    "error_area": lambda point: point.errors.area.total,
+    "flash_temperature": lambda point: point.flash.mean if point.flash else math.nan,
+    "max_temperature": lambda point: point.flash.highest if point.flash else math.nan,
+    "lower_temperature": lambda point: point.flash.lower if point.flash else math.nan,
+    "upper_temperature": lambda point: point.flash.upper if point.flash else math.nan,
+    "flash_shift": lambda point: point.shift_factor,
+}
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # the area as corrected
+
+
+def value_of(point: Point, name: str) -> float:
+    """Return what a point has in a column, but those of the branches."""
+    own = getattr(point, name, None) if name not in FOUND else FOUND[name](point)
+    return float(getattr(point.measures, name) if own is None else own)
 
 
 class CurveTable:
@@ -91,26 +113,19 @@ class CurveTable:
             self._console.warn(text, shown(text))
 
     def write(self, point: Point, waves: Any) -> None:
-        m, c, speed = point.measures, point.certificate, point.speed
-        forces = (m.force_x, m.force_y, point.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
-        solve = (c.worst, c.penetration, round(point.operator_calls, 2), round(point.seconds, 3))
-        last = [point.friction * (point.velocity[0] / speed), m.contact_area_corrected]
-        last += (point.temperature, point.shift_factor) if self.heated else ()
-        last += (point.friction - m.friction_interface, m.friction_interface) if self.interface else ()
-        warm = astuple(point.flash) if point.flash else ()
-        last += (*warm, point.friction_cold, point.shift_factor, point.rounds)[: len(self.thermal)]
-        last += point.error_friction, point.errors.area.total, m.friction
+        m, speed = point.measures, point.speed
         if self._waves:
             for wavelength, share in zip(*waves, strict=True):
                 self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
-        cells = [speed, m.pressure, *forces, *solve, *point.dissipated, *last]
+        lost = {f"dissipated_{k}": power for k, power in enumerate(point.dissipated)}
+        cells = [lost[name] if name in lost else value_of(point, name) for name in self._names]
         self._file.append([repr(float(value)) for value in cells])
         self._points.append(point)
         self.say(
             f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.errors.area.total)} "
             f"{point.friction:9.6f} "
             f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
-            f"{c.worst:9.2e}{f' {point.temperature:7g}' if self.heated else ''}"
+            f"{point.certificate.worst:9.2e}{f' {point.temperature:7g}' if self.heated else ''}"
         )
 
     def conclude(self, failures: int) -> None:
