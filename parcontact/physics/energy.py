@@ -114,6 +114,8 @@ class ElasticEnergy:
 class AppliedInverse:
     """`A^-1 du` by an operator K that is the inverse of A; `scratch()` is a map that is free until the next solve."""
 
+    bodies: tuple[ZenerBody, ...] = ()  # that relax
+
     def __init__(self, inverse: Inverse, scratch: Callable[[], Array]) -> None:
         self._inverse, self._scratch = inverse, scratch
 
@@ -145,6 +147,7 @@ class ElasticPressure:
 
     def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
         self.body = ZenerBody(slab, prony, integrator)
+        self.bodies: tuple[ZenerBody, ...] = (self.body,)
 
     @staticmethod
     def count_maps(branches: int) -> MapCount:
@@ -182,7 +185,7 @@ class ZenerEnergy:
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
     ) -> None:
         self.slab, self.material, self.inverse, self.unit = slab, material, inverse, unit
-        self.bodies = (inverse.body,) if isinstance(inverse, ElasticPressure) else ()
+        self.bodies = inverse.bodies
 
     def at_rest(self) -> EnergyMemory:
         """Return the energies of a body into which nothing has been pressed."""
