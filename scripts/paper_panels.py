@@ -17,6 +17,10 @@ from parcontact.summary import sweep_table, theory_settings
 QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
 WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
 TITLE = 6.5  # points, of the title of a legend
+LOOKS: tuple[tuple[dict[str, Any], str, str, bool], ...] = (  # of sweeps: points, theory, its error; with names
+    ({"fmt": "o-"}, "--", "-", True),
+    ({"fmt": "D", "mfc": "none"}, ":", ":", False),  # on a finer grid
+)
 
 
 class MissingError(Exception):
@@ -72,26 +76,29 @@ def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> 
 
     The same on a finer grid, in the directory NAME_1024, has open markers, its theory dotted lines.
     """
-    rows = sweep_table.read(there(out / name / "sweep.csv"))
-    finer = out / f"{name}_1024" / "sweep.csv"
-    fine = sweep_table.read(finer) if finer.is_file() else []
+    there(out / name / "sweep.csv")
+    found = [
+        sweep_table.read(path)
+        for path in (out / name / "sweep.csv", out / f"{name}_1024" / "sweep.csv")
+        if path.is_file()
+    ]
     figure, (top, middle, bottom) = panels(3, 1.75)
-    for number, (axes, (column, short)) in enumerate(zip((top, top, middle), QUANTITIES, strict=True)):
-        color = style.COLORS[number]
-        x, y, spread = means(rows, key, column)
-        axes.errorbar(scale * x, y, spread, fmt="o-", color=color, capsize=2, label=f"{short}, simulation")
-        tx, theory, _ = means(rows, key, f"theory_{column}")
-        axes.plot(scale * tx, theory, "--", color=color, label=f"{short}, theory")
-        if x.size == tx.size:
-            bottom.plot(scale * x, 100 * (theory - y) / y, "os^"[number] + "-", color=color, label=short)
-        if fine:
-            _finer_points(axes, bottom, fine, key, scale, number)
+    for rows, (marks, dashes, line, told) in zip(found, LOOKS, strict=False):
+        for number, (axes, (column, short)) in enumerate(zip((top, top, middle), QUANTITIES, strict=True)):
+            look = {"color": style.COLORS[number]}
+            (x, y, spread), (tx, theory, _) = (means(rows, key, each) for each in (column, f"theory_{column}"))
+            names = [f"{short}, simulation", f"{short}, theory", short] if told else [None] * 3
+            axes.errorbar(scale * x, y, spread if told else None, label=names[0], capsize=2, **marks, **look)
+            axes.plot(scale * tx, theory, dashes, label=names[1], **look)
+            if x.size == tx.size:
+                kind = {"mfc": marks.get("mfc"), "label": names[2]}
+                bottom.plot(scale * x, 100 * (theory - y) / y, "os^"[number] + line, **look, **kind)
     top.set(ylabel="friction coefficient", ylim=(0, 1.7 * top.get_ylim()[1]))
     middle.set(ylabel="contact area ratio", yscale="log")
     bottom.axhline(0, color=style.GREY, lw=0.6)
     bottom.set(ylabel="theory − simulation [%]", xlabel=label)
     bottom.set_ylim(top=0.4 * abs(bottom.get_ylim()[0]))
-    if fine:
+    if len(found) > 1:
         bottom.plot([], [], "D:", color=style.GREY, mfc="none", label="1024 × 1024")
     for axes in (top, middle, bottom):
         axes.set_xscale("log")
@@ -99,16 +106,3 @@ def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> 
     middle.legend()
     bottom.legend(loc="upper right", ncols=2)
     return figure
-
-
-def _finer_points(
-    axes: Axes, bottom: Axes, rows: Sequence[dict[str, Any]], key: str, scale: float, number: int
-) -> None:
-    """A quantity of a sweep on a finer grid: the simulation, its theory, and below the error of that."""
-    (column, _), color = QUANTITIES[number], style.COLORS[number]
-    x, y, _ = means(rows, key, column)
-    tx, theory, _ = means(rows, key, f"theory_{column}")
-    axes.plot(scale * x, y, "D", color=color, mfc="none")
-    axes.plot(scale * tx, theory, ":", color=color)
-    if x.size == tx.size:
-        bottom.plot(scale * x, 100 * (theory - y) / y, "os^"[number] + ":", color=color, mfc="none")
