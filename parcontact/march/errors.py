@@ -50,17 +50,6 @@ class LastObservation:
         """Return what was seen in a step."""
         return cls(float(step.stage), step.dt, 1.0, observed)
 
-    @property
-    def numbers(self) -> list[float]:
-        """All numbers, as a checkpoint has them."""
-        return [self.stage, self.dt, self.so_far, *self.observed]
-
-    @classmethod
-    def of_numbers(cls, numbers: list[float]) -> "LastObservation":
-        """Return the one of a checkpoint."""
-        stage, dt, so_far, *observed = numbers
-        return cls(stage, dt, so_far, tuple(observed))
-
 
 @dataclass(frozen=True)
 class Observations:
@@ -71,17 +60,15 @@ class Observations:
 
     def entries(self) -> dict[str, Entry]:
         """Return the entries of both; a checkpoint may lack them."""
-        observations = {PAIR: self.pair, VIEWS: self.views}
-        return {name: Entry(np.array(look.numbers), optional=True) for name, look in observations.items()}
+        looks = {PAIR: self.pair, VIEWS: self.views}
+        numbers = {name: [look.stage, look.dt, look.so_far, *look.observed] for name, look in looks.items()}
+        return {name: Entry(np.array(each), optional=True) for name, each in numbers.items()}
 
     @classmethod
     def restored(cls, saved: Saved) -> "Observations":
         """Return the looks of a checkpoint; one that it does not have is followed by a new one."""
-        pair, views = (
-            LastObservation.of_numbers(saved[name].tolist()) if name in saved else LastObservation()
-            for name in (PAIR, VIEWS)
-        )
-        return cls(pair, views)
+        found = (saved[name].tolist() if name in saved else [] for name in (PAIR, VIEWS))
+        return cls(*(LastObservation(*numbers[:3], observed=tuple(numbers[3:])) for numbers in found))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from parcontact.storage.provenance import Link, Provenance
 
 FIELDS = ("pressure", "displacement", "gap", "height")
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1e-4, "rms_slope": 0.02}
+SPHERE = {"shape": "sphere", "radius": 1e-2}
 ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "relaxation_time": 1e-3}]}
 STANDS = [{"pressure": 5e3}, {"pressure": 1e4}]
@@ -156,15 +157,16 @@ def test_a_failed_step_is_none(material: dict[str, Any], history: list[dict[str,
     assert all(np.array_equal(march.field(name), smooth.field(name)) for name in FIELDS)
 
 
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_without_load_the_surface_just_touches(boundary: str) -> None:
-    """Before the first step as after one that takes the load away: no gap is negative, the smallest is 0.
+@pytest.mark.parametrize(("boundary", "surface"), [("periodic", ROUGH), ("free", ROUGH), ("free", SPHERE)])
+def test_without_load_the_surface_just_touches(boundary: str, surface: dict[str, Any]) -> None:
+    """Before the first step as after one that takes the load away: no gap is negative, the smallest is 0. The mean of
+    a rough surface is 0, that of a sphere is not.
 
     To the rounding of heights in double precision.
     """
     unloads = [{"pressure": 5e3}, {"pressure": 0.0}]
     grid = {"points": 32, "size": 1e-3, "boundary": boundary}
-    march = begun(job(ELASTIC, unloads, grid=grid, output={}))
+    march = begun(job(ELASTIC, unloads, grid=grid, surface=surface, output={}))
     before, gaps, height = march.row.measures, march.field("gap"), np.ptp(march.field("height"))
     assert abs(gaps.min()) <= 1e-12 * height
     assert before.mean_gap == pytest.approx(gaps.mean(), rel=1e-12)
@@ -181,3 +183,13 @@ def test_at_first_the_highest_point_just_touches(tmp_path: Path) -> None:
     march = begun(job(ELASTIC, STANDS, surface={"shape": "file", "path": str(tmp_path / "heights.npy")}))
     assert march.row.measures.approach == pytest.approx(-heights.max(), rel=1e-12)
     assert march.row.measures.mean_gap == pytest.approx(heights.max() - heights.mean(), rel=1e-12)
+
+
+def test_energies_are_in_joules() -> None:
+    """An elastic body stores half of pressure times displacement; what is done to rubber is stored or lost. Rounding."""
+    march, rows = marched(job(ELASTIC, SLIDES))
+    half = 0.5 * float(np.sum(march.field("pressure") * march.field("displacement"))) * (1e-3 / 32) ** 2
+    assert (rows[-1].stored, rows[-1].work, rows[-1].dissipated) == (pytest.approx(half, rel=1e-12),) * 2 + (0.0,)
+    last = marched(job(RUBBER, SLIDES))[1][-1]
+    assert 0.0 < last.dissipated == pytest.approx(sum(last.branch_dissipation), rel=1e-14)
+    assert last.work == pytest.approx(last.stored + last.dissipated, rel=1e-12)
