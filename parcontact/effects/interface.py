@@ -15,7 +15,7 @@ from ..physics.interface import InterfaceFriction
 from ..physics.measures import Measures
 from .effect import Decision, Effect, Instant
 
-LEAST_POISSON = 0.49  # below it shear moves the surface, and the solve would have to be coupled
+LEAST_POISSON = 0.49  # physics: below it shear moves the surface, and the solve would have to be coupled
 
 
 def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:

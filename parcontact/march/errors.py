@@ -27,8 +27,8 @@ from .sticking import StuckContact
 
 PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
-ALIKE_STEPS = 4  # of one stage and one length, to which one look at the embedded pair applies at most; tuning
-ALIKE_VIEWS = 5  # the same of the two views of friction; odd, as steps may be quarters of a cell
+ALIKE_STEPS = 4  # tuning: of one stage and one length, to which one look at the embedded pair applies at most
+ALIKE_VIEWS = 5  # tuning: the same of the two views of friction; odd, as steps may be quarters of a cell
 
 
 @dataclass(frozen=True)

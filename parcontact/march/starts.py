@@ -26,9 +26,9 @@ from ..physics.motion import are_whole, cells_between
 from ..scene import Scene
 
 NAME = "contact/iterations of starts"  # in a checkpoint
-TRY_AGAIN = 16  # steps after which the kind of start that was worse may have become the better one; tuning
-FORGET = 128  # steps without a choice after which nothing is known any more; tuning
-LEAST_MOVED, LEAST_EXTRAPOLATED = 0.0, 1.0  # iterations that a solve takes with each, if nothing is known
+TRY_AGAIN = 16  # tuning: steps after which the kind of start that was worse may have become the better one
+FORGET = 128  # tuning: steps without a choice after which nothing is known any more
+LEAST_MOVED, LEAST_EXTRAPOLATED = 0.0, 1.0  # tuning: iterations that a solve takes with each, if nothing is known
 
 
 class Past(NamedTuple):

@@ -28,7 +28,7 @@ from .starts import Past, StartStatistics
 from .sticking import StickingMemory
 from .tolerance import StepTolerance, follows
 
-FURTHER = 2  # pressures before the earlier one that are kept for starts, of three and of four steps ago
+FURTHER = 2  # tuning: pressures before the earlier one that are kept for starts, of three and of four steps ago
 MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these
 
 

@@ -44,6 +44,7 @@ from .entries import Entry, Saved
 from .mesh_error import SPOTS_ORDER, SPOTS_POWER, WAVES_ORDER, area_by_mesh, friction_by_mesh
 from .time_error import RunProperties, StepObservation, count_spots, share_of_area, time_error
 
+# accuracy: these constants are fitted to true errors, as the text above says
 SOLVER_FRICTION = 1.1  # times the complementarity, over the power SPOTS_POWER of the number of spots
 SOLVER_AREA, SOLVER_AREA_POWER = 0.1, 0.7  # times this power of it
 PENETRATING = 0.8  # of the points that penetrate without pressure are missing in the contact, but for those in excess

@@ -24,7 +24,7 @@ from .entries import Entry, MapCount, Saved, part_of, prefixed
 from .prony import Prony
 from .units import Units
 
-SMALL = 1e-2  # z below which differences of exponentials are summed as series, here to ten digits
+SMALL = 1e-2  # rounding: z below which differences of exponentials are summed as series, here to ten digits
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from .prony import Prony, complex_modulus
 
 Vector = tuple[float, float]
 SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: of waves along the depth, in ln m, and over wavenumbers
-LAYER_DEPTH = 3.0  # wavenumber times thickness from which on heat lies half a thickness deep
+LAYER_DEPTH = 3.0  # physics: wavenumber times thickness from which on heat lies half a thickness deep
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import math
 
 from .time_error import RunProperties, StepObservation, Vector, count_spots, spot_radius
 
+# accuracy: these constants are fitted to true errors, as the text above says
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 SPOTS_POWER = 0.25  # of the number of spots, by which they average errors out

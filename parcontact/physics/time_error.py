@@ -39,6 +39,7 @@ from .prony import Prony
 
 Vector = tuple[float, float]
 
+# accuracy: these constants are fitted to true errors, as the text above says
 ROUND = 8.0 / math.pi  # cells of a round spot over its sides on the edge, times this: its radius in cells
 PASSING_FRICTION = 0.66  # times the share of the radius of a spot that a step is, and what forces are late by
 PASSING_LOSS = 0.19  # times that share: by what the loss is wrong

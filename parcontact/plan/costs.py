@@ -15,9 +15,9 @@ from . import memory
 from .sample import Sample
 
 TRIED_BYTES = 32 << 20  # tuning: written to see how fast that is
-SLOW_WRITE = 100e6  # bytes per second, where that cannot be seen
-HALF_MESH = 0.3  # of the time of a run, that on half the mesh: a quarter of the points, some more calls
-HALF_MESH_CHOSEN = 0.2  # the same in steps that are chosen, half as many
+SLOW_WRITE = 100e6  # tuning: bytes per second, where that cannot be seen
+HALF_MESH = 0.3  # tuning: of the time of a run, that on half the mesh: a quarter of the points, some more calls
+HALF_MESH_CHOSEN = 0.2  # tuning: the same in steps that are chosen, half as many
 
 
 @dataclass(frozen=True)

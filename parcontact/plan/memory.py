@@ -33,10 +33,10 @@ from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.preconditioner.extension import grids_for
 from ..steady_sliding.sliding import tolerance_of
 
-FREE_SHARE = 0.7  # of the memory that is free, which jobs may take
+FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
 MEMINFO = Path("/proc/meminfo")
 MOST_POINTS = 2**20  # tuning: of a small case, which gains little from several ranks
-SPARE = 2.0  # times the maps of steps: what a first contact or steady state on nested grids may hold besides
+SPARE = 2.0  # tuning: times the maps of steps: what a first contact or steady state on nested grids may hold besides
 
 
 Points = tuple[int, int]

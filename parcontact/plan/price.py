@@ -33,13 +33,13 @@ from .sample import Sample, StageCost
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
 MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
-ACROSS_SHARE = 0.2  # of that of the mesh, for the cells across the sliding
-CHOSEN_SHARE = 0.65  # of the accuracy, what time steps make that follow it, in the mean of a stage
-EDGE_ORDER = 1.0  # of the cell, in which the error of the contact area falls
-CALLS_PER_DECADE = 1.5  # for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
+ACROSS_SHARE = 0.2  # accuracy: of that of the mesh, for the cells across the sliding
+CHOSEN_SHARE = 0.65  # accuracy: of the accuracy, what time steps make that follow it, in the mean of a stage
+EDGE_ORDER = 1.0  # accuracy: of the cell, in which the error of the contact area falls
+CALLS_PER_DECADE = 1.5  # tuning: for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
 LONGER, COARSER, FINER = 4.0, 8.0, 16.0  # times the own steps, and the own cells, at most: no trial tells of more
-SAME = 1e-9  # relative: numbers this close are the same
+SAME = 1e-9  # rounding: relative: numbers this close are the same
 
 
 def offer(costs: Costs, accuracy: float) -> Costs:

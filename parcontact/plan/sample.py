@@ -30,7 +30,7 @@ T = TypeVar("T")
 FIRST = 2  # tuning: steps of a stage that stand for themselves alone
 FEWEST = 8  # tuning: steps of a stage that are made before a long one ends it
 KILO = 1024  # bytes in what the system counts resident memory in
-UNDISTURBED = 0.9  # of the time a rank has a core, where nothing else is at work
+UNDISTURBED = 0.9  # tuning: of the time a rank has a core, where nothing else is at work
 LATE = 2.0  # tuning: times the time given, after which no more steps are made
 
 

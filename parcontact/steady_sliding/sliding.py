@@ -28,9 +28,9 @@ from .heating import Feedback, warm
 from .losses import branch_powers
 from .point import Point
 
-COARSE_TOLERANCE = 0.02  # of the certificate on all grids but the finest
-LOOSE, SHARE = 1e-3, 0.6  # so much of a tolerance above LOOSE leaves the contact area as right as in a march
-NEAR = 1.1  # a velocity this many times the last one, or less, is near it
+COARSE_TOLERANCE = 0.02  # tuning: of the certificate on all grids but the finest
+LOOSE, SHARE = 1e-3, 0.6  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
+NEAR = 1.1  # tuning: a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 
 

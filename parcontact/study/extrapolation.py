@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # orders outside tell of values that do not converge yet
-DOUBT = 0.5  # of the order
-LEAST_DOUBT = 0.25  # of the last difference
+LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # accuracy: orders outside tell of values that do not converge yet
+DOUBT = 0.5  # accuracy: of the order
+LEAST_DOUBT = 0.25  # accuracy: of the last difference
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from ..storage.row import Row
 from .ladders import Settings
 
 FIRST_STEPS = 2
-LAST_SHARE = 0.25  # of the last stage that slides (or lasts): its mean is taken for what has settled
+LAST_SHARE = 0.25  # accuracy: of the last stage that slides (or lasts): its mean is taken for what has settled
 
 
 @dataclass(frozen=True)

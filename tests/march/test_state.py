@@ -186,7 +186,7 @@ def test_at_first_the_highest_point_just_touches(tmp_path: Path) -> None:
 
 
 def test_energies_are_in_joules() -> None:
-    """An elastic body stores half of pressure times displacement; what is done to rubber is stored or lost. Rounding."""
+    """An elastic body stores half of pressure times displacement; work on rubber is stored or lost. To rounding."""
     march, rows = marched(job(ELASTIC, SLIDES))
     half = 0.5 * float(np.sum(march.field("pressure") * march.field("displacement"))) * (1e-3 / 32) ** 2
     assert (rows[-1].stored, rows[-1].work, rows[-1].dissipated) == (pytest.approx(half, rel=1e-12),) * 2 + (0.0,)
