@@ -58,16 +58,16 @@ class Cosines:
         self.fft.along_x(field, self._transform_rows)
         for columns, symbol in zip(self.column_blocks, symbols, strict=True):
             part = self.fft.spectrum[:, columns]
-            _fold_columns(part, self._block)
+            _fold(part.T, self._block.T[: part.shape[1]])
             self._forward.execute()
             _weigh(self._block, self._turn_y, symbol)
             self._backward.execute()
-            _unfold_columns(self._block, part)
+            _unfold(self._block.T[: part.shape[1]], part.T)
         return self.fft.back_along_x(out, 1.0, self._transform_waves)
 
     def _transform_rows(self, source: Array, waves: Spectrum) -> None:
         block = self.fft.row_block[: len(waves)]
-        _fold_rows(source, block)
+        _fold(source, block)
         self.fft.execute_rows(block, waves)
         _turn(waves, 2.0 * self._turn_x)
 
@@ -75,47 +75,21 @@ class Cosines:
         block = self.fft.row_block[: len(waves)]
         _turn(waves, 0.5 * self._turn_x.conj())
         self.fft.execute_waves(waves, block)
-        _unfold_rows(block, target)
+        _unfold(block, target)
 
 
-@loop
-def _fold_rows(rows: NDArray[np.floating], folded: NDArray[np.floating]) -> None:
-    """Even points first, then the odd ones backwards."""
-    count = rows.shape[1]
-    for j in range(rows.shape[0]):
-        for i in range((count + 1) // 2):
-            folded[j, i] = rows[j, 2 * i]
-        for i in range(count // 2):
-            folded[j, count - 1 - i] = rows[j, 2 * i + 1]
+def _fold(points: NDArray[np.inexact], folded: NDArray[np.inexact]) -> None:
+    """Put the even points of each row first, then the odd ones backwards."""
+    half = (points.shape[1] + 1) // 2
+    folded[:, :half] = points[:, ::2]
+    folded[:, half:] = points[:, 1::2][:, ::-1]
 
 
-@loop
-def _unfold_rows(folded: NDArray[np.floating], rows: NDArray[np.floating]) -> None:
-    count = rows.shape[1]
-    for j in range(rows.shape[0]):
-        for i in range((count + 1) // 2):
-            rows[j, 2 * i] = folded[j, i]
-        for i in range(count // 2):
-            rows[j, 2 * i + 1] = folded[j, count - 1 - i]
-
-
-@loop
-def _fold_columns(columns: NDArray[np.complexfloating], folded: NDArray[np.complexfloating]) -> None:
-    """The same along y, into the first columns of a block."""
-    count = columns.shape[0]
-    for j in range(count):
-        place = j // 2 if j % 2 == 0 else count - 1 - j // 2
-        for i in range(columns.shape[1]):
-            folded[place, i] = columns[j, i]
-
-
-@loop
-def _unfold_columns(folded: NDArray[np.complexfloating], columns: NDArray[np.complexfloating]) -> None:
-    count = columns.shape[0]
-    for j in range(count):
-        place = j // 2 if j % 2 == 0 else count - 1 - j // 2
-        for i in range(columns.shape[1]):
-            columns[j, i] = folded[place, i]
+def _unfold(folded: NDArray[np.inexact], points: NDArray[np.inexact]) -> None:
+    """Undo `_fold`."""
+    half = (points.shape[1] + 1) // 2
+    points[:, ::2] = folded[:, :half]
+    points[:, 1::2] = folded[:, half:][:, ::-1]
 
 
 @loop
