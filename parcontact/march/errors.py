@@ -67,8 +67,11 @@ class Observations:
     @classmethod
     def restored(cls, saved: Saved) -> "Observations":
         """Return the looks of a checkpoint; one that it does not have is followed by a new one."""
-        found = (saved[name].tolist() if name in saved else [] for name in (PAIR, VIEWS))
-        return cls(*(LastObservation(*numbers[:3], observed=tuple(numbers[3:])) for numbers in found))
+        looks = []
+        for name in (PAIR, VIEWS):
+            stage, dt, so_far, *observed = saved[name].tolist() if name in saved else (-1.0, 0.0, 0.0)
+            looks.append(LastObservation(stage, dt, so_far, tuple(observed)))
+        return cls(*looks)
 
 
 @dataclass(frozen=True)

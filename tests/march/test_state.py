@@ -1,9 +1,11 @@
 """The state of a run: a checkpoint restores all of it, and a step that fails leaves it alone."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from marching import begun, marched
@@ -14,6 +16,7 @@ from parcontact.job.sections.listing import plain
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
 from parcontact.march.state import POSITIONS, State
+from parcontact.physics.units import Units
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
 from parcontact.storage.provenance import Link, Provenance
@@ -93,6 +96,35 @@ def test_ways_in_a_checkpoint_are_in_metres(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12)
     assert not found[:, 1].any()
     assert contents.numbers["clock/distance"] * contents.units["clock/distance"] == expected[0]
+
+
+def test_pressures_and_times_in_a_checkpoint_are_in_si_units(tmp_path: Path) -> None:
+    """Pressures as strains of a modulus, and when each step of a stage ended that chooses them."""
+    march, rows = marched(job(RUBBER, CHOSEN))
+    contents = checkpoint.inspect(written(march, tmp_path / "step.h5"))
+    values = {name: value * contents.units[name] for name, value in contents.numbers.items() if "plans" not in name}
+    with h5py.File(tmp_path / "step.h5") as file:
+        strain = file["contact/pressure"][...] * contents.units["contact/pressure"]
+    np.testing.assert_allclose(strain * values["contact/modulus"], march.field("pressure"), rtol=1e-12)
+    assert values["clock/ends"].tolist() == pytest.approx([row.time for row in rows[2:]], rel=1e-12)
+
+
+@pytest.mark.parametrize("material", [ELASTIC, RUBBER])
+def test_a_run_in_other_units_goes_on_alike(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, material: dict[str, Any]
+) -> None:
+    """In units that are powers of two times those of the run that wrote the checkpoint: to the last bit."""
+    old, _ = marched(job(material, SLIDES))
+    own = old.scene.units
+    other = replace(own, height=2.0 * own.height, length=8.0 * own.length, modulus=4.0 * own.modulus)
+    monkeypatch.setattr(Units, "near", lambda *_: other)
+    new = begun(job(material, SLIDES))
+    new.restore(checkpoint.inspect(written(old, tmp_path / "step.h5")))
+    assert new.scene.units == other
+    for name in FIELDS:
+        assert np.array_equal(new.field(name), old.field(name)), name
+    for name in ("distance", "work", "stored", "dissipated", "branch_dissipation"):
+        np.testing.assert_equal(getattr(new.row, name), getattr(old.row, name), name)
 
 
 @pytest.mark.parametrize("data", CASES)

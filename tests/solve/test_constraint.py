@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from parcontact.parallel.slab import Slab
 from parcontact.solve import constraint
 from parcontact.solve.constraint import CELL, NonNegative
 
@@ -54,6 +55,16 @@ def test_next_set(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
     found = NonNegative().next_set(maps.z, maps.u, maps.working)
     assert np.array_equal(found, (maps.working & (maps.z > 0.0)) | (~maps.working & (maps.u < 0.0)))
+
+
+def test_no_load_is_held_at_a_bound(dtype: type[np.floating]) -> None:
+    """Any pressure above 0 may change; one of another load is that times a factor."""
+    maps = Maps((5, 32), dtype)
+    assert NonNegative().mark(maps.p, maps.u, maps.h, 0.25, maps.working)[3] == 0.0
+    before = maps.wide("p").copy()
+    NonNegative().give_load(Slab.alone(32, 5), maps.p, float(before.sum()), 3.0)
+    assert maps.close(3.0, maps.wide("p"))
+    assert np.allclose(maps.wide("p"), 3.0 / before.sum() * before, rtol=4 * ROUNDING[dtype], atol=0.0)
 
 
 def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
