@@ -12,7 +12,7 @@ import parcontact as pc
 from parcontact.march.rounding import NAME
 from parcontact.march.state import entries
 
-HUGE, USUAL = 1e11, 1e4  # Pa: the first moves the body by 1e4 times the height of the surface, and more
+HUGE, USUAL = 3e10, 1e4  # Pa: the first moves the body by 3e3 times the height of the surface, and more
 HELD, CALLS = 6, 3  # steps under the huge load, and operator calls of one in full contact
 
 

@@ -1,6 +1,7 @@
 """Steps that fail: tried again to the same digits on any restart, or given up with a good checkpoint and advice."""
 
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -286,3 +287,14 @@ def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
     march.scene.motion.at((0.0, 0.0)).base[0, 0] = np.nan
     with pytest.raises(StepError, match="not finite"):
         run(march, [])
+
+
+@pytest.mark.parametrize(("share", "refused"), [(5e-15, False), (1e-12, True)])
+def test_an_approach_to_full_contact_is_one_to_rounding(share: float, refused: bool) -> None:
+    """The mean of the surface is 0: to go beyond it by a rounding of its height is to reach it."""
+    data = {"grid": GRID, "surface": ROUGH, "material": ELASTIC, "history": [{"approach": 0.0}]}
+    height = begun(data).scene.setup.height
+    march = begun(data | {"history": [{"approach": share * height}]})
+    with pytest.raises(StepError, match="is beyond full contact") if refused else nullcontext():
+        run(march, ())
+    assert march.row.step == 1 - refused
