@@ -204,6 +204,11 @@ class Run:
         row, console, errors = self.march.row, self.console, self.march.state.errors
         slides = any(stage.speed for stage in self.job.history)
         self._log_counts()
+        if self.slab.root and slides and not self.stop:
+            with suppress(OSError, InputError):  # a table that cannot be read now ends no run
+                rows = tables.read(self.directory.path / "measures.csv")
+                for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
+                    console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
@@ -215,11 +220,6 @@ class Run:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")
             return STOPPED_EARLY
-        if self.slab.root and slides:
-            with suppress(OSError, InputError):  # a table that cannot be read now ends no run
-                rows = tables.read(self.directory.path / "measures.csv")
-                for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
-                    console.say(text)
         detached = self.march.detached
         finished = row.step >= len(self.timeline) or bool(detached)
         if self.slab.root and finished:
