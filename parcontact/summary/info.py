@@ -225,8 +225,8 @@ def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
     columns = tables.read(path)
-    closed = ", ".join(f"closed along {axis} at {columns[f'percolates_{axis}'].count(0.0)}" for axis in "xy")
-    yield f"  leakage: leak.csv, {len(columns['time'])} instants, {closed} of them"
+    closed = " and ".join(f"at {columns[f'percolates_{axis}'].count(0.0)} along {axis}" for axis in "xy")
+    yield f"  leakage: {len(columns['time'])} instants in leak.csv; contact closes the gap {closed}"
 
 
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
