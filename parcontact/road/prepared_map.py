@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..job import Grid, Topography
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from ..printed import per_cent
+from ..printed import per_cent, quantity
 from . import map_files, treatment
 from .treatment import Treated
 
@@ -29,7 +29,8 @@ class Prepared:
     def notes(self) -> list[str]:
         """Return sentences on what was done."""
         (ny, nx), done = self.cut.shape, self.treated
-        lines = [f"road: {nx} x {ny} points of the map, {self.size[0]:.4g} x {self.size[1]:.4g} m, are used"]
+        lx, ly = (quantity(length, "m", 4) for length in self.size)
+        lines = [f"road: {nx} x {ny} points of the map, {lx} x {ly}, are used"]
         if done.missing:
             lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / self.cut.size)}) were filled")
         if done.outliers:

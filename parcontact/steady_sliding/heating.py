@@ -93,7 +93,7 @@ class Feedback:
             middle = 0.5 * (low + high) if high < math.inf else 2.0 * max(found, rise)
             rise = found if low < found < high else middle
         raise RunError(
-            f"steady sliding at {speed:g} m/s under {place[0]:g} Pa: the flash temperature did not settle in "
+            f"steady sliding at {speed:.4g} m/s under {place[0]:.4g} Pa: the flash temperature did not settle in "
             f"{MOST_ROUNDS} rounds: rubber {last[0]:.4g} K warmer makes {last[0] + last[1]:.4g} K. Try feedback: none"
         )
 

@@ -102,7 +102,7 @@ class SteadySliding:
     def _solve(self, velocity: Vector, pressure: float) -> Point:
         """Solve at the temperature that was taken."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
-        what, factor = f"steady sliding at {speed:g} m/s under {pressure:g} Pa", self.setup.choices.time_factor
+        what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
         for start, solver in self._starts(factor * speed, pressure):
             contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start, solver)
             calls += more

@@ -167,14 +167,14 @@ def describe_missed(points: Sequence[Point], asked: tuple[float, float], auto: b
     accuracy has chosen an `auto` mesh."""
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
-    names = ("friction", "corrected contact area")
+    names = ("friction", "the corrected contact area")
     for name, each, accuracy in zip(names, (friction, area), asked, strict=True):
         missed = [(parts.total, point, parts) for point, parts in each if exceeds(parts.total, accuracy)]
         if missed:
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
             yield (
-                f"estimated error of the {name} at {len(missed)} of {len(points)} points: up to {describe(parts)}, "
+                f"estimated error of {name} at {len(missed)} of {len(points)} points: up to {describe(parts)}, "
                 f"at {place}{advice(parts, accuracy, ['mesh'] * auto)}"
             )
 

@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
+from ..printed import quantity
+
 LOG = "steady.log"  # beside its table: what was said of it
 CLOSE = 1e-6  # accuracy: relative: speeds and pressures that are the same but for rounding
 
@@ -20,7 +22,7 @@ class Wanted(NamedTuple):
 
     def __str__(self) -> str:
         heated = "" if math.isnan(self.temperature) else f" at {self.temperature:g} C"
-        return f"{self.speed:.4g} m/s under {self.pressure:.4g} Pa{heated}"
+        return f"{self.speed:.4g} m/s under {quantity(self.pressure, 'Pa', 4)}{heated}"
 
 
 def asked(speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()) -> list[Wanted]:

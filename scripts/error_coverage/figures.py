@@ -18,7 +18,9 @@ SECOND_RANGE = 200  # from this number on scenes were not looked at before
 QUANTITIES = {"friction": "friction", "area": "corrected area"}
 CELLS = (0.0, 3.0, 4.0, 6.0, 8.0, 16.0, math.inf)
 CLASSES = ("body", "surface", "boundary", "history", "cells")
-HEAD = "kept or warned | warned | of the others kept | estimate >= half of the error | estimate/error: median | 5 to 95 %"
+HEAD = (
+    "kept or warned | warned | of the others kept | estimate >= half of the error | estimate/error: median | 5 to 95 %"
+)
 
 
 def judged(table: Path) -> pandas.DataFrame:
