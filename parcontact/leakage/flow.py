@@ -7,19 +7,26 @@ The Reynolds equation for a fluid of viscosity eta between two bodies that touch
 is solved by finite volumes: each point of the map is a cell, and the conductance of the face between two cells is the
 harmonic mean of their g^3. The pressure is given on two opposite ends of the map. The other two sides are periodic, or
 closed. Contact is impermeable. Only cells that lie on a path from end to end matter; the matrix of these is factorized
-directly, since g^3 spans many decades and iterations stall.
+directly, since g^3 spans many decades and iterations stall. The flow follows from what it dissipates,
+`sum c (p - p_neighbour)^2`, which is least for the exact pressures: their errors enter with their squares.
 """
+
+from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .elimination import Balance
+from . import slabs
 from .paths import connected_from_end_to_end, critical_constriction
+
+if TYPE_CHECKING:
+    from ..parallel.mpi import MPI
 
 Map = NDArray[np.float64]
 LEAST_GAP = 1e-3  # accuracy: of the largest gap; cells of a smaller one are closed, which costs some 1e-5 of the flow
@@ -32,8 +39,8 @@ class Flow:
     """Flow along one direction: `conductivity` is K [m^3], 0 where no path leads from end to end.
 
     `constriction` [m] is the smallest gap on the widest path and `position` its row and column; `imbalance` is the
-    difference of the flows at both ends over the flow, which rounding makes; `pressure` is the map of the fluid's
-    pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
+    difference of what flows out and of what dissipation takes to flow in, over the flow, which rounding makes;
+    `pressure` is the map of the fluid's pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
     """
 
     conductivity: float
@@ -47,31 +54,43 @@ class Flow:
         return self.constriction > 0.0
 
 
-def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
-    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`."""
+def solve_flow(
+    gap: Any,
+    size: tuple[float, float],
+    axis: str = "x",
+    periodic_sides: bool = True,
+    comm: MPI.Intracomm | None = None,
+) -> Flow:
+    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`.
+
+    The ranks of `comm`, if given, share the work: root has the map, the others pass None, and root alone gets the map
+    of the pressure. Collective.
+    """
     if axis == "x":
-        turned = solve_flow(gap.T, size[::-1], "y", periodic_sides)
+        turned = solve_flow(None if gap is None else gap.T, size[::-1], "y", periodic_sides, comm)
         place = None if turned.position is None else (turned.position[1], turned.position[0])
         return replace(turned, position=place, pressure=turned.pressure.T)
-    pressure = np.full(gap.shape, np.nan)
-    constriction, position = critical_constriction(gap, periodic_sides)
+    root = comm is None or comm.rank == 0
+    found = critical_constriction(gap, periodic_sides) if root else (0.0, None)
+    constriction, position = found if comm is None else comm.bcast(found)
+    pressure = np.full(gap.shape if root else (0, 0), np.nan)
     if position is None:
         return Flow(0.0, 0.0, None, 0.0, pressure)
+    resistances = _resistances(gap, constriction, periodic_sides) if root else None
+    solved, power, leaving = slabs.solve(resistances, size[0] / size[1], periodic_sides, comm)
+    if resistances is not None and solved is not None:
+        pressure = np.where(np.isfinite(resistances), solved, np.nan)
+    conductivity = constriction**3 * power * size[1] / size[0]
+    return Flow(conductivity, constriction, position, abs(leaving / power - 1.0), pressure)
+
+
+def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
+    """Return 1/g^3 over that of the constriction; infinite in cells that do not matter."""
     least = min(LEAST_GAP * float(gap.max()), LEAST_OF_CONSTRICTION * constriction)
     wet = connected_from_end_to_end(gap >= least, periodic_sides)
-    cubes = np.where(wet, np.minimum(gap, MOST_OF_CONSTRICTION * constriction) / constriction, 0.0) ** 3
-    length, width = size[1], size[0]
-    aspect = (width / gap.shape[1]) / (length / gap.shape[0])  # of a cell: across over along the flow
-    balance = Balance(cubes, aspect, periodic_sides)
-    # The drop from the first end and the pressure above the last end: each is exact where it is small.
-    drop, above = (
-        balance.solve(given) for given in (_at_row(wet.shape, -1, balance.last), _at_row(wet.shape, 0, balance.first))
-    )
-    inflow, outflow = float(balance.first @ drop[0]), float(balance.last @ above[-1])
-    flow = 0.5 * (inflow + outflow)
-    pressure[wet] = above[wet]
-    conductivity = constriction**3 * flow * length / width
-    return Flow(conductivity, constriction, position, abs(inflow - outflow) / flow, pressure)
+    found = np.full(gap.shape, np.inf)
+    found[wet] = (constriction / np.minimum(gap[wet], MOST_OF_CONSTRICTION * constriction)) ** 3
+    return found
 
 
 @dataclass(frozen=True)
@@ -113,8 +132,12 @@ def leak(gap: ArrayLike, size: Sequence[float], periodic: bool = True) -> Leak:
         raise InputError(f"gap must be a map [m] of shape (ny, nx), got one of shape {gaps.shape}")
     if missing := int(np.count_nonzero(~np.isfinite(gaps))):
         raise InputError(f"gap must be finite, {missing} of {gaps.size} points are not: fill or close (0) them")
-    lengths = _lengths(size)
-    return Leak(*(solve_flow(np.maximum(gaps, 0.0), lengths, axis, periodic) for axis in ("x", "y")))
+    return leak_on_ranks(np.maximum(gaps, 0.0), _lengths(size), periodic, None)
+
+
+def leak_on_ranks(gap: Map | None, size: tuple[float, float], periodic: bool, comm: MPI.Intracomm | None) -> Leak:
+    """Return the same for a map that is known to be one, by all ranks of `comm` (`solve_flow`); collective."""
+    return Leak(*(solve_flow(gap, size, axis, periodic, comm) for axis in ("x", "y")))
 
 
 def _lengths(size: Sequence[float]) -> tuple[float, float]:
@@ -125,10 +148,3 @@ def _lengths(size: Sequence[float]) -> tuple[float, float]:
     if not (0.0 < width < math.inf and 0.0 < height < math.inf):
         raise InputError(f"size must be two positive lengths (lx, ly) [m], got {size!r}")
     return width, height
-
-
-def _at_row(shape: tuple[int, ...], row: int, values: Map) -> Map:
-    """Return a map that is 0 but in one row."""
-    field = np.zeros(shape)
-    field[row] = values
-    return field

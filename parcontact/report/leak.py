@@ -13,7 +13,9 @@ from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
 from ..leakage.flow import Flow, Leak, Map, leak, solve_flow
+from ..parallel.groups import Groups
 from ..parallel.mpi import MPI
+from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plotting import leakage
 from ..plotting.run import Fields, Run
@@ -21,6 +23,7 @@ from ..printed import per_cent, quantity
 from ..storage import files, hdf5, tables
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
+MOST_CELLS = 4e6  # tuning: of a map for one rank, as long as there are more ranks; 2048 x 2048 takes 1.4 GB
 
 
 class Instant(NamedTuple):
@@ -54,6 +57,7 @@ class Gaps:
         job = shown_job(directory / RESOLVED)
         self.directory, self.sticks = directory, job.section("adhesion") is not None
         self.size, self.periodic = job.grid.size, job.grid.boundary == "periodic"
+        self.cells = job.grid.nx * job.grid.ny
         self.columns = tables.read(directory / "measures.csv")
         try:
             with self._open() as file:
@@ -86,12 +90,16 @@ class Gaps:
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
-    def solve(self, index: int) -> tuple[Leak, list[Map]]:
-        """Return the flow at a saved instant, without its maps of pressure, and for both directions where it is."""
-        gap, flows, shown = self.read(index), list[Flow](), list[Map]()
+    def solve(self, index: int, comm: MPI.Intracomm) -> tuple[Leak, list[Map]]:
+        """Return the flow at a saved instant, without its maps of pressure, and on root for both directions where it
+        is; collective."""
+        gaps, flows, shown = list[Map](), list[Flow](), list[Map]()
+        on_root(comm, lambda: gaps.append(self.read(index)))
+        gap = gaps[0] if gaps else None
         for axis in ("x", "y"):
-            flow = solve_flow(gap, self.size, axis, self.periodic)
-            shown.append(leakage.flux(gap, flow.pressure, self.size))
+            flow = solve_flow(gap, self.size, axis, self.periodic, comm)
+            if gap is not None:
+                shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
         return Leak(*flows), shown
 
@@ -114,8 +122,8 @@ class Gaps:
 
 
 def write(directory: Path, at: str, comm: MPI.Intracomm) -> Iterator[str]:
-    """Solve for the flow of the saved instants, each on one rank, and write leak.csv and leak.png; of one instant
-    leak.STEP.csv and leak.STEP.png. Collective.
+    """Solve for the flow of the saved instants and write leak.csv and leak.png; of one instant leak.STEP.csv and
+    leak.STEP.png. Collective: groups of ranks take an instant each.
 
     Yields, on root, what to say. Raises InputError for a directory without gaps.
     """
@@ -145,9 +153,10 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Leak], int, l
     """Return, on root, the flow at all instants, the one to draw and its maps: the last that has a flow in both
     directions, or else in one; collective."""
     mine, drawn, maps, problem = dict[int, Leak](), (-1, -1), list[Map](), ""
+    groups = Groups(comm, min(len(gaps.shown), int(comm.size * min(1.0, MOST_CELLS / gaps.cells))))
     try:
-        for index in gaps.shown[comm.rank :: comm.size]:
-            mine[index], found = gaps.solve(index)
+        for index in gaps.shown[groups.number :: groups.count]:
+            mine[index], found = gaps.solve(index, groups.comm)
             directions = mine[index].along_x.percolates + mine[index].along_y.percolates
             if (directions, index) > drawn:
                 drawn, maps = (directions, index), found
@@ -156,7 +165,7 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Leak], int, l
     if problems := [text for text in comm.allgather(problem) if text]:
         raise InputError(problems[0])
     chosen = max(comm.allgather(drawn))
-    parts = comm.gather((mine, maps if drawn == chosen else [])) or []
+    parts = comm.gather((mine, maps if drawn == chosen else [])) or []  # maps are on the roots of groups
     leaks = {index: one for part, _ in parts for index, one in part.items()}
     return leaks, chosen[1], next((found for _, found in parts if found), [])
 
