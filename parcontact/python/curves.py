@@ -35,7 +35,7 @@ class Curve:
     an interface adds], `friction_slopes` [-, by the slopes of the rigid surface], `error_friction`, `error_area` [-,
     relative, of friction and of the corrected area], `contact_area`, `contact_area_corrected` [share of the nominal,
     as counted and corrected by its edges], `force_x`, `force_y`
-    [N, on the rigid surface], `approach`, `mean_gap` [m], `max_pressure` [Pa], `residual` [-, the certificate];
+    [N, on the rigid surface], `approach`, `mean_gap` [m], `max_pressure` [Pa], `residual` [-, of the solve];
     `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene;
     `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference];
     `flash_temperature`, `max_temperature` [K, rise in the mean over the contact and the highest one; NaN without
