@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from parcontact.effects.relaxation import relaxation_of
-from parcontact.job import Job
+from parcontact.job import Job, load
 from parcontact.plotting import style
 from parcontact.storage import tables
-from parcontact.summary import sweep_table, theory_settings
+from parcontact.summary import slide, sweep_table, theory_settings
 
 QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
 WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
@@ -71,17 +71,27 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
     return np.array(at)[there], np.array([groups[k].mean() for k in there]), np.array(spread)
 
 
+def rows_of(directory: Path) -> list[dict[str, Any]]:
+    """Rows of the table of a sweep, with the contact area of simulations as corrected for its edges."""
+    rows = sweep_table.read(there(directory / "sweep.csv"))
+    for row in rows:
+        case = directory / "cases" / f"{int(row['case']):03d}"
+        if row["state"] == "done":
+            found = tables.read(case / "measures.csv")
+            found["contact_area"] = found[slide.CORRECTED]
+            measured = slide.measure(load(case / "job.resolved.yaml").history, found)
+            row["contact_area"] = measured.contact_area if measured else np.nan
+    return rows
+
+
 def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> Figure:
     """Friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds.
 
-    The same on a finer grid, in the directory NAME_1024, has open markers, its theory dotted lines.
+    The same with shorter waves, in the directory NAME_finer, has open markers, its theory dotted lines.
     """
-    there(out / name / "sweep.csv")
-    found = [
-        sweep_table.read(path)
-        for path in (out / name / "sweep.csv", out / f"{name}_1024" / "sweep.csv")
-        if path.is_file()
-    ]
+    found = [rows_of(out / name)]
+    if (out / f"{name}_finer" / "sweep.csv").is_file():
+        found.append(rows_of(out / f"{name}_finer"))
     figure, (top, middle, bottom) = panels(3, 1.75)
     for rows, (marks, dashes, line, told) in zip(found, LOOKS, strict=False):
         for number, (axes, (column, short)) in enumerate(zip((top, top, middle), QUANTITIES, strict=True)):
@@ -99,7 +109,7 @@ def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> 
     bottom.set(ylabel="theory − simulation [%]", xlabel=label)
     bottom.set_ylim(top=0.4 * abs(bottom.get_ylim()[0]))
     if len(found) > 1:
-        bottom.plot([], [], "D:", color=style.GREY, mfc="none", label="1024 × 1024")
+        bottom.plot([], [], "D:", color=style.GREY, mfc="none", label="waves of the paper")
     for axes in (top, middle, bottom):
         axes.set_xscale("log")
     explain(top, out / name, loc="upper center", ncols=2)

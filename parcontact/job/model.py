@@ -129,7 +129,7 @@ class Job(Part):
         """Sentences about what is allowed but will probably disappoint; errors with `numerics.strict`."""
         return (
             *(self.material.doubts if isinstance(self.material, Dma) else ()),
-            *advice.resolution(self, self.directions),
+            *advice.resolution(self, self.directions, chosen=bool(self._origin.mesh)),
             *meaning.warnings(self),
             *layer.warnings(self),
             *size.warnings(self),

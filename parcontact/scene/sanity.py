@@ -67,7 +67,7 @@ def _check_heights(setup: Setup) -> Iterator[str]:
     strained = layer.strained(span, body.thickness) if body is not None and setup.roughness else ""
     if strained and not any(told.startswith("body.thickness: the surface") for told in setup.job.warnings):
         yield strained
-    if setup.shortest is not None and not seams:  # a seam has waves of its own
+    if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
         yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.asked, setup.job.directions)
 
 

@@ -10,7 +10,7 @@ from parcontact.job.sections.calculation import Accuracy, Grid
 SIZE = (1e-3, 1e-3)
 WAVE = 6.25e-5
 BOTH = Accuracy(friction=0.01, area=0.01)
-FRICTION = Accuracy(friction=0.01, area=0.05)
+FRICTION = Accuracy(friction=0.003, area=0.1)
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 100, 416, 1000])
@@ -26,8 +26,9 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
     (nx, ny), (x, y) = points, way
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
     c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-    friction = math.hypot(0.01 * (8.0 / c) ** 2.5 * 2**0.3, 0.0015 * (4.0 / across) ** 2.5 * 2**0.9)
-    return friction * 0.95**2, 0.025 * (4.0 / cx + 4.0 / cy) ** 1.6 * 0.95**3 * 2**0.5
+    friction = math.hypot(0.035 * (4.0 / c) ** 1.9, 0.003 * (4.0 / across) ** 2.5)
+    area = math.hypot(0.065 * (4.0 / c) ** 1.2, 0.01 * (4.0 / across) ** 2)
+    return friction * 0.95**2 * 2**0.4, area * 0.95**2 * 2**0.4
 
 
 @pytest.mark.parametrize("asked", [BOTH, FRICTION, Accuracy(friction=0.05, area=0.3)])
@@ -39,8 +40,8 @@ def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     lengths = [n for n in range(16, 800, 16) if cells.fast_length(n) == n]
 
     def keeps(points: tuple[int, int]) -> bool:
-        """The grid has the shortest wave, too."""
-        resolved = min(points) * WAVE / SIZE[0] >= cells.LEAST_CELLS
+        """The grid has the shortest wave, too, and cells that are no longer than tried."""
+        resolved = min(points) * WAVE / SIZE[0] >= cells.LEAST_CELLS and max(points) <= cells.LONGEST * min(points)
         return resolved and all(a <= b for a, b in zip(errors(points, way), asked.both, strict=True))
 
     least = min(nx * ny for nx in lengths for ny in lengths if keeps((nx, ny)))

@@ -46,12 +46,13 @@ def test_more_accuracy_takes_more_points_where_it_pays(tmp_path: Path) -> None:
 
 
 def test_the_direction_decides(tmp_path: Path) -> None:
-    along = points_of(tmp_path)
-    assert points_of(tmp_path, "history.0.velocity=[0, 1]") == along[::-1]
+    fine = "numerics.accuracy.friction=0.01"
+    along = points_of(tmp_path, fine)
+    assert points_of(tmp_path, fine, "history.0.velocity=[0, 1]") == along[::-1]
     still = replaced(AUTO.split("history")[0], history="[{pressure: 1e5}]")
     assert len(set(points_of(tmp_path, text=still))) == 1
     curve = replaced(AUTO.split("history")[0], steady="{velocities: [1.0], pressures: [1e5], direction: [0, 1]}")
-    nx, ny = points_of(tmp_path, text=curve)
+    nx, ny = points_of(tmp_path, fine, text=curve)
     assert nx < ny <= along[0]  # time steps leave less for the mesh of a march
 
 
@@ -92,6 +93,15 @@ def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path:
 def test_where_it_is_too_coarse_more_accuracy_helps(tmp_path: Path) -> None:
     assert "mesh" in chosen_by_accuracy(job_of(tmp_path, AUTO))
     assert "mesh" not in chosen_by_accuracy(job_of(tmp_path, AUTO, "grid.points=64"))
+
+
+def test_a_chosen_mesh_is_not_called_too_coarse(tmp_path: Path) -> None:
+    """Near full contact fewer cells do than a job with points of its own is advised to take."""
+    full = "history.0.pressure=1e7"
+    nx, ny = points_of(tmp_path, full)
+    told = [f"grid.points=[{nx}, {ny}]", full]
+    assert any("cells per shortest wave" in warning for warning in job_of(tmp_path, AUTO, *told).warnings)
+    assert not any("cells per shortest wave" in warning for warning in job_of(tmp_path, AUTO, full).warnings)
 
 
 def test_check_says_it(tmp_path: Path, main: Main) -> None:

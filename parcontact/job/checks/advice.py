@@ -26,12 +26,15 @@ SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
 SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
-def resolution(job: Sections, directions: Sequence[Vector] = ()) -> Iterator[str]:
-    """Yield sentences, in the order of the sections; the surface slides along these directions (unit vectors)."""
+def resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = False) -> Iterator[str]:
+    """Yield sentences, in the order of the sections; the surface slides along these directions (unit vectors). A mesh
+    that was `chosen` for the job has cells enough, as far as is known before."""
     grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
-            yield from _waves(index, shape, grid, numerics.asked, directions)
+            yield from _long_waves(index, shape, grid)
+            if not chosen:
+                yield from _short_waves(index, shape, grid, numerics.asked, directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
     times = [branch.relaxation_time for branch in job.material.fitted.branches]
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
@@ -45,7 +48,7 @@ def _directions(grid: Grid) -> list[tuple[str, float, float]]:
     return [(name, length, cell) for name, length, cell, points in found if points > 1]
 
 
-def _waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
+def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[str]:
     name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
     if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
         yield (
@@ -53,6 +56,9 @@ def _waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Se
             f"{name}, and a representative surface has at least {LONG_WAVES}; use a grid.size of "
             f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
         )
+
+
+def _short_waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
     otherwise = " or a short_wavelength of {:.4g} m"
     yield from _few_cells(f"surface.{index}", shape.short_wavelength, "", otherwise, grid, asked, directions)
 

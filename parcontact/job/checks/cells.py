@@ -1,17 +1,17 @@
 """Cells that the shortest wave of a surface needs along and across the sliding.
 
-Friction comes from slopes along the sliding: the mesh makes its error along it, and little across. The contact area
-wants both directions alike. With c cells per shortest wave along the sliding and c' across it the relative errors are
-about
+Friction and the contact area come from slopes along the sliding: the mesh makes their errors along it, and little
+across. With c cells per shortest wave along the sliding and c' across it the relative errors are at most about
 
-    friction    hypot(ALONG (8/c)^2.5 l^0.3, ACROSS (4/c')^2.5 l^0.9) (1 - A)^2,
-    area        AREA (4/c + 4/c')^1.6 l^0.5 (1 - A)^3,        l = max(0.1/A, 1),
+    max(0.1/A, 1)^0.4 (1 - A)^2 hypot(along (4/c)^p, across (4/c')^q),
 
-where a share A is in contact: what is wrong is wrong at edges, and light contact is of small spots. They were found by
-experiment, with A as it is guessed before (`job.contact_share`): steady states of twelve rough surfaces of 3 to 100 %
-contact on 40 meshes of 2.7 to 40 cells per shortest wave. `scripts/chosen_mesh.py` tells how the meshes that follow do
-on others: single surfaces may be three times as good or as bad. Along a direction (x, y) the cells of a grid are
-hypot(x dx, y dy).
+with numbers of their own for friction and area, where a share A is in contact: what is wrong is wrong at edges, and
+light contact is of small spots. They were found by experiment, with A as it is guessed before (`job.contact_share`):
+34 steady states of rough surfaces of 1 to 100 % contact on 40 meshes of 2.7 to 24 cells per shortest wave, so that nine
+of ten keep what is asked for. From mesh to mesh the errors of one surface scatter by a factor of 2.4 (one standard
+deviation), so that no law is sharp. `scripts/chosen_mesh.py` tells how the meshes that follow do on others. Along a
+direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing slides, either direction counts as the one
+along the sliding.
 """
 
 from __future__ import annotations
@@ -19,26 +19,47 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from ..sections.calculation import Accuracy, Grid
 from ..sections.stages import Initial, Stage, Steady
 
 Vector = tuple[float, float]
 
-ALONG, ACROSS, MESH_ORDER = 0.01, 0.0015, 2.5  # accuracy: of friction, at 8 and at 4 cells
-AREA, AREA_ORDER = 0.025, 1.6  # accuracy: of the corrected area, at 8 cells both ways
-OPEN_FRICTION, OPEN_AREA = 2, 3  # accuracy: powers of the share that is open
-LIGHT = 0.1  # accuracy: the share in contact below which spots are small
-LIGHT_ALONG, LIGHT_ACROSS, LIGHT_AREA = 0.3, 0.9, 0.5  # accuracy: powers of it
+LIGHT, SMALL_SPOTS = 0.1, 0.4  # accuracy: the share in contact below which spots are small, and the power of it
+OPEN = 2  # accuracy: power of the share that is open
 TYPICAL = 0.2  # accuracy: share in contact, where none is known
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
+FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: with which more of them are advised for less
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across
 LEAST_CELLS = 2.1  # accuracy: per shortest wave; the grid has no waves shorter than two
 LONG = 1.2  # accuracy: cells with such sides are no squares
-LONGEST = 8.0  # accuracy: the longer side of a cell over the shorter, in the experiments
+LONGEST = 4.0  # accuracy: the longer side of a cell over the shorter, in the experiments
 MOST_CELLS = 400.0  # tuning: per shortest wave
 MULTIPLE = 16  # tuning: of which points along a side are, so that there are coarser grids to start from
 SAME = 1e-9  # accuracy: relative: numbers this close are the same
+
+
+class Law(NamedTuple):
+    """Errors by the cells along the sliding and across it, with four of each per shortest wave, and their orders."""
+
+    along: float
+    order_along: float
+    across: float
+    order_across: float
+
+    def error(self, c: float, across: float, share: float) -> float:
+        """Return the relative error with so many cells along the sliding and across it, a share being in contact."""
+        parts = self.along * (4.0 / c) ** self.order_along, self.across * (4.0 / across) ** self.order_across
+        return (1.0 - share) ** OPEN * max(LIGHT / share, 1.0) ** SMALL_SPOTS * math.hypot(*parts)
+
+    def cells_across(self, error: float) -> float:
+        """Return how many cells across the sliding make this error."""
+        return max(LEAST_CELLS, 4.0 * (self.across / error) ** (1.0 / self.order_across))
+
+
+FRICTION = Law(0.035, 1.9, 0.003, 2.5)  # accuracy
+AREA = Law(0.065, 1.2, 0.01, 2.0)  # accuracy: of the corrected area
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:
@@ -51,43 +72,27 @@ def along(way: Vector, length: float, grid: Grid) -> float:
     return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
 
 
-def friction_error(c: float, across: float, share: float = TYPICAL) -> float:
-    """Return the error of friction with so many cells per shortest wave along and across the sliding, where that share
-    is in contact."""
-    small = max(LIGHT / share, 1.0)
-    parts = (
-        ALONG * (8.0 / c) ** MESH_ORDER * small**LIGHT_ALONG,
-        ACROSS * (4.0 / across) ** MESH_ORDER * small**LIGHT_ACROSS,
-    )
-    return (1.0 - share) ** OPEN_FRICTION * math.hypot(*parts)
-
-
-def area_error(c: float, across: float, share: float = TYPICAL) -> float:
-    """Return the error of the corrected area with so many cells per shortest wave in two directions."""
-    edges = (1.0 - share) ** OPEN_AREA * max(LIGHT / share, 1.0) ** LIGHT_AREA
-    return edges * AREA * (4.0 / c + 4.0 / across) ** AREA_ORDER
-
-
 def cells_per_wave(accuracy: float) -> int:
     """Return how many cells the shortest wave of a rough surface needs along the sliding."""
-    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / MESH_ORDER) * (1 - SAME)))
+    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME)))
 
 
 def cells_across(accuracy: float) -> float:
     """Return how many it needs across the sliding, for the friction."""
-    return max(LEAST_CELLS, 4.0 * (ACROSS / accuracy) ** (1.0 / MESH_ORDER))
+    return FRICTION.cells_across(accuracy)
 
 
 def cells_for_area(accuracy: float) -> float:
-    """Return how many it needs in both directions, for the contact area."""
+    """Return how many it needs along the sliding, for the contact area."""
     return max(LEAST_CELLS, CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / AREA_ORDER))
 
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
     """Return how many cells the shortest wave needs along an axis, for friction and for the contact area, of a surface
     that slides along these directions (unit vectors); without any as many as along the sliding."""
-    slides = not directions or any(abs(way[axis]) > ASIDE for way in directions)
-    return cells_per_wave(asked.friction) if slides else cells_across(asked.friction), cells_for_area(asked.area)
+    if not directions or any(abs(way[axis]) > ASIDE for way in directions):
+        return cells_per_wave(asked.friction), cells_for_area(asked.area)
+    return cells_across(asked.friction), AREA.cells_across(asked.area)
 
 
 def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Steady | None) -> list[Vector]:
@@ -122,15 +127,17 @@ def choose(
     wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, share: float = TYPICAL
 ) -> tuple[int, int]:
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,
-    where it slides along these directions (unit vectors), or nowhere, and that share of it is in contact."""
+    where it slides along these directions (unit vectors), or nowhere, and that share of it is in contact. Of meshes
+    with as many points it is the one with the fewest along a side."""
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     best = along_x[-1], along_y[-1]
     for ny in along_y:
         cells = lambda nx, ny=ny: (wave * nx / size[0], wave * ny / size[1])  # noqa: E731
         place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, asked, share))
-        if place < len(along_x) and along_x[place] * ny < math.prod(best):
+        if place < len(along_x):
             cx, cy = cells(along_x[place])
-            best = (along_x[place], ny) if max(cx, cy) <= LONGEST * min(cx, cy) else best
+            if max(cx, cy) <= LONGEST * min(cx, cy):
+                best = min(best, (along_x[place], ny), key=lambda points: (math.prod(points), max(points)))
     return best
 
 
@@ -144,10 +151,12 @@ def _fast_lengths(most: float) -> list[int]:
 
 def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, share: float) -> bool:
     """Return whether cells per wave along x and y keep the errors asked for."""
-    if min(cx, cy) < LEAST_CELLS or area_error(cx, cy, share) > asked.area:
+    if min(cx, cy) < LEAST_CELLS:
         return False
-    for x, y in directions:
+    for x, y in directions or ((1.0, 0.0), (0.0, 1.0)):
         c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-        if friction_error(c, across, share) > asked.friction:
+        if AREA.error(c, across, share) > asked.area:
+            return False
+        if directions and FRICTION.error(c, across, share) > asked.friction:
             return False
     return True
