@@ -16,7 +16,7 @@ from parcontact.summary import slide, sweep_table, theory_settings
 
 QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
 WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
-TITLE = 6.5  # points, of the title of a legend
+TITLE = 5.2  # points, of the title of a legend
 LOOKS: tuple[tuple[dict[str, Any], str, str, bool], ...] = (  # of sweeps: points, theory, its error; with names
     ({"fmt": "o-"}, "--", "-", True),
     ({"fmt": "D", "mfc": "none"}, ":", ":", False),  # on a finer grid

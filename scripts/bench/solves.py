@@ -22,7 +22,7 @@ SMALLEST = 256  # points along a side, where `sizes` begins
 TOLERANCE = 1e-6  # of its cold solves
 LIGHT = 0.036  # mean pressure over E* of `large`, for 8 % of contact at a slope of 1
 LARGE_ERROR = 1e-5  # of its pressures
-COARSER, COARSE = 4, 1024  # times fewer points, and points at most, where the tolerance for that is looked for
+COARSER = 4  # times fewer points, where the tolerance for that is looked for
 FURTHER = 1e3  # times smaller a tolerance, to see the error
 
 
@@ -69,7 +69,7 @@ def large(points: int, *_: object) -> Iterator[Line]:
     """A cold solve at 8 % of contact: to a tolerance that is good enough on a coarser grid, then on from there until
     the pressure is good enough, seen from where it gets with a thousandth of that tolerance. What is compared is kept
     in single precision, for memory."""
-    tolerance = Cold(min(max(points // COARSER, 64), COARSE), load=LIGHT).loosest(LARGE_ERROR)[0][0].tolerance
+    tolerance = Cold(max(points // COARSER, 64), load=LIGHT).loosest(LARGE_ERROR)[0][0].tolerance
     began = time.process_time()
     surface = Cold(points, load=LIGHT)
     solver, tally = surface.solver(tolerance), surface.slab.tally
