@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from ..printed import per_cent, with_error
 from .extrapolation import Limit, extrapolate
 from .ladders import Ladders, Settings
 from .outcome import QUANTITIES, Outcome
@@ -27,8 +28,9 @@ class Found:
         order = "no order found" if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
         name = f"{self.quantity} with {self.integrator}, {self.ladder}"
         if math.isnan(self.limit.uncertainty):
-            return f"{name}: {self.limit.value:.6g} in the last cases, which do not differ: its error is not known"
-        return f"{name}: {self.limit.value:.6g} +- {100 * self.limit.doubt:.2g} %, {order}"
+            return f"{name}: {self.limit.value:.4g} in the last cases, which do not differ: its error is not known"
+        value = with_error(self.limit.value, abs(self.limit.value) * self.limit.doubt)
+        return f"{name}: {value} ({per_cent(self.limit.doubt)}), {order}"
 
 
 def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
@@ -141,7 +143,7 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
         if math.isnan(doubt):
             text += " (compared with the most expensive case, whose own error is not known)"
         elif doubt > target:
-            text += f" (the reference itself is only known to {100 * doubt:.2g} %)"
+            text += f" (the reference itself is known to {100 * doubt:.2g} %)"
         if lines and not enough and lines[-1].endswith(f"%: {text}"):  # the same is said of both
             lines[-1] = lines[-1].replace(" %: none", f" %, {100 * target:g} %: none")
         else:

@@ -142,7 +142,7 @@ def _title(directory: Path) -> str:
     for name in ("job.resolved.yaml", "steady.resolved.yaml", "study.resolved.yaml", *of_a_case):
         if (directory / name).is_file():
             found = re.search(r"^title: (.+)$", (directory / name).read_text(errors="replace"), re.MULTILINE)
-            return found.group(1).strip("'\"") if found else "without a title"
+            return (found and found.group(1).strip("'\"")) or "without a title"
     return "without a job"
 
 
