@@ -18,7 +18,7 @@ from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.body import Trial, surface_of
 from ..physics.energy import EnergyMemory, Pressed
-from ..scene import Scene, solver_on
+from ..scene import Scene, solver_on, solver_on_tiles
 from ..solve.contact import Contact
 from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
@@ -193,7 +193,7 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     moved_start = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare)
     if state.alpha == 0.0:  # nothing has been solved before
         on = partial(solver_on, scene.setup)
-        cold_start.prepare(solver, problem, state.spare, on)
+        cold_start.prepare(solver, problem, state.spare, on, solver_on_tiles(scene.setup))
     contact, remark = solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
     if contact.failure:
         contact, remark = _retry(scene, state, step, problem, contact)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..compiled import loop
 from .slab import Array, Slab
 
 COARSEST = 32  # tuning: points: there is no coarser grid
@@ -33,19 +34,52 @@ def factors(fine: Slab, coarse: Slab) -> tuple[int, int]:
 def restrict(fine: Slab, coarse: Slab, field: Array) -> Array:
     """The means over the cells of the coarse grid."""
     fy, fx = factors(fine, coarse)
-    rows = fetch(fine, field, [slice(fy * part.start, fy * part.stop) for part in coarse.dealt])
-    out = coarse.empty(field.dtype)
-    out[...] = rows.reshape(coarse.shape[0], fy, coarse.nx, fx).mean(axis=(1, 3))
+    rows, out = _rows_of_cells(fine, coarse, field), coarse.empty(field.dtype)
+    if fy == fx == 2:
+        _average(rows, out)
+    else:
+        out[...] = rows.reshape(-1, fy, fine.nx).mean(axis=1).reshape(*coarse.shape, fx).mean(axis=2)
     return out
+
+
+def highest(fine: Slab, coarse: Slab, field: Array) -> Array:
+    """The largest values within the cells of the coarse grid."""
+    fy, fx = factors(fine, coarse)
+    rows = _rows_of_cells(fine, coarse, field)
+    return np.asarray(rows.reshape(-1, fy, fine.nx).max(axis=1).reshape(*coarse.shape, fx).max(axis=2))
+
+
+def _rows_of_cells(fine: Slab, coarse: Slab, field: Array) -> Array:
+    """The rows of a map within the rows of cells of this rank."""
+    fy, _ = factors(fine, coarse)
+    return fetch(fine, field, [slice(fy * part.start, fy * part.stop) for part in coarse.dealt])
+
+
+@loop
+def _average(rows: Array, out: Array) -> None:
+    """Means over two by two points."""
+    quarter = out.dtype.type(0.25)
+    for j in range(out.shape[0]):
+        a, b = rows[2 * j], rows[2 * j + 1]
+        for i in range(out.shape[1]):
+            out[j, i] = ((a[2 * i] + a[2 * i + 1]) + (b[2 * i] + b[2 * i + 1])) * quarter
+
+
+@loop
+def _spread(cells: Array, above: int, fy: int, fx: int, out: Array) -> None:
+    """The value of each cell at all its points, of which so many rows `above` are not there."""
+    for j in range(out.shape[0]):
+        row, points = cells[(j + above) // fy], out[j]
+        for i in range(row.size):
+            for k in range(fx):
+                points[fx * i + k] = row[i]
 
 
 def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
     """The same value in all fine cells of a coarse one: no point gets a pressure that had none."""
     fy, fx = factors(fine, coarse)
     wanted = [slice(part.start // fy, (part.stop + fy - 1) // fy) for part in fine.dealt]
-    rows = np.repeat(np.repeat(fetch(coarse, field, wanted), fy, axis=0), fx, axis=1)
-    first = fine.rows.start - fy * (fine.rows.start // fy)
-    out[...] = rows[first : first + fine.shape[0]]
+    _spread(fetch(coarse, field, wanted), fine.rows.start % fy, fy, fx, out)
     return out
 
 

@@ -44,9 +44,9 @@ class Slab:
         self.tally = Tally() if tally is None else tally
 
     @staticmethod
-    def alone(nx: int, ny: int) -> "Slab":
+    def alone(nx: int, ny: int, tally: Tally | None = None) -> "Slab":
         """The slab of a map that this rank has for itself."""
-        return Slab(MPI.COMM_SELF, nx, ny)
+        return Slab(MPI.COMM_SELF, nx, ny, tally)
 
     def resized(self, nx: int, ny: int) -> "Slab":
         """The slab of a map of another size on the same ranks."""

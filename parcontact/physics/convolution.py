@@ -124,16 +124,23 @@ def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
     return pyfftw.next_fast_len(2 * nx), pyfftw.next_fast_len(2 * ny)
 
 
-def tabulate(fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array]) -> NDArray[np.complexfloating]:
+def tabulate(
+    fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array], even: bool = False
+) -> NDArray[np.complexfloating]:
     """Symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at distance (x, y) [length]
-    that a unit pressure on one cell causes; collective, and no rank holds the whole table.
+    that a unit pressure on one cell causes; collective, and no rank holds the whole table. One that is `even` in x and
+    in y is calculated for each distance once.
     """
     slab = fft.slab
     dx, dy = size[0] / slab.nx, size[1] / slab.ny
     padded = slab.resized(fft.mx, fft.my)
-    x, y = (step * _distances(count) for step, count in ((dx, fft.mx), (dy, fft.my)))
-    table = np.ascontiguousarray(coefficient(x[None, :], y[padded.rows, None], dx, dy))
-    return FFT(padded, measured=fft.measured).forward(table)
+    x, y = _distances(fft.mx), _distances(fft.my)[padded.rows]
+    if not even:
+        table = coefficient(dx * x[None, :], dy * y[:, None], dx, dy)
+        return FFT(padded, measured=fft.measured).forward(np.ascontiguousarray(table))
+    (near_x, from_x), (near_y, from_y) = (np.unique(np.abs(each), return_inverse=True) for each in (x, y))
+    quadrant = coefficient(dx * near_x[None, :], dy * near_y[:, None], dx, dy)
+    return FFT(padded, measured=fft.measured).forward(quadrant[from_y[:, None], from_x[None, :]])
 
 
 def _distances(count: int) -> NDArray[np.int64]:

@@ -30,6 +30,7 @@ from ..errors import InputError
 from ..parallel.cosines import Cosines
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
+from ..parallel.tally import Tally
 from .convolution import (
     ALL,
     Convolution,
@@ -42,6 +43,7 @@ from .convolution import (
 from .layer import Layer, LongWaves
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
+from .tiles import LONGEST_CELL, TileConvolution, TileOperator, Tiles, tile_inverse
 from .wake import wake
 
 Vector = tuple[float, float]
@@ -143,7 +145,7 @@ class HalfSpace:
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
         padded = _padded(fft, fft.dtype, fft.measured)
-        table = tabulate(padded, self.size, self._coefficient)
+        table = tabulate(padded, self.size, self._coefficient, self.layer is None)
         return Convolution(padded, lambda rows: table[rows].real, fft.dtype)
 
     def _coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
@@ -160,6 +162,17 @@ class HalfSpace:
             return MirroredConvolution(cosines, partial(self._mirrored_inverse_symbol, cosines))
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
+    def works_on_tiles(self, nx: int, ny: int) -> bool:
+        """Whether there are operators on tiles of a grid: of a half space with nothing around, on cells that are not
+        long."""
+        dx, dy = self.size[0] / nx, self.size[1] / ny
+        return self.free and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
+
+    def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
+        """The operator of a body with nothing around on tiles of its grid, and a preconditioner; no layers."""
+        operator = TileOperator(tiles, self.size, self.poisson, self._coefficient, tally)
+        return operator, tile_inverse(tiles, self.size, self.poisson, tally)
+
     # -- of contacts that stick -------------------------------------------------------------------------------------
 
     def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
@@ -170,7 +183,7 @@ class HalfSpace:
         exact within half a box.
         """
         if self.free:
-            table = tabulate(fft, self.size, self._coefficient).real
+            table = tabulate(fft, self.size, self._coefficient, self.layer is None).real
             mean = self._mean_of(table, fft)
             least = mean
         else:

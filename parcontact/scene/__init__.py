@@ -1,7 +1,7 @@
 """From a job to what is calculated with: the choices that follow from it, the rigid surface, the body, the solver."""
 
 from .choices import Choices, choices
-from .scene import Scene, Setup, build, build_on, describe_scene, set_up, solver_on
+from .scene import Scene, Setup, build, build_on, describe_scene, set_up, solver_on, solver_on_tiles
 
 __all__ = [
     "Choices",
@@ -13,4 +13,5 @@ __all__ = [
     "describe_scene",
     "set_up",
     "solver_on",
+    "solver_on_tiles",
 ]

@@ -26,6 +26,7 @@ from ..physics.probe import Probe
 from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
+from ..physics.tiles import SIDE, Tiles
 from ..physics.units import Units
 from ..printed import quantity
 from ..solve.adhesive import kernels as laws
@@ -36,6 +37,7 @@ from ..solve.constraint import Constraint, NonNegative
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
+from ..solve.tiles import LARGER_CELLS, OnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
 from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
@@ -213,6 +215,20 @@ def solver_on(
     """
     on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
+
+
+def solver_on_tiles(setup: Setup) -> OnTiles | None:
+    """Return what makes a solver and the operators of the body of a setup on tiles of a grid, for a start, on one rank
+    alone; None where the body has no operators on tiles."""
+    body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
+    height = setup.height / setup.units.height
+
+    def on(tiles: Tiles, tolerance: float) -> tuple[ContactSolver, Operators]:
+        workspace = Workspace(Slab.alone(SIDE, tiles.count * SIDE, tally), tolerance)
+        solver = ContactSolver(workspace, height, tolerance, limit, LARGER_CELLS, free=True)
+        return solver, Operators(*body.on_tiles(tiles, tally))
+
+    return on if body.works_on_tiles(setup.slab.nx, setup.slab.ny) else None
 
 
 def describe_scene(scene: Scene) -> Iterator[str]:

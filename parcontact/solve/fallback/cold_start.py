@@ -9,9 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ...parallel.slab import Array, Slab
-from .. import nested
+from ...physics.tiles import SIDE
+from .. import nested, tiles
 from ..contact import ContactSolver
 from ..problem import Operators, Problem
+from ..tiles import OnTiles
 
 LOOSE = 0.03  # tuning: tolerance on the coarse grids, whose pressure is only a start
 WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes longer than what they save
@@ -19,30 +21,76 @@ WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes l
 SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # of the same body on a grid, with a tolerance
 
 
-def prepare(solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn) -> None:
+def prepare(
+    solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: OnTiles | None = None
+) -> None:
     """On a large grid put a start into `start`, which is 0, for a body that nothing has been pressed into; collective.
 
-    Operator calls of solvers on other grids are counted by their share of the points.
+    Operator calls of solvers on other grids, or on tiles, are counted by their share of the points. With operators
+    `on_tiles` a dilute contact is solved on these, to the solver's tolerance on the finest grid.
     """
     if solver.slab.points >= WORTHWHILE:
-        start_on_coarse_grids(solver, problem, start, solver_on)
+        start_on_coarse_grids(solver, problem, start, solver_on, on_tiles)
 
 
-def start_on_coarse_grids(solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn) -> int:
+def start_on_coarse_grids(
+    solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: OnTiles | None = None
+) -> int:
     """Solve loosely on coarser grids and put the start that follows into `start`, 0 if there is none; returns how many
     grids there are; collective."""
-    levels, tally, cost = nested.levels_of(solver.slab, problem.heights), solver.slab.tally, 0.0
-    before = tally["operator"]
-
-    def solve(level: nested.Level, below: Array) -> Array:
-        nonlocal cost
-        calls = tally["operator"]
-        coarse, (operator, preconditioner) = solver_on(level.slab, max(LOOSE, solver.tolerance))
-        there = replace(problem, operator=operator, preconditioner=preconditioner, heights=level.heights)
-        p = coarse.solve(there, below).p
-        cost += (tally["operator"] - calls) * level.slab.points / solver.slab.points
-        return p
-
-    nested.descend(levels, solve, start)
-    tally["operator"] = before + round(cost)
+    levels = nested.levels_of(solver.slab, problem.heights)
+    descent = _Descent(solver, problem, solver_on, on_tiles)
+    nested.descend(levels, descent.solve, start)
+    descent.solve_finest(levels[0], start)
+    descent.count()
     return len(levels)
+
+
+class _Descent:
+    """From coarse grids to finer ones, on tiles of a grid as long as these are few."""
+
+    def __init__(self, solver: ContactSolver, problem: Problem, solver_on: SolverOn, on_tiles: OnTiles | None) -> None:
+        self._solver, self._problem, self._solver_on = solver, problem, solver_on
+        self._on_tiles, self._tally = on_tiles, solver.slab.tally
+        self._cost, self._before = 0.0, self._tally["operator"]
+        self._blocks: tuple[Slab, Operators] | None = None
+        self._below: tiles.Found | None = None
+
+    def solve(self, level: nested.Level, p: Array) -> Array:
+        """Solve loosely on a coarse level from p."""
+        if self._on_blocks(level, max(LOOSE, self._solver.tolerance), p):
+            return p
+        calls = self._tally["operator"]
+        coarse, operators = self._solver_on(level.slab, max(LOOSE, self._solver.tolerance))
+        contact = coarse.solve(replace(self._problem, **operators._asdict(), heights=level.heights), p)
+        if self._on_tiles is not None and tiles.is_block_grid(level.slab, self._solver.slab):
+            self._blocks = level.slab, operators
+            self._below = tiles.Found(level.slab, contact.p, contact.d, contact.certificate.length)
+        self._add(calls, level.slab.points)
+        return contact.p
+
+    def solve_finest(self, level: nested.Level, p: Array) -> None:
+        """Solve on tiles of the finest grid from p, or leave it as it is."""
+        self._on_blocks(level, max(tiles.SHARE * self._solver.tolerance, tiles.LEAST), p)
+
+    def count(self) -> None:
+        """Count the operator calls of all levels by their share of points."""
+        self._tally["operator"] = self._before + round(self._cost)
+
+    def _on_blocks(self, level: nested.Level, tolerance: float, p: Array) -> bool:
+        """Solve on tiles of a level if they are few; if not, finer levels do without tiles."""
+        if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
+            return False
+        assert self._on_tiles is not None
+        chosen = tiles.choose(*self._blocks, self._below, level.slab, level.heights)
+        if chosen is None:
+            self._below = None
+            return False
+        calls, there = self._tally["operator"], replace(self._problem, heights=level.heights)
+        self._below = tiles.solve(chosen, self._on_tiles, there, level.slab, self._solver.height, tolerance, p)
+        self._add(calls, chosen.count * SIDE**2)
+        return True
+
+    def _add(self, calls: int, points: int) -> None:
+        """Add the calls since so many by their share of points."""
+        self._cost += (self._tally["operator"] - calls) * points / self._solver.slab.points

@@ -1,0 +1,145 @@
+"""A dilute contact, solved on the tiles of the grid that may touch: its cost follows the contact, not the box.
+
+A coarser grid has told where contact is, and about how deep: with its pressure p on a grid of blocks and the
+displacement u that this causes there, a block can touch only if its highest point is near the rigid approach,
+
+    u - max(h) - d < MARGIN L,
+
+with L the length by which u varies within the contact (`certificate.Certificate`). Tiles with such blocks, or with
+pressure, or beside one, are stacked to a map of their own, on which `contact.ContactSolver` solves the same problem
+with operators on tiles (`physics.tiles`). What comes out is a start for the whole grid, whose first certificate judges
+it at all points. Root solves and tells the others.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parallel import regrid
+from ..parallel.slab import Array, Slab
+from ..physics.tiles import SIDE, Tiles, tiles_along
+from .contact import ContactSolver
+from .preconditioner.extension import Grids
+from .problem import Control, MeanPressure, Operators, Problem
+
+MARGIN = 0.2  # tuning: of the length, by which a block may be off
+LARGEST_SHARE = 0.25  # tuning: of the points of a grid: on more tiles, solving on all points is as fast
+BLOCKS = 256  # points along the longer side of the grid of blocks, at most, unless tiles have fewer than one
+LARGER_CELLS = Grids(2)  # tuning: of solvers on tiles; still larger cells would be those of tiles far apart
+SHARE = 0.5  # of a tolerance, to which tiles are solved: the whole grid has to agree
+LEAST = 1e-7  # accuracy: tolerance: beyond it operators on tiles have no more digits
+
+OnTiles = Callable[[Tiles, float], tuple[ContactSolver, Operators]]  # of the same body, with a tolerance
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is known of a contact on a grid: its pressure, of this rank's rows, and approach, and how much displacements
+    vary within it."""
+
+    slab: Slab
+    p: Array
+    d: float
+    length: float
+
+
+def is_block_grid(slab: Slab, finest: Slab) -> bool:
+    """Whether a grid is coarse enough to be one of blocks, but each in a single tile of the finest grid."""
+    longest = max(slab.nx, slab.ny)
+    return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
+
+
+def choose(blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array) -> Tiles | None:
+    """The tiles of a grid that may touch, from the contact on the next coarser one; None where these are none, or
+    more than LARGEST_SHARE of all; collective."""
+    p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
+    u = operators.operator.apply(p, blocks.empty())
+    gap = u - regrid.highest(slab, blocks, heights) - below.d
+    near = blocks.to_root(np.where((p > 0.0) | (gap < MARGIN * below.length), 1.0, 0.0))
+    return slab.agree(None if near is None else _tiles_of(near > 0.0, slab))
+
+
+def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles | None:
+    """The tiles of a grid with blocks that are near contact, or beside such a block."""
+    down, across = near.shape
+    around = np.zeros((down + 2, across + 2), np.bool_)
+    for j in range(3):
+        for i in range(3):
+            around[j : j + down, i : i + across] |= near
+    rows, columns = np.nonzero(around[1:-1, 1:-1])
+    across, down = tiles_along((slab.nx, slab.ny))
+    marked = np.zeros((down, across), np.bool_)
+    marked[rows * slab.ny // near.shape[0] // SIDE, columns * slab.nx // near.shape[1] // SIDE] = True
+    tiles = Tiles((slab.nx, slab.ny), *np.nonzero(marked))
+    return tiles if 0 < tiles.count * SIDE**2 <= LARGEST_SHARE * slab.points else None
+
+
+def solve(
+    tiles: Tiles, on_tiles: OnTiles, problem: Problem, slab: Slab, height: float, tolerance: float, p: Array
+) -> Found:
+    """Solve a problem on tiles of a grid from the pressure p, in whose place the solution will be; collective."""
+    lowest = float(problem.heights.min(initial=np.inf))
+    heights, start = (_stacked(slab, tiles, each) for each in (problem.heights, p))
+    lowest = -slab.reduce((), [-lowest])[0]
+    told: tuple[Array, float, float] | None = None
+    if heights is not None and start is not None:
+        _bury(heights, tiles, lowest - height)
+        solver, operators = on_tiles(tiles, tolerance)
+        control = _on_part(problem.control, slab.points / solver.slab.points)
+        contact = solver.solve(Problem(*operators, heights, problem.constraint, control), start)
+        told = contact.p, contact.d, contact.certificate.length
+    told = slab.agree(told)
+    assert told is not None
+    stacked, d, length = told
+    _unstack(slab, tiles, stacked, p)
+    return Found(slab, p, d, length)
+
+
+def _on_part(control: Control, share: float) -> Control:
+    """The same load on so many times fewer points."""
+    return MeanPressure(control.value * share) if isinstance(control, MeanPressure) else control
+
+
+def _bury(heights: Array, tiles: Tiles, deep: float) -> None:
+    """Put points of tiles beyond the end of the grid so deep that they do not touch."""
+    nx, ny = tiles.points
+    places = np.arange(SIDE)
+    beyond_x = tiles.columns[:, None] * SIDE + places >= nx
+    beyond_y = tiles.rows[:, None] * SIDE + places >= ny
+    heights.reshape(-1, SIDE, SIDE)[beyond_y[:, :, None] | beyond_x[:, None, :]] = deep
+
+
+def _parts(slab: Slab, tiles: Tiles) -> list[tuple[tuple[slice, slice], tuple[slice, slice]]]:
+    """For each tile, where this rank's part of it is in the stacked map and in that of its rows."""
+    parts = []
+    for number, (row, column) in enumerate(zip(tiles.rows.tolist(), tiles.columns.tolist(), strict=True)):
+        top, left = row * SIDE, column * SIDE
+        start = max(top, slab.rows.start)
+        stop = max(min(top + SIDE, slab.rows.stop), start)
+        right = min(left + SIDE, slab.nx)
+        first = number * SIDE - top
+        there = slice(first + start, first + stop), slice(0, right - left)
+        here = slice(start - slab.rows.start, stop - slab.rows.start), slice(left, right)
+        parts.append((there, here))
+    return parts
+
+
+def _stacked(slab: Slab, tiles: Tiles, field: Array) -> Array | None:
+    """The stacked map of tiles on root, 0 beyond the end of the grid; None on other ranks; collective."""
+    own = np.zeros(tiles.shape)
+    for there, here in _parts(slab, tiles):
+        own[there] = field[here]
+    if slab.comm.size == 1:
+        return own
+    whole = np.empty_like(own) if slab.root else None
+    slab.comm.Reduce(own, whole)
+    return whole
+
+
+def _unstack(slab: Slab, tiles: Tiles, stacked: Array, field: Array) -> None:
+    """Put a stacked map that all ranks have into the rows of this one, 0 outside the tiles."""
+    field.fill(0.0)
+    for there, here in _parts(slab, tiles):
+        field[here] = stacked[there]
