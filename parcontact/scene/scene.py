@@ -218,8 +218,7 @@ def solver_on(
 
 
 def solver_on_tiles(setup: Setup) -> OnTiles | None:
-    """Return what makes a solver and the operators of the body of a setup on tiles of a grid, for a start, on one rank
-    alone; None where the body has no operators on tiles."""
+    """Return what makes a solver and operators on tiles of a grid, on one rank; None if the body has none."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 

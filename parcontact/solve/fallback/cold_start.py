@@ -63,8 +63,9 @@ class _Descent:
         calls = self._tally["operator"]
         coarse, operators = self._solver_on(level.slab, max(LOOSE, self._solver.tolerance))
         contact = coarse.solve(replace(self._problem, **operators._asdict(), heights=level.heights), p)
-        if self._on_tiles is not None and tiles.is_block_grid(level.slab, self._solver.slab):
-            self._blocks = level.slab, operators
+        if self._on_tiles is not None:
+            if tiles.is_block_grid(level.slab, self._solver.slab):
+                self._blocks = level.slab, operators
             self._below = tiles.Found(level.slab, contact.p, contact.d, contact.certificate.length)
         self._add(calls, level.slab.points)
         return contact.p
@@ -78,13 +79,12 @@ class _Descent:
         self._tally["operator"] = self._before + round(self._cost)
 
     def _on_blocks(self, level: nested.Level, tolerance: float, p: Array) -> bool:
-        """Solve on tiles of a level if they are few; if not, finer levels do without tiles."""
+        """Solve on tiles of a level, if they are few."""
         if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
             return False
         assert self._on_tiles is not None
         chosen = tiles.choose(*self._blocks, self._below, level.slab, level.heights)
         if chosen is None:
-            self._below = None
             return False
         calls, there = self._tally["operator"], replace(self._problem, heights=level.heights)
         self._below = tiles.solve(chosen, self._on_tiles, there, level.slab, self._solver.height, tolerance, p)

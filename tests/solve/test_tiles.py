@@ -1,0 +1,111 @@
+"""A dilute contact is found on tiles of a free box, and the whole grid agrees."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.tiles import SIDE, Tiles
+from parcontact.solve import tiles as module
+from parcontact.solve.constraint import NonNegative
+from parcontact.solve.contact import Contact, ContactSolver
+from parcontact.solve.fallback import cold_start
+from parcontact.solve.problem import Approach, MeanPressure, Operators, Problem
+from parcontact.solve.workspace import Workspace
+
+from .bodies import Map
+
+POINTS, TOLERANCE = 256, 1e-5
+BODY = HalfSpace((1.0, 1.0), free=True)
+LIGHT, HEAVY = MeanPressure(0.0005), MeanPressure(0.3)
+
+
+def spheres() -> Map:
+    """Two spheres and, far from them, a peak of a single point that coarse grids do not show."""
+    x = (np.arange(POINTS) + 0.5) / POINTS
+    h = np.full((POINTS, POINTS), -0.2)
+    for at_x, at_y, top in [(0.18, 0.31, 0.0), (0.57, 0.69, 1e-3)]:
+        h = np.maximum(h, top - 20.0 * ((x[None, :] - at_x) ** 2 + (x[:, None] - at_y) ** 2))
+    h[40, 250] = 0.002
+    return h
+
+
+def found(
+    comm: MPI.Intracomm, control: MeanPressure | Approach, monkeypatch: pytest.MonkeyPatch, on_tiles: bool = True
+) -> tuple[Contact, Array | None, int]:
+    """A contact found from nothing, its whole pressure on root, and calls of the operators."""
+    monkeypatch.setattr(module, "BLOCKS", POINTS // 4)
+    slab, whole = Slab(comm, POINTS, POINTS), spheres()
+    h, height = np.ascontiguousarray(whole[slab.rows]), float(np.ptp(whole))
+
+    def solver_on(on: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
+        fft = FFT(on, measured=False)
+        solver = ContactSolver(Workspace(on, tolerance), height, tolerance, 500, free=True)
+        return solver, Operators(BODY.operator(fft), BODY.inverse(fft))
+
+    def tiles_on(tiles: Tiles, tolerance: float) -> tuple[ContactSolver, Operators]:
+        work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, slab.tally), tolerance)
+        solver = ContactSolver(work, height, tolerance, 500, module.LARGER_CELLS, free=True)
+        return solver, Operators(*BODY.on_tiles(tiles, slab.tally))
+
+    solver, operators = solver_on(slab, TOLERANCE)
+    problem, p = Problem(*operators, h, NonNegative(), control), slab.zeros()
+    cold_start.prepare(solver, problem, p, solver_on, tiles_on if on_tiles else None)
+    before = slab.tally["operator"]
+    contact = solver.solve(problem, p)
+    return contact, slab.to_root(contact.p), slab.tally["operator"] - before
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("control", [LIGHT, Approach(0.001)], ids=["load", "approach"])
+def test_one_call_of_the_whole_operator(
+    comm: MPI.Intracomm, control: MeanPressure | Approach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first certificate on the whole grid is good, peak included; the pressure is that of a solve without tiles."""
+    contact, p, calls = found(comm, control, monkeypatch)
+    _, expected, more = found(comm, control, monkeypatch, on_tiles=False)
+    assert contact.converged
+    assert (contact.iterations, calls) == (0, 1)
+    assert more > 5
+    if p is not None and expected is not None:
+        assert p[40, 250] > 0.0
+        assert np.linalg.norm(p - expected) <= 1e-4 * np.linalg.norm(expected)
+
+
+@pytest.mark.mpi(2, 3, 4)
+def test_any_number_of_ranks(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Root solves on tiles: all ranks together find what one alone does, to the tolerance of the coarse grids."""
+    _, p, _ = found(comm, LIGHT, monkeypatch)
+    _, alone, _ = found(MPI.COMM_SELF, LIGHT, monkeypatch)
+    if p is not None and alone is not None:
+        assert np.linalg.norm(p - alone) <= TOLERANCE * np.linalg.norm(alone)
+
+
+@pytest.mark.mpi
+def test_maps_of_ranks_without_rows(comm: MPI.Intracomm) -> None:
+    """Rows of tiles come together from all ranks and go back, whoever has them: here the last one has all."""
+    nx, ny = 50, 70
+    dealt = [slice(0, 0)] * (comm.size - 1) + [slice(0, ny)]
+    slab, tiles = Slab(comm, nx, ny, dealt=dealt), Tiles((nx, ny), np.array([0, 2]), np.array([1, 0]))
+    whole = np.random.default_rng(1).random((ny, nx))
+    stacked: Array | None = slab.agree(module._stacked(slab, tiles, whole[slab.rows]))
+    assert stacked is not None
+    assert np.array_equal(stacked[:SIDE, : nx - SIDE], whole[:SIDE, SIDE:])
+    assert not stacked[:SIDE, nx - SIDE :].any()
+    back = slab.empty()
+    module._unstack(slab, tiles, stacked, back)
+    outside = np.ones((ny, nx), np.bool_)
+    outside[:SIDE, SIDE:] = outside[2 * SIDE :, :SIDE] = False
+    assert np.array_equal(back, np.where(outside, 0.0, whole)[slab.rows])
+
+
+def test_a_contact_that_is_not_dilute(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It starts and ends to the last bit as if there were no tiles."""
+    contact, p, calls = found(MPI.COMM_SELF, HEAVY, monkeypatch)
+    without, expected, as_many = found(MPI.COMM_SELF, HEAVY, monkeypatch, on_tiles=False)
+    assert (contact.iterations, calls) == (without.iterations, as_many)
+    assert p is not None
+    assert expected is not None
+    assert np.array_equal(p, expected)
