@@ -3,6 +3,7 @@
     .venv/bin/python scripts/bench.py [PART...] [--points 512] [--rounds 15] [--json FILE] [--peers DIRECTORY]
 
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
+    dilute   cold elastic solves at 0.07 to 2 % contact in free boxes of two and four times as many points, and aspher's
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
@@ -34,6 +35,7 @@ from pathlib import Path
 
 import runs
 from bench.adhesive import adhesion
+from bench.dilute import dilute
 from bench.effects import effects
 from bench.program import start
 from bench.scaling import WORLD, march, scale
@@ -44,7 +46,7 @@ from bench.table import Line
 FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 PARTS = {"solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
-PARTS |= {"folded": folded, "sizes": sizes, "large": large, "adhesion": adhesion}
+PARTS |= {"folded": folded, "sizes": sizes, "large": large, "adhesion": adhesion, "dilute": dilute}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 

@@ -146,7 +146,7 @@ def compare_peers(directory: Path, tasks: tuple[Task, ...], given: Mapping[str, 
     """CPU seconds of each to the error `given["wanted"]`, over `ours`; one that fails is left out."""
     for task in tasks:
         try:
-            found = search(_installed(directory, task.program), task, given)
+            found = search(installed(directory, task.program), task, given)
         except (subprocess.CalledProcessError, OSError) as failure:
             said = getattr(failure, "stderr", None) or str(failure)
             print(f"{task.program} is left out: {said.strip().splitlines()[-1:]}")
@@ -181,7 +181,7 @@ def judge(said: list[dict[str, float]], wanted: float) -> Found:
     return Found(False, max(tries + unfinished, default=LIMIT), np.inf)
 
 
-def _installed(directory: Path, program: str) -> Path:
+def installed(directory: Path, program: str) -> Path:
     """The Python of a program's own environment, which is made if it is not there."""
     python, done = directory / program / "bin" / "python", directory / program / "installed"
     if not done.exists():

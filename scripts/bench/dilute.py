@@ -1,0 +1,146 @@
+"""Part `dilute`: cold solves of few points in contact in free boxes, and aspher on the same surfaces in turns."""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.tiles import SIDE, Tiles
+from parcontact.solve.contact import ContactSolver
+from parcontact.solve.fallback import cold_start
+from parcontact.solve.problem import Operators
+from parcontact.solve.tiles import LARGER_CELLS
+from parcontact.solve.workspace import Workspace
+
+from .peers import installed
+from .table import Line, Map, quartiles
+from .work import EXACT, MODULUS, TOLERANCES, Cold, Solver
+
+ERROR = 5e-5  # of pressures, of the other program; ours is never larger than its own
+CASES = ((2, 0.00105), (2, 0.0094), (4, 0.00038), (4, 0.003))  # times `--points`; mean pressure over E*
+ASPHER = """\
+import aspher
+coarsest = len(heights)
+while coarsest % 2 == 0 and coarsest > 64:
+    coarsest //= 2
+gap, reference = heights.max() - heights, given["reference"]
+def attempt(tolerance):
+    began = time.process_time()
+    found = aspher.solve_nested(
+        len(heights), gap, load, coarsest=coarsest, tol=tolerance, coarse_tol=1e-3, backend="h2", active_set=True
+    )
+    seconds = time.process_time() - began
+    p = np.asarray(found.pressure).reshape(heights.shape)
+    return seconds, float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
+"""
+TURN = """\
+import json, sys, time
+import numpy as np
+given = np.load(sys.argv[1])
+heights, load = given["heights"], float(given["load"])
+{attempt}
+for line in sys.stdin:
+    print(json.dumps(attempt(float(line))), flush=True)
+"""
+
+
+class Free(Cold):
+    """The same surface in a box with nothing around, on tiles where contact is dilute."""
+
+    def __init__(self, points: int, load: float) -> None:
+        super().__init__(points, load=load)
+        self.body = HalfSpace(self.size, free=True)
+        began = time.process_time()
+        self.operators = Operators(self.body.operator(self.fft), self.body.inverse(self.fft))
+        self.making = time.process_time() - began  # seconds, in which those of the finest grid are made
+
+    def solver(self, tolerance: float, single: bool = False, slab: Slab | None = None) -> Solver:
+        own = self.slab if slab is None else slab
+        solver = ContactSolver(Workspace(own, tolerance), self.height, tolerance, 500, free=True)
+        if slab is None:
+            return solver, self.operators
+        fft = FFT(slab, measured=False)
+        return solver, Operators(self.body.operator(fft), self.body.inverse(fft))
+
+    def on_tiles(self, tiles: Tiles, tolerance: float) -> Solver:
+        work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, self.slab.tally), tolerance)
+        solver = ContactSolver(work, self.height, tolerance, 500, LARGER_CELLS, free=True)
+        return solver, Operators(*self.body.on_tiles(tiles, self.slab.tally))
+
+    def start(self, solver: Solver) -> Map:
+        start, (own, operators) = np.zeros_like(self.heights), solver
+        coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
+        cold_start.prepare(own, self.problem(operators), start, coarse, self.on_tiles)
+        return start
+
+
+def dilute(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
+    """Two grids of two and four times as many points along a side, at two loads each."""
+    for times, load in CASES:
+        yield from _case(times * points, load, min(rounds, 5), asked.peers)
+
+
+def _case(points: int, load: float, rounds: int, peers: Path | None) -> Iterator[Line]:
+    surface = Free(points, load)
+    surface.reference = surface.solve(surface.solver(EXACT))
+    name = f"{points} x {points}, {np.mean(surface.reference > 0.0):.2%}"
+    with tempfile.TemporaryDirectory() as where:
+        given = {"heights": surface.heights, "reference": surface.reference / MODULUS, "load": load, "wanted": ERROR}
+        other = None if peers is None else _Other(installed(peers, "aspher"), given, Path(where, "given.npz"))
+        solver, error = surface.loosest(ERROR if other is None else min(other.error, ERROR))
+        calls = surface.slab.tally["operator"]
+        surface.solve(solver)
+        calls = surface.slab.tally["operator"] - calls
+        ours, theirs = list[float](), list[float]()
+        for _ in range(rounds):
+            began = time.process_time()
+            surface.solve(solver)
+            ours.append(time.process_time() - began)
+            if other is not None:
+                theirs.append(other.turn())
+    yield Line(f"{name}: operator calls", calls)
+    yield Line(f"{name}: pressure error", error)
+    yield Line(f"{name}: operators of the finest grid", 1e3 * surface.making, "ms")
+    yield Line(f"{name}: a cold solve", 1e3 * statistics.median(ours), "ms")
+    if other is not None:
+        other.end()
+        yield Line(f"{name}: aspher: error", other.error)
+        yield Line(f"{name}: aspher", 1e3 * statistics.median(theirs), "ms")
+        yield quartiles(f"{name}: aspher over ours", [a / b for a, b in zip(theirs, ours, strict=True)])
+
+
+class _Other:
+    """aspher in a process of its own, which solves when it is its turn, by the loosest tolerance that is enough."""
+
+    def __init__(self, python: Path, given: dict[str, object], file: Path) -> None:
+        self.tolerance, self.error = np.nan, np.inf
+        np.savez(file, **given)  # type: ignore[arg-type]
+        words = [str(python), "-c", TURN.format(attempt=ASPHER), str(file)]
+        alone = {**os.environ, "OMP_NUM_THREADS": "1"}
+        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=alone)
+        for tolerance in TOLERANCES:
+            self.tolerance = tolerance
+            self.turn()
+            if self.error <= ERROR:
+                return
+
+    def turn(self) -> float:
+        """Seconds of a solve."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(self.tolerance, file=self._process.stdin, flush=True)
+        seconds, self.error = json.loads(self._process.stdout.readline())
+        return float(seconds)
+
+    def end(self) -> None:
+        self._process.communicate()
