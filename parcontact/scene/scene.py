@@ -29,8 +29,8 @@ from ..physics.surface import Surface
 from ..physics.tiles import SIDE, Tiles
 from ..physics.units import Units
 from ..printed import quantity
-from ..solve.adhesive import kernels as laws
-from ..solve.adhesive.solver import GapOperators, GapSolver, Law
+from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
+from ..solve.adhesive.solver import GapOperators, GapSolver
 from ..solve.adhesive.sticking import StickingSolver
 from ..solve.bounded import Bounded
 from ..solve.constraint import Constraint, NonNegative
@@ -168,7 +168,7 @@ class Scene:
         law = self.choices.adhesion
         if law is None:
             return None
-        kind = laws.DUGDALE if law.kind == "dugdale" else laws.EXPONENTIAL
+        kind = DUGDALE if law.kind == "dugdale" else EXPONENTIAL
         return Law(kind, law.strength / (alpha * self.units.pressure), law.range / self.units.height)
 
 

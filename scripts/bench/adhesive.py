@@ -11,8 +11,8 @@ from mpi4py import MPI
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.adhesive import kernels
-from parcontact.solve.adhesive.solver import GapOperators, GapSolution, GapSolver, Law
+from parcontact.solve.adhesive.law import EXPONENTIAL, Law
+from parcontact.solve.adhesive.solver import GapOperators, GapSolution, GapSolver
 from parcontact.solve.problem import Approach
 
 from .peers import ADHESION_COLD, TAMAAS_ADHESIVE, Task, compare_peers
@@ -35,7 +35,7 @@ class Sticky:
         self.heights -= self.heights.mean()
         work = STRENGTH * MODULUS * 8 / points
         reach = float(np.sqrt(2 / points * work / MODULUS))  # a cell is half a process zone
-        self.law = Law(kernels.EXPONENTIAL, work / reach, reach)
+        self.law = Law(EXPONENTIAL, work / reach, reach)
         self.mean_gap = float(self.heights.std())
         operators = GapOperators(*HalfSpace((1.0, 1.0)).gap_operators(FFT(self.slab)))
         self.solver = GapSolver(self.slab, operators, 1000)

@@ -1,73 +1,52 @@
 """Fused loops over this rank's rows for contacts that stick; each returns partial sums for one Allreduce.
 
-A law is three numbers: its `kind` (EXPONENTIAL or DUGDALE), its strength `s` and its range `rho`,
-
-    exponential  sigma(g) = s exp(-g/rho),           gamma(g) = s rho exp(-g/rho),
-    dugdale      sigma(g) = s where g < rho, else 0,  gamma(g) = s max(rho - g, 0).
+The law of adhesion is three numbers `kind, s, rho` (`law`); q is the pressure K (g + h), to which a mean is added.
 """
-
-import math
 
 import numpy as np
 
 from ...compiled import loop
+from .law import EXPONENTIAL, attraction, energy, softening
 
-EXPONENTIAL, DUGDALE = 0, 1
-
-
-@loop
-def traction(kind, s, rho, g):
-    """The attraction sigma at a gap."""
-    if kind == EXPONENTIAL:
-        return s * math.exp(-g / rho)
-    return s if g < rho else 0.0
+SHORT = 1e-3  # accuracy: of a way over the range, whose energy is then right to 1e-7
 
 
 @loop
-def energy(kind, s, rho, g):
-    """The energy gamma per area that it takes to open a gap from g on."""
-    if kind == EXPONENTIAL:
-        return s * rho * math.exp(-g / rho)
-    return s * (rho - g) if g < rho else 0.0
+def attract(kind, s, rho, g, sigma):
+    """`sigma <- sigma(g)`."""
+    for j in range(g.shape[0]):
+        for i in range(g.shape[1]):
+            sigma[j, i] = attraction(kind, s, rho, g[j, i])
 
 
 @loop
-def softening(kind, s, rho, g):
-    """`-d sigma/dg`."""
-    if kind == EXPONENTIAL:
-        return s / rho * math.exp(-g / rho)
-    return 0.0
-
-
-@loop
-def open_residual(kind, s, rho, g, q):
-    """Over points with an open gap: their count, and the sum of `q + sigma(g)`."""
+def press(g, q, sigma, step, image):
+    """`q <- q + step image`. Over points with an open gap: their count, and the sum of `q + sigma`."""
     count, total = 0.0, 0.0
     for j in range(g.shape[0]):
         row_count, row_total = 0.0, 0.0
         for i in range(g.shape[1]):
-            if g[j, i] > 0.0:
-                row_count += 1.0
-                row_total += q[j, i] + traction(kind, s, rho, g[j, i])
+            q[j, i] += step * image[j, i]
+            weight = 1.0 if g[j, i] > 0.0 else 0.0
+            row_count += weight
+            row_total += weight * (q[j, i] + sigma[j, i])
         count += row_count
         total += row_total
     return count, total
 
 
 @loop
-def residual(kind, s, rho, g, q, mean, working, c, c_old):
-    """`c = q + mean + sigma(g)` on the working set, open points and those in contact that are pulled, else 0; the old
-    one is kept. Returns the size of the set, the sums of c over it and of sigma over all points, and the largest -g."""
-    count, total, attraction = 0.0, 0.0, 0.0
+def residual(g, q, sigma, mean, working, c):
+    """`c = q + mean + sigma` on the working set, open points and those in contact that are pulled, else 0. Returns the
+    size of the set, the sums of c over it and of sigma over all points, and the largest -g."""
+    count, total, attracted = 0.0, 0.0, 0.0
     lowest = np.full(g.shape[1], np.inf)
     for j in range(g.shape[0]):
-        row_count, row_total, row_attraction = 0.0, 0.0, 0.0
+        row_count, row_total, row_attracted = 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
-            c_old[j, i] = c[j, i]
-            pull = traction(kind, s, rho, g[j, i])
-            pushed = q[j, i] + mean + pull
+            pushed = q[j, i] + mean + sigma[j, i]
             lowest[i] = min(lowest[i], g[j, i])
-            row_attraction += pull
+            row_attracted += sigma[j, i]
             inside = (g[j, i] > 0.0) | (pushed < 0.0)
             working[j, i] = inside
             c[j, i] = pushed if inside else 0.0
@@ -75,8 +54,8 @@ def residual(kind, s, rho, g, q, mean, working, c, c_old):
             row_total += pushed if inside else 0.0
         count += row_count
         total += row_total
-        attraction += row_attraction
-    return count, total, attraction, -lowest.min()
+        attracted += row_attracted
+    return count, total, attracted, -lowest.min()
 
 
 @loop
@@ -88,18 +67,19 @@ def centre(working, mean, c):
 
 
 @loop
-def judge(working, q, mean, c, g, h, z):
-    """Sums of the weights `|p| + |c|`, of these times u and u^2, and over the working set times |z|, with
-    `p = q + mean` and `u = g + h`."""
+def judge(working, g, h, q, mean, sigma, z):
+    """With `p = q + mean` and `c = p + sigma` on the working set: sums of the weights `|p| + |c|`, of these times u and
+    u^2, with `u = g + h`, and over the set times |z|."""
     load, first, second, wrong = 0.0, 0.0, 0.0, 0.0
     for j in range(g.shape[0]):
         row_load, row_first, row_second, row_wrong = 0.0, 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
-            size, u = abs(q[j, i] + mean) + abs(c[j, i]), g[j, i] + h[j, i]
+            p, u, weight = q[j, i] + mean, g[j, i] + h[j, i], 1.0 if working[j, i] else 0.0
+            size = abs(p) + weight * abs(p + sigma[j, i])
             row_load += size
             row_first += size * u
             row_second += size * u * u
-            row_wrong += size * abs(z[j, i]) if working[j, i] else 0.0
+            row_wrong += weight * size * abs(z[j, i])
         load += row_load
         first += row_first
         second += row_second
@@ -108,25 +88,27 @@ def judge(working, q, mean, c, g, h, z):
 
 
 @loop
-def products(working, c, c_old, z, t):
-    """Over the working set: sums of z, t, c z, c_old z and c t."""
-    sum_z, sum_t, c_z, old_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(c.shape[0]):
-        row_z, row_t, row_c_z, row_old_z, row_c_t = 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(c.shape[1]):
+def products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
+    """Over the working set, with `c = q + mean + sigma` and its change `e = step image + sigma - sigma_old + shift` in
+    the last step: sums of z, t, c z, e z and c t."""
+    sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(z.shape[0]):
+        row_z, row_t, row_c_z, row_e_z, row_c_t = 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(z.shape[1]):
             weight = 1.0 if working[j, i] else 0.0
             z_here, t_here = weight * z[j, i], weight * t[j, i]
+            c = q[j, i] + mean + sigma[j, i]
             row_z += z_here
             row_t += t_here
-            row_c_z += c[j, i] * z_here
-            row_old_z += c_old[j, i] * z_here
-            row_c_t += c[j, i] * t_here
+            row_c_z += c * z_here
+            row_e_z += (step * image[j, i] + sigma[j, i] - sigma_old[j, i] + shift) * z_here
+            row_c_t += c * t_here
         sum_z += row_z
         sum_t += row_t
         c_z += row_c_z
-        old_z += row_old_z
+        e_z += row_e_z
         c_t += row_c_t
-    return sum_z, sum_t, c_z, old_z, c_t
+    return sum_z, sum_t, c_z, e_z, c_t
 
 
 @loop
@@ -138,63 +120,76 @@ def turn(working, z, beta, mean, t):
 
 
 @loop
-def curvature(kind, s, rho, g, t, image):
-    """Sums of `t K t`, whose second factor is the image, of `t^2 (-d sigma/dg)`, and of t."""
-    stiff, soft, total = 0.0, 0.0, 0.0
-    for j in range(t.shape[0]):
-        row_stiff, row_soft, row_total = 0.0, 0.0, 0.0
-        for i in range(t.shape[1]):
-            row_stiff += t[j, i] * image[j, i]
-            row_soft += t[j, i] * t[j, i] * softening(kind, s, rho, g[j, i])
-            row_total += t[j, i]
-        stiff += row_stiff
-        soft += row_soft
-        total += row_total
-    return stiff, soft, total
-
-
-@loop
-def advance(g, t, step, out):
-    """`out = max(g - step t, 0)`; its sum, and by how much cutting off has raised it."""
+def lead(g, t, step, way):
+    """The way `max(g - step t, 0) - g` of a step. Returns the sum of the gaps to which it leads, and by how much
+    cutting off has raised it."""
     total, cut = 0.0, 0.0
-    for j in range(g.shape[0]):
+    for j in range(t.shape[0]):
         row_total, row_cut = 0.0, 0.0
-        for i in range(g.shape[1]):
-            value = g[j, i] - step * t[j, i]
-            kept = 0.0 if value < 0.0 else value
-            out[j, i] = kept
+        for i in range(t.shape[1]):
+            wanted = g[j, i] - step * t[j, i]
+            kept = wanted if wanted > 0.0 else 0.0
+            way[j, i] = kept - g[j, i]
             row_total += kept
-            row_cut += kept - value
+            row_cut += kept - wanted
         total += row_total
         cut += row_cut
     return total, cut
 
 
 @loop
-def change(kind, s, rho, g, q, g_new, q_new):
-    """Sums of `(g_new - g) (q + q_new)/2 - gamma(g_new) + gamma(g)`, its magnitude, and of `g_new - g`."""
-    total, size, moved = 0.0, 0.0, 0.0
+def rescale(g, factor, way):
+    """Lead the way to `factor` times the gap to which it led."""
     for j in range(g.shape[0]):
-        row_total, row_size, row_moved = 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
-            rise = g_new[j, i] - g[j, i]
-            elastic = 0.5 * rise * (q[j, i] + q_new[j, i])
-            surface = energy(kind, s, rho, g[j, i]) - energy(kind, s, rho, g_new[j, i])
-            row_total += elastic + surface
-            row_size += abs(elastic) + abs(surface)
-            row_moved += rise
-        total += row_total
-        size += row_size
-        moved += row_moved
-    return total, size, moved
+            way[j, i] = factor * (g[j, i] + way[j, i]) - g[j, i]
 
 
 @loop
-def subtract(q, step, image, out):
-    """`out = q - step image`."""
-    for j in range(q.shape[0]):
-        for i in range(q.shape[1]):
-            out[j, i] = q[j, i] - step * image[j, i]
+def curvature(kind, rho, g, q, mean, sigma, way, image):
+    """Sums over a way w of `-c w`, of `w K w`, whose second factor is the image, of `w^2 (-d sigma/dg)` and of w; and
+    the largest -w/g."""
+    slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
+    fastest = np.zeros(g.shape[1])
+    for j in range(g.shape[0]):
+        row_slope, row_stiff, row_soft, row_total = 0.0, 0.0, 0.0, 0.0
+        for i in range(g.shape[1]):
+            w = way[j, i]
+            row_slope -= (q[j, i] + mean + sigma[j, i]) * w
+            row_stiff += w * image[j, i]
+            row_soft += w * w * softening(kind, rho, sigma[j, i])
+            row_total += w
+            fastest[i] = max(fastest[i], -w / g[j, i] if w < 0.0 else 0.0)
+        slope += row_slope
+        stiff += row_stiff
+        soft += row_soft
+        total += row_total
+    return slope, stiff, soft, total, fastest.max()
+
+
+@loop
+def move(kind, s, rho, g, q, mean, sigma, step, way, image, g_new, sigma_new):
+    """`g_new = g + step way`, and its attraction. Returns the sums of `d (q + mean + step image/2) + gamma(g) -
+    gamma(g_new)`, with `d = g_new - g`, and of its magnitude. Energies of short ways are those of the mean attraction,
+    which rounds less."""
+    total, size = 0.0, 0.0
+    for j in range(g.shape[0]):
+        row_total, row_size = 0.0, 0.0
+        for i in range(g.shape[1]):
+            now, d, pull = g[j, i], step * way[j, i], sigma[j, i]
+            new = now + d if now + d > 0.0 else 0.0
+            pull_new = attraction(kind, s, rho, new)
+            surface = energy(kind, rho, now, pull) - energy(kind, rho, new, pull_new)
+            if kind == EXPONENTIAL and abs(d) < SHORT * rho:
+                surface = 0.5 * d * (pull + pull_new)
+            push = q[j, i] + mean + 0.5 * step * image[j, i]
+            g_new[j, i] = new
+            sigma_new[j, i] = pull_new
+            row_total += d * push + surface
+            row_size += abs(d * push) + abs(surface)
+        total += row_total
+        size += row_size
+    return total, size
 
 
 @loop
@@ -242,7 +237,7 @@ def surface_energy(kind, s, rho, g):
     for j in range(g.shape[0]):
         row = 0.0
         for i in range(g.shape[1]):
-            row -= energy(kind, s, rho, g[j, i])
+            row -= energy(kind, rho, g[j, i], attraction(kind, s, rho, g[j, i]))
         total += row
     return total
 
