@@ -152,9 +152,9 @@ class SteadySliding:
     ) -> tuple[float, ErrorBudget]:
         """Return friction from that by energy, with what an interface adds, and how wrong it and the area are;
         collective."""
-        setup, speed = self.setup, math.hypot(*velocity)
+        setup, (x, y) = self.setup, _direction(velocity)
         load, rise = setup.slab.sum(*slope_under(contact.p, self.levels[0].heights))
-        slopes = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / (speed * measures.normal_force)
+        slopes = -(measures.force_x * x + measures.force_y * y) / measures.normal_force
         friction = by_energy + measures.friction_interface
         seen = StepObservation(
             contact.certificate.complementarity,
@@ -222,8 +222,8 @@ class SteadySliding:
         else:
             p[...] = start
         contact, operator = solve(self.levels[0], p)
-        speed, unit, load = math.hypot(*velocity), self.setup.units.height / self.setup.units.length, kernels.total(p)
-        lost = operator.loss(p, self.setup.size, (velocity[0] / speed, velocity[1] / speed))
+        unit, load = self.setup.units.height / self.setup.units.length, kernels.total(p)
+        lost = operator.loss(p, self.setup.size, _direction(velocity))
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
     def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> tuple[SteadySolver, Convolution]:
@@ -255,3 +255,9 @@ class SteadySliding:
 def tolerance_of(asked: float) -> float:
     """Return the tolerance on the certificate of a steady state for the one that a job asks for."""
     return max(SHARE * asked, min(LOOSE, asked))
+
+
+def _direction(velocity: Vector) -> tuple[float, float]:
+    """Return the unit vector of a velocity; that of x for a surface at rest."""
+    speed = math.hypot(*velocity)
+    return (velocity[0] / speed, velocity[1] / speed) if speed > 0.0 else (1.0, 0.0)

@@ -1,11 +1,11 @@
-"""What a steady start holds, as it is planned, and that it comes before the maps of the march."""
+"""What a steady start holds, as it is planned, and that it comes before the maps of the march; a start at rest."""
 
 from typing import Any
 
 import pytest
 from mpi4py import MPI
 
-from parcontact import scene
+from parcontact import Simulation, scene
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory, report
@@ -99,3 +99,22 @@ def test_plan_tells_both() -> None:
     virgin = planned.model_copy(update={"initial": type(planned.initial)()})
     assert not any("steady" in text for text in report.maps(virgin, [1]))
     assert memory.steady_start(virgin) == 0
+
+
+def test_at_rest_the_body_is_relaxed() -> None:
+    """The contact is the elastic one of the long-term modulus, to the tolerance of both solves, and without friction."""
+    planned = job({"points": 64}, WAVE, (0.0, 0.0), tolerance=1e-6)
+    point = SteadySliding(scene.set_up(planned, Slab(MPI.COMM_SELF, 64, 64))).solve((0.0, 0.0), 1e5)
+    elastic = Simulation(
+        {
+            "grid": {"points": 64, "size": 1e-3},
+            "surface": WAVE,
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "history": [{"pressure": 1e5}],
+            "numerics": {"tolerance": 1e-6},
+        },
+        comm=MPI.COMM_SELF,
+    ).run()
+    assert point.friction == 0.0
+    assert point.measures.contact_area == elastic.contact_area
+    assert point.measures.max_pressure == pytest.approx(elastic.max_pressure, rel=1e-5)
