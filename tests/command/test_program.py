@@ -44,7 +44,7 @@ def test_from_job_to_result(run_parcontact: RunParcontact, tmp_path: Path) -> No
     table = [line.split()[0] for line in lines[1:-1] if line.startswith("    ")]
     assert table == ["step", *map(str, range(STEPS + 1))]
     farewell = [line.split()[0] for line in lines[lines.index(line_of(lines, STEPS)) + 1 : -1]]
-    assert farewell == ["estimated", "estimated", "mu_max,", "mu_dyn,", "the", "largest"], done.stdout
+    assert farewell == ["mu_max,", "mu_dyn,", "the", "largest", "estimated", "estimated"], done.stdout
     assert lines[-1] == "done: results in out/job"
     out = tmp_path / "out" / "job"
     assert [int(row["step"]) for row in rows(out)] == list(range(STEPS + 1))
