@@ -172,8 +172,12 @@ class Job(Part):
         return bool(self.material.fitted.branches) or self.section("adhesion") is not None
 
     def resolved(self) -> str:
-        """YAML text with every default filled in; it loads back to an equal job, where the files that it names are."""
-        return dump(listing.plain(self))
+        """YAML text with every default filled in; it loads back to an equal job, where the files that it names are.
+
+        What `numerics.accuracy` has chosen is a comment, as it is not given.
+        """
+        chosen = ", ".join(f"{name} {value!r}" for name, value in self.numerics.chosen.items())
+        return dump(listing.plain(self)) + (f"# chosen by numerics.accuracy: {chosen}\n" if chosen else "")
 
 
 SEPARATOR = ":"  # of sections in the name of an extended job, by which other ranks find its class

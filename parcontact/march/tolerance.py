@@ -64,8 +64,8 @@ class StepTolerance:
 def follows(scene: Scene) -> bool:
     """Return whether the tolerance of steps follows the error budget: where `numerics.accuracy` has chosen that of the
     job, and stages last. Contacts with adhesion are solved to that of the job."""
-    chosen = scene.choices
-    return chosen.numerics.tolerance_is_chosen and chosen.timeline.lasts and chosen.adhesion is None
+    choices = scene.choices
+    return "tolerance" in choices.numerics.chosen and choices.timeline.lasts and choices.adhesion is None
 
 
 def _room(budget: ErrorBudget, asked: Accuracy) -> float:

@@ -22,7 +22,6 @@ from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
 from ..job.checks.advice import STEPS_PER_WAVE
 from ..job.checks.cells import ASIDE, cells_across, cells_per_wave, fast_length, one_cell
-from ..job.sections.calculation import BRANCH_SHARE, TOLERANCE_SHARE
 from ..job.sections.listing import plain
 from ..physics.mesh_error import SPOTS_ORDER
 from ..physics.time_error import TIME_ORDER
@@ -101,8 +100,7 @@ def shortest_wave(job: Job) -> float | None:
 def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
     """The job with the numerics of an accuracy; on its own mesh if its surface cannot be put on another."""
     data: dict[str, Any] = plain(job)
-    shares = {"tolerance": TOLERANCE_SHARE * accuracy, "branch_error": BRANCH_SHARE * accuracy}
-    data["numerics"] |= {"accuracy": accuracy, **shares}
+    data["numerics"] |= {"accuracy": accuracy, "tolerance": None, "branch_error": None}
     try:
         return Job.model_validate({**data, "grid": {**data["grid"], "points": list(points)}})
     except ValidationError:

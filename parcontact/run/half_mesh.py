@@ -40,7 +40,7 @@ def job_on_half_mesh(job: Job) -> Job:
     data["numerics"]["strict"] = False
     if Timeline.of(job).chooses:
         own = job.numerics.asked.of_steps
-        data["numerics"]["accuracy"] = min(LOOSER * own, max(LOOSEST, own))
+        data["numerics"] |= {"accuracy": min(LOOSER * own, max(LOOSEST, own)), **job.numerics.chosen}
     for stage in data["history"]:
         if "cells_per_step" in stage:
             stage["cells_per_step"] /= 2

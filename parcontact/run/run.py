@@ -12,7 +12,6 @@ from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.checks.cells import more_points
-from ..job.sections.calculation import BRANCH_SHARE
 from ..job.sections.listing import plain
 from ..march import loop
 from ..march.failure import StepError
@@ -239,9 +238,9 @@ def chosen_by_accuracy(job: Job) -> set[str]:
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
     stages = [stage for stage in lasting if stage.speed > 0.0] or lasting
     chosen = {
-        "solver": numerics.tolerance_is_chosen,
+        "solver": "tolerance" in numerics.chosen,
         "time": bool(stages) and all(stage.chooses for stage in stages),
         "mesh": bool(job.origin.mesh),
-        "folded": numerics.branch_error == BRANCH_SHARE * numerics.asked.strictest,
+        "folded": "branch_error" in numerics.chosen,
     }
     return {name for name, by_accuracy in chosen.items() if by_accuracy}

@@ -15,6 +15,7 @@ from parcontact.run.run import chosen_by_accuracy
         ({"cells_per_step": 1}, {}, {"solver", "folded"}),
         ({}, {"accuracy": 0.03, "tolerance": 1e-4}, {"time", "folded"}),
         ({}, {"tolerance": 1e-4, "branch_error": 0.0}, {"time"}),
+        ({}, {"tolerance": 5e-3, "branch_error": 1e-3}, {"time"}),  # given, though they are what would be chosen
     ],
 )
 def test_what_a_smaller_accuracy_would_help(slide: dict[str, Any], numerics: dict[str, Any], parts: set[str]) -> None:

@@ -11,8 +11,8 @@ from pydantic import (
     BeforeValidator,
     Field,
     PlainValidator,
+    PrivateAttr,
     TypeAdapter,
-    ValidationError,
     ValidationInfo,
 )
 
@@ -151,24 +151,19 @@ class Numerics(Part):
     accept_unconverged: Flag = False
     strict: Flag = False
 
-    @classmethod
-    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Fill in the tolerance and the error of folded branches, which are shares of the accuracy."""
-        if (given := data.get("accuracy")) is None:
-            return data
-        try:
-            value = TypeAdapter(cls.model_fields["accuracy"].rebuild_annotation()).validate_python(
-                given, context=context
-            )
-        except ValidationError:
-            return data
-        least = value.strictest if isinstance(value, Accuracy) else value
-        return {"tolerance": TOLERANCE_SHARE * least, "branch_error": BRANCH_SHARE * least, **data}
+    _chosen: dict[str, float] = PrivateAttr(default_factory=dict)
+
+    def model_post_init(self, context: Any) -> None:
+        """Let the accuracy choose what is not given."""
+        least = self.asked.strictest
+        shares = {"tolerance": TOLERANCE_SHARE * least, "branch_error": BRANCH_SHARE * least}
+        self._chosen = {name: share for name, share in shares.items() if name not in self.model_fields_set}
+        self.__dict__.update(self._chosen)
 
     @property
-    def tolerance_is_chosen(self) -> bool:
-        """True if the tolerance is that which belongs to the accuracy."""
-        return self.tolerance == TOLERANCE_SHARE * self.asked.strictest
+    def chosen(self) -> dict[str, float]:
+        """The values that the accuracy has chosen: those of keys that are not given."""
+        return self._chosen
 
     @property
     def asked(self) -> Accuracy:

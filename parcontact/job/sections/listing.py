@@ -8,17 +8,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from .calculation import Numerics
 from .height_arrays import HeightArray
 from .part import Part
 from .stages import Ramp
 
 
 def plain(value: Any) -> Any:
-    """Return a value of a job as the plain data it was written as; keys without a value are left out."""
+    """Return a value of a job as the plain data it was written as; keys without a value are left out, and those that
+    the accuracy has chosen: it chooses them again."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
-        return {key: plain(inner) for key, inner in items(value)}
+        chosen = value.chosen if isinstance(value, Numerics) else ()
+        return {key: plain(inner) for key, inner in items(value) if key not in chosen}
     if isinstance(value, Ramp):
         return value.start if value.constant else {"from": value.start, "to": value.end}
     if isinstance(value, tuple):
@@ -34,6 +37,7 @@ def items(part: Part) -> Iterator[tuple[str, Any]]:
 def plain_job(job: Any) -> dict[str, Any]:
     """Return a job as plain data by which it is known; files that are read are known by what they hold."""
     data: dict[str, Any] = plain(job)
+    data["numerics"] |= job.numerics.chosen
     for part, given in zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True):
         for key in ("path", "spectrum"):
             if isinstance(path := getattr(given, key, None), Path):
