@@ -167,9 +167,13 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def describe_pull_off(columns: Mapping[str, list[Any]], area: float) -> Iterator[str]:
-    """The lowest load of a surface that was pulled, and where: columns of measures.csv, area of the box [m^2]."""
-    pressures = columns["pressure"]
-    row = pressures.index(min(pressures))
+    """The lowest load after the deepest approach, if it pulls, and where: columns of measures.csv, area of box [m^2].
+
+    On the way there surfaces that stick may pull each other harder, which is no pull-off.
+    """
+    pressures, approaches = columns["pressure"], columns["approach"]
+    deepest = approaches.index(max(approaches))
+    row = min(range(deepest, len(pressures)), key=pressures.__getitem__)
     if pressures[row] < 0.0:
         where = f"t = {quantity(columns['time'][row], 's', 4)}, approach {quantity(columns['approach'][row], 'm', 4)}"
         load = f"{quantity(pressures[row] * area, 'N', 4)}, {quantity(pressures[row], 'Pa', 4)}"

@@ -3,8 +3,8 @@
 from parcontact.summary import info
 
 
-def test_the_lowest_load_is_the_pull_off() -> None:
-    columns = {"pressure": [0.0, 2.0, -3.0, -1.0], "time": [0.0, 1.0, 2.0, 3.0], "approach": [0.0, 1e-6, -1e-6, -2e-6]}
+def test_the_lowest_load_of_the_way_back_is_the_pull_off() -> None:
+    columns = {"pressure": [-4.0, 2.0, -3.0, -1.0], "time": [0.0, 1.0, 2.0, 3.0], "approach": [0.0, 1e-6, -1e-6, -2e-6]}
     assert list(info.describe_pull_off(columns, 0.5)) == ["lowest load: -1.5 N, -3 Pa, at t = 2 s, approach -1 um"]
 
 
