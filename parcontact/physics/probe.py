@@ -49,6 +49,7 @@ class Probe:
         with `velocity` [m/s]; collective.
 
         `touching` is a map that is not 0 where the surfaces touch; without one that is where there is a pressure.
+        Where nothing touches all pressure is tension. A load above 0 is then an error of the solve, and friction is 0.
         """
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
@@ -63,6 +64,7 @@ class Probe:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
+        presses = normal > 0.0 and count > 0
         corrected = (count - self._excess * sides) / points
         own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]
@@ -70,7 +72,7 @@ class Probe:
             pressure=load / points * unit_pressure,
             force_x=force_x,
             force_y=force_y,
-            friction=math.hypot(force_x, force_y) / normal if normal > 0.0 else 0.0,
+            friction=math.hypot(force_x, force_y) / normal if presses else 0.0,
             contact_area=count / points,
             approach=d * units.height - self.surface.datum,
             mean_gap=(gaps / points - d) * units.height,
@@ -78,7 +80,7 @@ class Probe:
             contact_area_corrected=corrected,
             at_edge=edge > 0.0,
             normal_force=normal,
-            friction_interface=math.hypot(*own) / normal if normal > 0.0 else 0.0,
+            friction_interface=math.hypot(*own) / normal if presses else 0.0,
         )
 
 

@@ -131,3 +131,15 @@ def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:
     found = Probe(surface.slab, surface, UNITS).measure(none, ALPHA, none, h, -1.0, (0.0, 0.0))
     assert found == Measures(approach=-UNITS.height, mean_gap=found.mean_gap)
     assert_allclose(found.mean_gap, UNITS.height, rtol=1e-14)  # the wave has no mean
+
+
+@pytest.mark.parametrize("touches", [False, True])
+def test_a_load_on_nothing_has_no_friction(comm: MPI.Intracomm, touches: bool) -> None:
+    """Surfaces that stick and touch nowhere carry no load: one above 0 is an error of the solve, however small."""
+    surface = wave(comm, (3, 0))
+    slab, h = surface.slab, surface.heights((0.0, 0.0), surface.slab.empty())
+    p = 1e-9 * (1.0 + np.cos(angle(slab, (3, 0)) - 0.6))
+    touching = np.full_like(p, touches)
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h, h, 0.0, (0.0, 0.0), touching=touching)
+    assert found.pressure > 0.0
+    assert (found.friction > 0.0) == touches
