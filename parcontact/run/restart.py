@@ -103,7 +103,8 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
     if problem := checkpoint.verify(found, slab):
         return problem
     if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
-        raise InputError(f"{path}: {difference}; {ADVICE}, --restart PATH goes on from an earlier checkpoint")
+        other = "to go on otherwise, end the running stage where it is and add another; or"
+        raise InputError(f"{path}: {difference}; {other} {ADVICE}, --restart PATH goes on from an earlier checkpoint")
     return found
 
 
@@ -168,7 +169,7 @@ def _apart(old: Step, new: Step) -> Iterator[str]:
     """Yield in what two steps differ."""
     size = math.hypot(*old.position)
     if old.jump != new.jump:
-        yield "was a jump of the load, is none" if old.jump else "was none, is a jump of the load"
+        yield "was a jump of the load, and is none now" if old.jump else "was no jump of the load, and is one now"
     if not math.isclose(old.time, new.time, rel_tol=SAME_STEP):
         yield f"ended at t = {old.time!r} s, ends at {new.time!r} s"
     if old.control != new.control or not math.isclose(old.load, new.load, rel_tol=SAME_STEP):
