@@ -106,7 +106,7 @@ def steady(
             failures.append(str(error))
             warnings.warn(str(error), RuntimeWarning, stacklevel=2)
     if slab.root:
-        for text in describe_missed([point for point in points if point], found.numerics.asked.both):
+        for text in describe_missed([point for point in points if point], found):
             warnings.warn(text, UserWarning, stacklevel=2)
     return _curve(wanted.points, points, tuple(failures))
 

@@ -8,6 +8,7 @@ from typing import Any
 from .. import progress
 from ..effects.interface import InterfaceColumns
 from ..effects.thermal import ThermalColumns
+from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..physics.budget import advice, describe, exceeds
 from ..storage import curve_points, files, tables
@@ -135,7 +136,7 @@ class CurveTable:
         if self.known:
             self._sort()
         self.warn(list(describe_hot(self._points)))
-        self.warn(list(describe_missed(self._points, self._job.numerics.asked.both, bool(self._job.origin.mesh))))
+        self.warn(list(describe_missed(self._points, self._job)))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
@@ -162,20 +163,21 @@ class CurveTable:
             self._waves.close()
 
 
-def describe_missed(points: Sequence[Point], asked: tuple[float, float], auto: bool = False) -> Iterator[str]:
-    """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than asked for; the
-    accuracy has chosen an `auto` mesh."""
+def describe_missed(points: Sequence[Point], job: Job) -> Iterator[str]:
+    """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than the job asks
+    for."""
+    chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
     names = ("friction", "the corrected contact area")
-    for name, each, accuracy in zip(names, (friction, area), asked, strict=True):
+    for name, each, accuracy in zip(names, (friction, area), job.numerics.asked.both, strict=True):
         missed = [(parts.total, point, parts) for point, parts in each if exceeds(parts.total, accuracy)]
         if missed:
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
             yield (
                 f"estimated error of {name} at {len(missed)} of {len(points)} points: up to {describe(parts)}, "
-                f"at {place}{advice(parts, accuracy, ['mesh'] * auto)}"
+                f"at {place}{advice(parts, accuracy, chosen)}"
             )
 
 
