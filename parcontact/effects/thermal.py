@@ -131,6 +131,14 @@ class ThermalColumns:
         return Decision("thermal", True, f"{why}; {exponentials_of(job).kept} exponentials" if job.history else why)
 
     @staticmethod
+    def facts(job: Any) -> Iterator[str]:
+        """Say what the distance of steady sliding is where the job gives none."""
+        if job.section("thermal").distance is None:
+            free = job.grid.boundary == "free"
+            way = "without end" if free else f"{max(job.grid.size):g} m, the longer side of the box, since it was cold"
+            yield f"thermal.distance is not given: in friction curves the rubber has slid {way}"
+
+    @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
         """Return the types of the map of temperatures, and of those that hold its spectra."""
         count, rubs = 2 + exponentials_of(job).kept, job.section("interface") is not None
