@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..job import Initial, Ramp, Stage
 from ..printed import per_cent, quantity, with_error
 
+LATE = 0.9  # accuracy: of the distance; a maximum beyond may be none
 DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over which friction is averaged
 SAME_INSTANT = 1e-9  # accuracy: relative: instants this close are the same
 CORRECTED = "contact_area_corrected"
@@ -115,11 +116,13 @@ def describe(
         ends_with = _slide(so_far).stop - 1
         yield f"the last slide has not begun; these numbers are of the one before, which ends with history.{ends_with}"
     rows = _during(so_far, np.asarray(columns["time"], float))
-    after = f"{quantity(found.mu_max_distance, 'm')} after its start"
+    way = columns["distance"][rows[-1]] - columns["distance"][rows[0]]
+    late = ", in its last tenth: friction may still rise" if found.mu_max_distance > LATE * way else ""
+    after = f"{quantity(found.mu_max_distance, 'm')} after its start{late}"
     yield f"mu_max, the highest friction of the slide, is {_highest(columns, rows, cell)}, {after}"
-    length = quantity(columns["distance"][rows[-1]] - columns["distance"][rows[0]], "m")
-    dynamic = _mean(columns, rows, "friction", ERRORS[0])
+    length, dynamic = quantity(way, "m"), _mean(columns, rows, "friction", ERRORS[0])
     yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
+    yield from _unsettled(columns, rows)
     area = f"{found.contact_area:.4g} as counted in points"
     if CORRECTED in columns:
         area = f"{_mean(columns, rows, CORRECTED, ERRORS[1])} as corrected for its edges, and {area}"
@@ -133,6 +136,22 @@ def describe(
         yield "in some steps of the slide friction is smaller than its estimated error"
     if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
+
+
+def _unsettled(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:
+    """Yield a sentence if friction of the two halves of the last three quarters differs by more than its known errors;
+    steady sliding has one friction."""
+    distance, friction, errors = (
+        np.asarray(columns.get(name, np.full(len(columns["friction"]), np.nan)), float)[rows]
+        for name in ("distance", "friction", ERRORS[0])
+    )
+    second = mean_over_end(distance, friction, DYNAMIC / 2)
+    first = 2.0 * mean_over_end(distance, friction) - second
+    if abs(second - first) > mean_over_end(distance, np.abs(friction) * errors):
+        yield (
+            f"friction has not settled: its means over the two halves of these three quarters, {first:.4g} and "
+            f"{second:.4g}, differ by more than the estimated error"
+        )
 
 
 def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:

@@ -101,7 +101,20 @@ def test_sentences_about_a_slide_that_others_follow() -> None:
     assert measure(stages(*history), table) is None
     assert len(said([REST, CLIMB, SETTLE], rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)))) == 3
     begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
-    assert said(history, begun)[0] == "mu_max, the highest friction of the slide, is 7, 1.5 m after its start"
+    late = "1.5 m after its start, in its last tenth: friction may still rise"
+    assert said(history, begun)[0] == f"mu_max, the highest friction of the slide, is 7, {late}"
+
+
+@pytest.mark.parametrize(("error", "settled"), [(0.1, False), (0.7, True)])
+def test_friction_that_goes_on_to_fall(error: float, settled: bool) -> None:
+    """On a line from 5 to 1 over 4 m the halves of the last three quarters have 3.25 and 1.75, and the whole 2.5: they
+    are 0.6 of it apart. The error is 0.1 of friction, or 0.7."""
+    x = np.linspace(0.0, 4.0, 9)
+    table = rows(*zip(x / 2.0, x, 5.0 - x, strict=True))
+    assert not any("settled" in text for text in said([{**CLIMB, "duration": 2.0}], table))
+    table["error_friction"] = [error] * x.size
+    told = [text for text in said([{**CLIMB, "duration": 2.0}], table) if "settled" in text]
+    assert ["3.25 and 1.75" in text for text in told] == [True] * (not settled)
 
 
 def test_mu_max_on_a_ripple() -> None:
