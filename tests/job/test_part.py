@@ -134,6 +134,10 @@ MATERIALS = {
 HISTORIES = {
     "history:": "4:9: history needs at least one stage, unless there is a steady section",
     "history: []": "4:10: history needs at least one stage, unless there is a steady section",
+    "history: [{pressure: 1, velocity: {from: 0, to: 1}}]": (
+        "4:35: history.0.velocity must be a velocity [m/s]: a number along x, or [vx, vy]; it does not ramp: a stage "
+        "has one velocity, write several stages"
+    ),
     "history: {pressure: 1}": "4:10: history must be a list of stages, got a mapping",
     "history: [1]": "4:11: history.0 must be a mapping of keys, got 1",
     "history: [{presure: 1, force: 1}]": "4:12: history.0.presure is not a known key; did you mean pressure?",

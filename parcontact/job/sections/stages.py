@@ -14,14 +14,24 @@ from .part import Instead, Origin, Part, Rule
 from .quantities import Flag, Positive, Real, Vector, listed, log_range
 from .temperature import Celsius
 
-Velocity = Annotated[Vector, Field(description="a velocity [m/s]: a number along x, or [vx, vy]")]
 Control = Literal["pressure", "force", "approach"]
 CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
 PRESSURE = "a pressure [Pa] of zero or more"
 FORCE = "a force [N] of zero or more"
+VELOCITY = "a velocity [m/s]: a number along x, or [vx, vy]"
 SIGNED = ", with adhesion also below zero"
 APPROACH = "a finite approach [m]"
 SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
+
+
+def _no_ramp(value: Any) -> Any:
+    """Refuse {from, to} of a velocity."""
+    if isinstance(value, dict):
+        refuse(Fault(f"must be {VELOCITY}; it does not ramp: a stage has one velocity, write several stages"))
+    return value
+
+
+Velocity = Annotated[Vector, BeforeValidator(_no_ramp), Field(description=VELOCITY)]
 
 
 @dataclass(frozen=True)
