@@ -34,7 +34,10 @@ class Prepared:
         if done.missing:
             lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / self.cut.size)}) were filled")
         if done.outliers:
-            lines.append(f"road: {done.outliers} points stick out of their neighbours by far; they are as measured")
+            lines.append(
+                f"road: {done.outliers} points stick out of their neighbours by far; they are as measured. "
+                "Missing points have to be nan in the file"
+            )
         if len(done.trend) > 1:
             tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], self.size, strict=True)]
             lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")

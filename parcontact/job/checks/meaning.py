@@ -27,7 +27,10 @@ REMEMBERS = 0.1  # accuracy: of the time since; a branch that relaxes in less ha
 ROUNDS = 1000  # tuning: through the box that are looked at
 SAME = 1e-9  # accuracy: ways this near, relatively, are the same
 BEYOND = 100.0  # physics: times slower or faster than all branches: nothing relaxes
-MANY_UNITS = "heights and lengths are in m; a file of heights in um needs scale: 1.0e-6, or unit: um in a topography"
+MANY_UNITS = (
+    "heights and lengths are in m; heights in um need a factor of 1e-6 (scale: 1.0e-6 of a file, unit: um of a "
+    "topography), and missing points are nan"
+)
 
 
 def warnings(job: Sections) -> Iterator[str]:
