@@ -18,6 +18,13 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     )
 
 
+def test_no_warning_of_a_few_points_that_lack(tmp_path: Path) -> None:
+    """Of 64^2 points, which are 8 cells per shortest wave, 3 and 6 % lack on 63^2 and on 62^2."""
+    text = replaced(SMALL, surface=ROUGH.replace("5e-4", "2.5e-4").replace("6.25e-5", "1.25e-4"))
+    points = [f"grid.points={points}" for points in (64, 63, 62)]
+    assert [bool(job_of(tmp_path, text, one).warnings) for one in points] == [False, False, True]
+
+
 def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:
     zener = "{model: zener, branches: [{modulus: 1e6, relaxation_time: 1e-3}, {modulus: 1e6, relaxation_time: 1}]}"
     history = "[{pressure: 1, duration: 1, time_step: {first: 1e-5, growth: 1.25}}]"

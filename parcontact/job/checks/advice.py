@@ -19,6 +19,7 @@ from .cells import ASIDE, Vector, needed, one_cell
 LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)
 STEPS_PER_WAVE = 4  # accuracy: fewer skip over the shortest waves while sliding
 SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
+LITTLE = 0.05  # tuning: points that lack, as a share of all; so few are not worth another mesh
 
 # Standard deviations over 8 to 12 seeds, times the longest waves along a side; found with six steady states of 2 to
 # 50 % contact of bodies of one and twelve branches, in boxes of 2, 4 and 8 of these waves: 0.11 to 0.44 for friction,
@@ -78,11 +79,11 @@ def _few_cells(
     wants = {name: needed("xy".index(name), directions, asked) for name, _, _ in _directions(grid)}
     lacks = {name: max(wants[name]) * cell / wave for name, _, cell in _directions(grid)}
     name, length, cell = max(_directions(grid), key=lambda direction: lacks[direction[0]], default=("", 0.0, 0.0))
-    if not name or lacks[name] <= 1 + SAME_LENGTH:
+    more = math.prod(max(lack, 1.0) for lack in lacks.values())
+    if not name or more <= 1 + LITTLE:
         return
     least, of_area = wants[name]
     reason = "a resolved contact" if math.isclose(least, of_area) else "friction" if least > of_area else "its area"
-    more = math.prod(max(lack, 1.0) for lack in lacks.values())
     slides = lambda axis: not directions or any(abs(way["xy".index(axis)]) > ASIDE for way in directions)  # noqa: E731
     finer = max((max(lack, 1.0) for axis, lack in lacks.items() if slides(axis)), default=1.0)
     yield (
