@@ -165,7 +165,8 @@ class Simulation:
         world, file = all_ranks(comm), path_of(path)
         agree(world, file, set)
         text = on_root(world, lambda: checkpoint.inspect(file).chain[-1].job)
-        job = read(heights.located(parse(text, str(file)).data, file), set, world)
+        elsewhere = "surface" in str(set)
+        job = read(on_root(world, lambda: heights.located(parse(text, str(file)).data, file, elsewhere)), set, world)
         if not any(key.startswith("output") for key in set or {}):  # `read` has found its keys to be words
             job = job.of(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)

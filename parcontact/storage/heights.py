@@ -25,10 +25,19 @@ def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
     hdf5.on_root(slab, write, f"cannot write the heights of the surface into {directory}", InputError)
 
 
-def located(job: dict[str, Any], checkpoint: Path) -> dict[str, Any]:
-    """Return a stored job with the paths of its height files: beside a checkpoint, or one directory up."""
-    for shape in job["surface"]:
-        if not Path(shape.get("path", "/")).is_absolute():
-            beside, above = checkpoint.parent / shape["path"], checkpoint.parent.parent / shape["path"]
+def located(job: dict[str, Any], checkpoint: Path, elsewhere: bool) -> dict[str, Any]:
+    """Return a stored job with the paths of its height files: beside a checkpoint, or one directory up; root only.
+
+    Raises InputError for one that is at neither place, unless the caller says that it is `elsewhere`.
+    """
+    for index, shape in enumerate(job["surface"]):
+        name = Path(shape.get("path", "/"))
+        if not name.is_absolute():
+            beside, above = checkpoint.parent / name, checkpoint.parent.parent / name
             shape["path"] = str((above if above.is_file() and not beside.is_file() else beside).absolute())
+            if not (elsewhere or Path(shape["path"]).is_file()):
+                raise InputError(
+                    f"{checkpoint} needs {name}, the heights of its surface, which were written with it: move both "
+                    f"files, or say where it is with set={{'surface.{index}.path': ...}}"
+                )
     return job

@@ -92,6 +92,20 @@ def test_a_checkpoint_finds_its_heights(nowhere: Path) -> None:
     assert pc.Simulation.restore("elsewhere/state.h5").run().friction == pytest.approx(run.run().friction, rel=1e-7)
 
 
+def test_a_checkpoint_without_its_heights(nowhere: Path) -> None:
+    """The message names both files; one may say where the heights are."""
+    run = pc.Simulation(JOB, comm=MPI.COMM_SELF)
+    next(run.steps())
+    run.save("state.h5")
+    (heights,) = nowhere.glob("surface-*.npy")
+    (nowhere / "there").mkdir()
+    heights = heights.rename(nowhere / "there" / heights.name)
+    with pytest.raises(pc.InputError, match=f"state.h5 needs {heights.name}, the heights of its surface"):
+        pc.Simulation.restore("state.h5", comm=MPI.COMM_SELF)
+    again = pc.Simulation.restore("state.h5", {"surface.0.path": str(heights)}, MPI.COMM_SELF)
+    assert again.row.step == run.row.step
+
+
 MISTAKES = [
     (HEIGHTS.T, "has shape (16, 12), but the grid has (ny, nx) = (12, 16)"),
     (HEIGHTS[0], "must be a numpy array of heights [m], real and finite, of shape (ny, nx), got"),
