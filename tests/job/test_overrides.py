@@ -76,7 +76,10 @@ def test_duplicates_deep_inside() -> None:
 def test_a_missing_file_and_a_directory(tmp_path: Path) -> None:
     with pytest.raises(JobError, match=r"^nowhere\.yaml: cannot be read: there is no such file$"):
         load("nowhere.yaml")
-    with pytest.raises(JobError, match="cannot be read: Is a directory"):
+    with pytest.raises(JobError, match=r"cannot be read: Is a directory$"):
+        load(tmp_path)
+    (tmp_path / "job.resolved.yaml").touch()
+    with pytest.raises(JobError, match=r"Is a directory; the job of the run in it is .*/job\.resolved\.yaml$"):
         load(tmp_path)
 
 

@@ -77,6 +77,8 @@ def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
         reason = "there is no such file"
     except (OSError, ValueError) as error:  # ValueError: a null character in its name
         reason = getattr(error, "strerror", None) or str(error)
+        if isinstance(error, IsADirectoryError) and (path / "job.resolved.yaml").is_file():
+            reason += f"; the job of the run in it is {Path(shown) / 'job.resolved.yaml'}"
     found = Source(UNREADABLE, Place(shorten(shown)))
     found.note(found.place, f"cannot be read: {reason}")
     return b"", found
