@@ -25,7 +25,8 @@ class Found:
     limit: Limit
 
     def __str__(self) -> str:
-        order = "no order found" if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
+        last = "no order found: the last case, and how much the last ones differ"
+        order = last if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
         name = f"{self.quantity} with {self.integrator}, {self.ladder}"
         if math.isnan(self.limit.uncertainty):
             return f"{name}: {self.limit.value:.4g} in the last cases, which do not differ: its error is not known"
@@ -124,7 +125,7 @@ def front(outcomes: Outcomes, error: Mapping[Settings, float]) -> list[Settings]
 
 
 def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
-    """For each target: the cheapest settings that reach it in all quantities, and how long they take."""
+    """What is held to the targets; for each the cheapest settings that reach it, and how long they take."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
     doubts = [reference[name].doubt for name in NEEDED if name in reference and reference[name].value]
@@ -148,4 +149,4 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
             lines[-1] = lines[-1].replace(" %: none", f" %, {100 * target:g} %: none")
         else:
             lines.append(f"for {100 * target:g} %: {text}")
-    return lines
+    return [f"the cheapest settings whose errors of {', '.join(NEEDED)} are all within a bound:", *lines]

@@ -123,12 +123,13 @@ def test_front_and_sentences() -> None:
     assert [round(value, 12) for value in error.values()] == [0.1, 0.02, 0.04, 0.002]
     assert verdict.front(cases, error) == [first, second, last]
     lines = verdict.sentences(cases, reference, 2)
-    assert lines[0] == f"for 5 %: {second}; 0.2 s of CPU time on 2 ranks"
-    assert lines[2] == f"for 1 %: {last}; 0.4 s of CPU time on 2 ranks"
-    assert lines[3].startswith(
+    assert lines[0].startswith("the cheapest settings whose errors of mu_max, mu_end, area_corrected are all")
+    assert lines[1] == f"for 5 %: {second}; 0.2 s of CPU time on 2 ranks"
+    assert lines[3] == f"for 1 %: {last}; 0.4 s of CPU time on 2 ranks"
+    assert lines[4].startswith(
         f"for 0.3 %: none of these settings is good enough; the best, {last}, have an error of 0.4 %"
     )
-    assert lines[3].endswith("(the reference itself is known to 0.4 %)")
+    assert lines[4].endswith("(the reference itself is known to 0.4 %)")
 
 
 def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
@@ -139,7 +140,7 @@ def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
     refined = ladders(load(path))
     same = dict.fromkeys(refined.combine(), make(1.0, 0.1))
     assert all("its error is not known" in str(one) for one in verdict.limits(refined, same))
-    lines = verdict.sentences(same, verdict.references(refined, same), 1)
+    _, *lines = verdict.sentences(same, verdict.references(refined, same), 1)
     assert all(line.endswith("(compared with the most expensive case, whose own error is not known)") for line in lines)
     path.write_text(path.read_text().replace(", cells_per_step: 1}", "}").replace(", cells_per_step: [1, 0.5]", ""))
     refined = ladders(load(path))
