@@ -28,6 +28,7 @@ POINTS = (
     *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
 )
 DIGITS = 5
+LEAKAGE = {"time": "s", "pressure": "Pa", "flow_x": "m³", "flow_y": "m³", "constriction": "m"}
 MOST_ROWS = 200  # of a table: the whole is in the data
 MOST_MAPS = 24  # pictures of one map: instants in between are left out
 MAP_DPI = 100
@@ -50,7 +51,7 @@ def describe_run(directory: Path) -> Section:
         theory_settings.describe(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)
-    shown = [numbers, *_theory(directory, run)]
+    shown = [numbers, *_leakage_of_stages(run), *_theory(directory, run)]
     return Section("Results of the run", list(filter(None, told)), shown, pictures, browse_run(run))
 
 
@@ -63,6 +64,16 @@ def _theory(directory: Path, run: Run) -> list[Table]:
     ]
     head = ("result", "run", "Persson's theory", "difference of the theory")
     return [Table(head, rows, "beside Persson's theory; the area of the run as corrected for its edges")] * bool(rows)
+
+
+def _leakage_of_stages(run: Run) -> list[Table]:
+    """Return the conductivities at the end of each stage, where the run has calculated them: the last row that has."""
+    if "flow_x" not in run.columns:
+        return []
+    known = [[row for row in rows if run.columns["flow_x"][row] >= 0.0] for rows in run.rows_of_stages.values()]
+    rows = [[format_cell(float(run.columns[name][found[-1]])) for name in LEAKAGE] for found in known if found]
+    head = [f"{_to_words(name)} [{unit}]" for name, unit in LEAKAGE.items()]
+    return [Table(head, rows, "leakage at the end of each stage")] * bool(rows)
 
 
 def _leakage(directory: Path) -> list[tuple[str, str]]:

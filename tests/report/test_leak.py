@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import __main__
-from parcontact.report import leak
+from parcontact.report import leak, results
 
 POINTS = 64
 PRESS = {"pressure": {"from": 1e4, "to": 8e4}, "duration": 1.0, "time_step": 0.25}
@@ -99,6 +99,17 @@ def test_one_instant(comm: MPI.Intracomm, shared_path: Path) -> None:
     assert (out / "leak.3.png").is_file()
     assert whole == ((out / "leak.csv").read_bytes(), (out / "leak.png").read_bytes())
     assert "flow_x" not in table(out / "measures.csv")[0]
+
+
+def test_a_report_has_the_leakage_of_each_stage(tmp_path: Path) -> None:
+    """Of the last step of a stage that has it: the flow is calculated at every second step."""
+    history = [PRESS, {**PRESS, "pressure": {"from": 8e4, "to": 2e4}}]
+    out = run(MPI.COMM_SELF, tmp_path, history=history)
+    known = [row for row in table(out / "measures.csv") if row["flow_x"]]
+    expected = [[row for row in known if float(row["time"]) <= 1.0][-1], known[-1]]
+    names = ("time", "pressure", "flow_x", "flow_y", "constriction")
+    (found,) = [one for one in results.describe_run(out).tables if "flow x [m³]" in one.head]
+    assert found.rows == [[results.format_cell(float(row[name])) for name in names] for row in expected]
 
 
 def test_gap_and_pressure_must_have_been_saved(
