@@ -67,7 +67,8 @@ def _short_waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directio
 def measured(grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
     """Yield what to say of the shortest wave [m] of a measured surface that slides along these directions."""
     known = f" ({wave:.3g} m, by the spectrum of the heights)"
-    otherwise = ", to which a map is interpolated, or heights without waves shorter than {:.4g} m"
+    otherwise = ", to which a topography is interpolated (resample an array yourself), "
+    otherwise += "or heights without waves shorter than {:.4g} m"
     yield from _few_cells("surface", wave, known, otherwise, grid, asked, directions)
 
 
