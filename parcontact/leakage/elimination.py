@@ -99,7 +99,7 @@ class Balance:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """That of the map."""
+        """The shape of the map."""
         return self._sum.shape
 
     def power(self, pressure: Map) -> float:

@@ -163,7 +163,7 @@ class HalfSpace:
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     def works_on_tiles(self, nx: int, ny: int) -> bool:
-        """Whether there are operators on tiles of a grid: of a half space with nothing around, on cells that are not
+        """Return whether tiles have operators: on a half space with nothing around, and on cells that are not
         long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
         return self.free and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)

@@ -66,7 +66,7 @@ class Tiles:
 
 
 def tiles_along(points: tuple[int, int]) -> tuple[int, int]:
-    """How many tiles there are along x and y."""
+    """Return the numbers of tiles along x and y."""
     return -(-points[0] // SIDE), -(-points[1] // SIDE)
 
 

@@ -36,8 +36,7 @@ OnTiles = Callable[[Tiles, float], tuple[ContactSolver, Operators]]  # of the sa
 
 @dataclass(frozen=True)
 class Found:
-    """What is known of a contact on a grid: its pressure, of this rank's rows, and approach, and how much displacements
-    vary within it."""
+    """A contact on a grid: pressure on the rows of this rank, approach, and how much displacements vary in it."""
 
     slab: Slab
     p: Array
@@ -46,14 +45,14 @@ class Found:
 
 
 def is_block_grid(slab: Slab, finest: Slab) -> bool:
-    """Whether a grid is coarse enough to be one of blocks, but each in a single tile of the finest grid."""
+    """Return whether a grid is coarse enough to be one of blocks, but each in a single tile of the finest grid."""
     longest = max(slab.nx, slab.ny)
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
 
 def choose(blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array) -> Tiles | None:
-    """The tiles of a grid that may touch, from the contact on the next coarser one; None where these are none, or
-    more than LARGEST_SHARE of all; collective."""
+    """Return the tiles of a grid that may touch, from the contact on the next coarser one; None where these are none,
+    or more than LARGEST_SHARE of all; collective."""
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     u = operators.operator.apply(p, blocks.empty())
     gap = u - regrid.highest(slab, blocks, heights) - below.d

@@ -125,7 +125,7 @@ def front(outcomes: Outcomes, error: Mapping[Settings, float]) -> list[Settings]
 
 
 def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
-    """What is held to the targets; for each the cheapest settings that reach it, and how long they take."""
+    """Return what is held to the targets, and for each the cheapest settings that reach it, with the time they take."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
     doubts = [reference[name].doubt for name in NEEDED if name in reference and reference[name].value]

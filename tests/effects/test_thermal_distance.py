@@ -1,4 +1,4 @@
-"""What `parcontact check` says of a distance of heat that the job does not give."""
+"""`parcontact check` names the distance of heat that a job does not give."""
 
 from typing import Any
 

@@ -19,7 +19,7 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
 
 
 def test_no_warning_of_a_few_points_that_lack(tmp_path: Path) -> None:
-    """Of 64^2 points, which are 8 cells per shortest wave, 3 and 6 % lack on 63^2 and on 62^2."""
+    """64^2 points are 8 cells per shortest wave; 3 and 6 % of them lack on 63^2 and on 62^2."""
     text = replaced(SMALL, surface=ROUGH.replace("5e-4", "2.5e-4").replace("6.25e-5", "1.25e-4"))
     points = [f"grid.points={points}" for points in (64, 63, 62)]
     assert [bool(job_of(tmp_path, text, one).warnings) for one in points] == [False, False, True]

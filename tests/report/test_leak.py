@@ -102,7 +102,7 @@ def test_one_instant(comm: MPI.Intracomm, shared_path: Path) -> None:
 
 
 def test_a_report_has_the_leakage_of_each_stage(tmp_path: Path) -> None:
-    """Of the last step of a stage that has it: the flow is calculated at every second step."""
+    """The table has the last step of a stage with a flow, which is calculated at every second step."""
     history = [PRESS, {**PRESS, "pressure": {"from": 8e4, "to": 2e4}}]
     out = run(MPI.COMM_SELF, tmp_path, history=history)
     known = [row for row in table(out / "measures.csv") if row["flow_x"]]

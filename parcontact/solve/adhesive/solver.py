@@ -206,7 +206,7 @@ class GapSolver:
         return self.slab.reduce((), [lowest])[0] - it.law.strength
 
     def _certify(self, it: _Iterate, g: Array) -> Certificate:
-        """How wrong the gap is: by z, weighted by the pressure, over a length; collective.
+        """Return how wrong the gap is: by z, weighted by the pressure, over a length; collective.
 
         The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it.
         """
