@@ -1,5 +1,8 @@
 """A dilute contact is found on tiles of a free box, and the whole grid agrees."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -109,3 +112,26 @@ def test_a_contact_that_is_not_dilute(monkeypatch: pytest.MonkeyPatch) -> None:
     assert p is not None
     assert expected is not None
     assert np.array_equal(p, expected)
+
+
+def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
+    """On tiles that the end cuts off they lie below all others by the height of the surface."""
+    slab = Slab(MPI.COMM_SELF, 40, 36)
+    grid = Tiles((40, 36), *(each.ravel() for each in np.indices((2, 2))))
+    found = []
+
+    def on(_: Tiles, __: float) -> Any:
+        def solve(problem: Problem, start: Array) -> Any:
+            found.append(problem.heights.reshape(2, 2, 32, 32).transpose(0, 2, 1, 3).reshape(64, 64))
+            return SimpleNamespace(p=start, d=0.0, certificate=SimpleNamespace(length=1.0))
+
+        return SimpleNamespace(slab=Slab.alone(32, 128, slab.tally), solve=solve), (None, None)
+
+    heights = np.random.default_rng(1).uniform(-3.0, -1.0, (36, 40))
+    nothing: Any = None
+    problem = Problem(nothing, nothing, heights, NonNegative(), Approach(1.0))
+    module.solve(grid, on, problem, slab, 2.0, 1e-3, slab.zeros())
+    (stacked,) = found
+    assert (stacked[:36, :40] == heights).all()
+    stacked[:36, :40] = heights.min() - 2.0
+    assert (stacked == heights.min() - 2.0).all()

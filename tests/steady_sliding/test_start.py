@@ -1,4 +1,4 @@
-"""What a steady start holds, as it is planned, and that it comes before the maps of the march; a start at rest."""
+"""A steady start holds what is planned, and comes before the maps of the march; a start at rest."""
 
 from typing import Any
 
