@@ -17,7 +17,7 @@ def test_words_have_no_unit() -> None:
 
 
 def test_a_resolved_job_keeps_what_is_given(tmp_path: Path) -> None:
-    """Values that the accuracy chooses are a comment, and chosen again; equal values that are given make another job."""
+    """Values chosen by the accuracy are a comment, and chosen again; equal values that are given make another job."""
     chosen, given = (job_of(tmp_path, SMALL, *words) for words in ((), ("numerics.tolerance=5e-3",)))
     assert chosen.resolved().endswith("# chosen by numerics.accuracy: tolerance 0.005, branch_error 0.001\n")
     assert chosen != given
