@@ -1,5 +1,7 @@
 """Pictures of the results of a sweep: friction and contact area over the swept key, beside theory if it is there.
 
+Those of a sweep of friction curves are over velocity, or what else has several values in each curve.
+
 Points are cases, lines their means over seeds and other keys that do not tell lines apart.
 """
 
@@ -18,14 +20,18 @@ from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 
 TABLE = sweep_table.TABLE
-UNITS = {"velocity": "m/s", "pressure": "Pa", "force": "N", "size": "m", "distance": "m", "duration": "s"}
-UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "shear_modulus": "Pa"}
-UNITS |= {"work": "J/m²", "range": "m"}
+UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
+UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
+UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
 MAX_LINES = 3  # of a second key
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 PANELS = (  # measures and their columns by the names of lines
     ("friction", "friction coefficient", {"highest": "mu_max", "dynamic": "mu_dyn"}),
     ("area", FRACTION, {"simulation": "contact_area"}),
+)
+CURVE_PANELS = (
+    ("friction", "friction coefficient", {"steady sliding": "friction"}),
+    ("area", FRACTION, {"steady sliding": "contact_area"}),
 )
 
 Rows = Sequence[dict[str, Any]]
@@ -33,14 +39,19 @@ Rows = Sequence[dict[str, Any]]
 
 def charts(directory: Path) -> list[Chart]:
     """Return panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
-    rows = sweep_table.read(directory / TABLE)
+    table = sweep_table.results(directory)
+    rows, panels = sweep_table.read(table), PANELS
     keys = _find_keys(rows)
+    if table.name == sweep_table.CURVES:
+        panels = CURVE_PANELS
+        places = {name: {row[name] for row in rows if row[name] == row[name]} for name in sweep_table.PLACES}
+        keys = [name for name, values in places.items() if len(values) > 1] + _find_keys(rows)
     if not keys:
         return []
     key, *others = keys
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
-    for panel, title, columns in PANELS:
+    for panel, title, columns in panels:
         wanted = [(name, part, own, column) for part, own in _split(rows, others) for name, column in columns.items()]
         series = [line for k, one in enumerate(wanted) for line in _make_lines(*one, key, style.line(k)["color"])]
         if series:

@@ -72,7 +72,7 @@ class Sweep:
             for text in self.doubts.summary([kinds for _, kinds in found]):
                 print_line(f"warning: {text}", sys.stderr)
             if STOPPED_EARLY not in codes and not self.quiet:
-                print_line(f"results of all cases: {_directory(self.cases) / sweep_table.TABLE}")
+                print_line(f"results of all cases: {sweep_table.results(_directory(self.cases))}")
         return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
 
     def _take(self, own: Sequence[Case]) -> int:

@@ -21,6 +21,7 @@ DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over whi
 SAME_INSTANT = 1e-9  # accuracy: relative: instants this close are the same
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
+FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 
 
 class Slide(NamedTuple):
@@ -56,6 +57,17 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
     return Slide(float(friction[highest]), float(distance[highest] - start), *means)
 
 
+def friction_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
+    """Return the absolute errors of mu_max and mu_dyn of `measure`, as far as they are estimated; `cell` is the spacing
+    of the grid along x [m]."""
+    known = errors(history, columns).get(ERRORS[0], math.nan)
+    if known != known or measure(history, columns) is None:
+        return {}
+    rows = _during(history, np.asarray(columns["time"], float))
+    found = _highest(columns, rows, cell)[1], _mean(columns, rows, "friction", ERRORS[0])[1]
+    return dict(zip(FRICTION_ERRORS, found, strict=True))
+
+
 def errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
     """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row if
     nothing has slid, by their columns as far as these are there; nan where none is known."""
@@ -79,23 +91,21 @@ def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> fl
     return max(float(y[at] - mean_over_end(x[near], y[near], 1.0)), 0.0)
 
 
-def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> str:
-    """Return the highest friction of some rows as text, with its error: its estimate, and the ripple on which it
-    sits."""
+def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> tuple[float, float, float]:
+    """Return the highest friction of some rows, its error, and the part of it that is the ripple on which it sits; the
+    rest of the error is its estimate."""
     friction = np.asarray(columns["friction"], float)[rows]
     at = int(np.argmax(friction[1:])) + 1
     error = float(columns[ERRORS[0]][rows[at]]) * friction[at] if ERRORS[0] in columns else math.nan
     wave = ripple(np.asarray(columns["distance"], float)[rows], friction, at, cell)
-    both = wave + (error if error == error else 0.0)
-    rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * both else ""
-    return with_error(float(friction[at]), both) + rippled
+    return float(friction[at]), wave + (0.0 if math.isnan(error) else float(error)), wave
 
 
-def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str) -> str:
-    """Return the mean of a column over the last three quarters as text, with that of its known errors."""
+def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str) -> tuple[float, float]:
+    """Return the mean of a column over the last three quarters, and that of its known errors."""
     distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
     within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
-    return with_error(mean_over_end(distance, values), mean_over_end(distance, within))
+    return mean_over_end(distance, values), mean_over_end(distance, within)
 
 
 def describe(
@@ -119,13 +129,15 @@ def describe(
     way = columns["distance"][rows[-1]] - columns["distance"][rows[0]]
     late = ", in its last tenth: friction may still rise" if found.mu_max_distance > LATE * way else ""
     after = f"{quantity(found.mu_max_distance, 'm')} after its start{late}"
-    yield f"mu_max, the highest friction of the slide, is {_highest(columns, rows, cell)}, {after}"
-    length, dynamic = quantity(way, "m"), _mean(columns, rows, "friction", ERRORS[0])
+    mu_max, error, wave = _highest(columns, rows, cell)
+    rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * error else ""
+    yield f"mu_max, the highest friction of the slide, is {with_error(mu_max, error)}{rippled}, {after}"
+    length, dynamic = quantity(way, "m"), with_error(*_mean(columns, rows, "friction", ERRORS[0]))
     yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
     yield from _unsettled(columns, rows)
     area = f"{found.contact_area:.4g} as counted in points"
     if CORRECTED in columns:
-        area = f"{_mean(columns, rows, CORRECTED, ERRORS[1])} as corrected for its edges, and {area}"
+        area = f"{with_error(*_mean(columns, rows, CORRECTED, ERRORS[1]))} as corrected for its edges, and {area}"
     yield f"the mean contact area over the same distance is {area}"
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:

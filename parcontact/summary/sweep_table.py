@@ -1,4 +1,7 @@
-"""sweep.csv: what the cases of a sweep have come to, a row each; sweep_mean.csv: their means over seeds."""
+"""Tables of a sweep: sweep.csv has a row for each case, sweep_curves.csv one for each point of friction curves.
+
+sweep_mean.csv and sweep_curves_mean.csv have means over seeds.
+"""
 
 import csv
 import fcntl
@@ -17,9 +20,14 @@ from ..storage import curve_points, files, tables
 from . import slide
 
 TABLE = "sweep.csv"
+CURVES = "sweep_curves.csv"
+PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
+CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
+CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
-COLUMNS = ("state", *RESULTS, "residual", *slide.ERRORS, "seconds", *(f"theory_{name}" for name in RESULTS))
-NUMBERS = {"case", *COLUMNS} - {"state"}
+THEORY = tuple(f"theory_{name}" for name in RESULTS)
+COLUMNS = ("state", *RESULTS, *slide.FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
+NUMBERS = {"case", *COLUMNS, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SEED = "seed"  # the last word of keys over whose values means are taken
@@ -27,16 +35,26 @@ FAILURE = ".failure"  # why a case has failed
 
 
 def write(directory: Path, cases: Sequence[Case]) -> None:
-    """Write both tables in the directory of a sweep, from what its cases have left in theirs; root only.
+    """Write all tables in the directory of a sweep, from what its cases have left in theirs; root only.
 
     Several programs, each with a case, may do so at a time.
     """
     with _alone(directory):
-        rows = [_row(case) for case in cases]
-        keys = list(cases[0].settings)
+        keys, seeded = list(cases[0].settings), any(key.split(".")[-1] == SEED for key in cases[0].settings)
+        rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
         save(directory / TABLE, ["case", *keys, *COLUMNS], rows)
-        if any(key.split(".")[-1] == SEED for key in keys):
-            save(directory / "sweep_mean.csv", *_means(rows, keys))
+        if points:
+            save(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
+        if seeded and any(case.job.history for case in cases):
+            save(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *THEORY]))
+        if seeded and points:
+            save(directory / "sweep_curves_mean.csv", *_means(points, [*keys, *PLACES], CURVE_RESULTS))
+
+
+def results(directory: Path) -> Path:
+    """Return the table with the results of a sweep: of the points of its friction curves, or else of its cases."""
+    curves = directory / CURVES
+    return curves if curves.is_file() else directory / TABLE
 
 
 def read(path: Path) -> list[dict[str, Any]]:
@@ -80,7 +98,20 @@ def _row(case: Case) -> dict[str, Any]:
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
             row |= slide.errors(case.job.history, columns)
+            row |= slide.friction_errors(case.job.history, columns, case.job.grid.dx)
     return row
+
+
+def _points(case: Case) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a friction curve as far as it has come."""
+    table = case.job.output.directory / "steady.csv"
+    if not case.job.history and table.is_file():
+        columns: dict[str, list[float]] = tables.read(table)
+        head = {"case": case.number, **case.settings, "state": state(case)}
+        numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]
+        for k, place in enumerate(curve_points.of_table(columns)):
+            places = {name: float(f"{value:.9g}") for name, value in zip(PLACES, place, strict=True)}  # not of rounding
+            yield head | places | {name: columns[name][k] for name in numbers}
 
 
 def state(case: Case) -> str:
@@ -107,11 +138,12 @@ def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]])
     return bool(curve_points.lacking(asked, curve_points.of_table(columns)))
 
 
-def _means(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the columns and rows of the means over the cases that differ by their seeds only, with the standard
-    deviation of a single case, the standard error of the mean, and the number of cases."""
+def _means(
+    rows: Sequence[dict[str, Any]], keys: Sequence[str], names: Sequence[str]
+) -> tuple[list[str], list[dict[str, Any]]]:
+    """Return the columns and rows of the means of some results over the cases that differ by their seeds only, with the
+    standard deviation of a single case, the standard error of the mean, and the number of cases."""
     kept = [key for key in keys if key.split(".")[-1] != SEED]
-    names = [name for name in COLUMNS if name in RESULTS or name.startswith("theory_")]
     groups: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         groups.setdefault(repr([row[key] for key in kept]), []).append(row)

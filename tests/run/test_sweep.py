@@ -207,48 +207,6 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         assert float(found[1]) == pytest.approx(float(rows[1]["mu_dyn"]), abs=0.1 * float(found[2]))
 
 
-def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:
-    """Errors are not known in the first row."""
-    directory = cases[0].job.output.directory
-    directory.mkdir(parents=True)
-    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction"
-    (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,\n1,1,0,0.1,0.2,1e-5,0.25,3e-3\n")
-    sweep_table.write(Path("out/job"), cases)
-    row = table()[0]
-    assert [row[name] for name in ("residual", "error_friction", "error_area")] == ["2e-05", "0.003", ""]
-    assert (row["state"], row["seconds"], row["mu_max"], row["contact_area"]) == ("begun", "0.75", "", "0.2")
-
-
-def test_errors_are_those_of_the_slide(cases: tuple[Case, ...]) -> None:
-    """For which its friction and area stand: neither of the press before it nor of the rest after it."""
-    first = cases[0].job
-    press = first.history[0].model_copy(update={"velocity": (0.0, 0.0), "distance": None, "duration": 1.0})
-    slide = press.model_copy(update={"velocity": (1e-3, 0.0)})
-    changed = cases[0]._replace(job=first.model_copy(update={"history": (press, slide, press)}))
-    changed.job.output.directory.mkdir(parents=True)
-    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,error_area"
-    errors = [("", ""), ("0.9", "0.8"), ("0.02", "0.03"), ("0.01", "0.04"), ("0.7", "0.6")]
-    instants = [(0.0, 0.0), (1.0, 0.0), (1.5, 5e-4), (2.0, 1e-3), (3.0, 1e-3)]
-    lines = [
-        f"{step},{time},{distance},0.1,0.2,1e-5,1.0,{friction},{area}"
-        for step, ((time, distance), (friction, area)) in enumerate(zip(instants, errors, strict=True))
-    ]
-    (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
-    sweep_table.write(Path("out/job"), (changed,))
-    assert [table()[0][name] for name in ("error_friction", "error_area")] == ["0.02", "0.04"]
-
-
-def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:
-    for case in cases[:2]:
-        directory = case.job.output.directory
-        directory.mkdir(parents=True)
-        text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e5,0.0,0.1\n0.001,0.0,1e5,0.0,0.2\n"
-        (directory / "theory.csv").write_text(f"{text}0.051,0.0005,1e5,0.02,0.3\n")
-    sweep_table.write(Path("out/job"), cases)
-    assert [row["theory_mu_max"] for row in table()] == ["0.02", "0.02", "", "", "", ""]
-    assert [row["mu_max"] for row in table()] == [""] * 6
-
-
 @pytest.mark.parametrize("words", [["check"], ["run"]])
 def test_nothing_runs_with_a_mistake_in_any_case(
     run_parcontact: RunParcontact, tmp_path: Path, words: list[str]

@@ -1,34 +1,123 @@
-"""A damaged sweep.csv is told in a sentence, by all that read it."""
+"""Tables of a sweep, from what its cases have left in their directories."""
 
-from collections.abc import Callable
+import csv
 from pathlib import Path
 
 import pytest
 
-from parcontact.errors import InputError
-from parcontact.plotting import sweep
-from parcontact.report import results
-from parcontact.summary import info
+from parcontact.job import Case, load_cases
+from parcontact.plotting import sweep as pictures
+from parcontact.summary import sweep_table
 
-HEAD = "case,a.velocity,state,mu_max\n"
-DAMAGED = {
-    "empty": "",
-    "no state": "case,a.velocity,mu_max\n0,1.0,0.1\n",
-    "cut": f"{HEAD}0,1.0,done,0.1\n1,2.0",
-    "no case": f"{HEAD}x,1.0,done,0.1\n",
-    "cut number": f"{HEAD}0,1.0,done,0.1\n1,2.0,done,0.01",
-    "few values": f"{HEAD}0,1.0,done\n",
-    "no number": f"{HEAD}0,1.0,done,0.1\n1,2.0,done,O.1\n",
-    "zeros": "\0" * 99,
-}
+JOB = """\
+grid: {points: 34, size: 1.0e-3}
+surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 2.4e-4, rms_slope: 0.01, seed: 1}
+material: {model: zener, modulus_inf: 0.275e+6, branches: [{modulus: 2.475e+6, relaxation_time: 1.0e-3}]}
+history:
+  - {pressure: 1.0e+5, duration: 1.0e-3, time_step: 5.0e-4}
+  - {pressure: 1.0e+5, velocity: 0.1, distance: 5.0e-4, cells_per_step: 1}
+sweep:
+  - {history.1.velocity: [0.01, 0.1]}
+  - {surface.seed: [1, 2, 3]}
+"""
 
 
-@pytest.mark.parametrize("name", DAMAGED)
-@pytest.mark.parametrize("read", [sweep.charts, results.describe_sweep])
-def test_what_is_no_table(tmp_path: Path, name: str, read: Callable[[Path], object]) -> None:
-    (tmp_path / "sweep.csv").write_text(DAMAGED[name])
-    with pytest.raises(InputError, match=r"sweep.csv cannot be read: .*; run the sweep again"):
-        read(tmp_path)
-    told, sound = info.describe(tmp_path)
-    assert not sound
-    assert str(tmp_path / "sweep.csv") in told
+@pytest.fixture
+def cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Case, ...]:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(JOB)
+    return load_cases("job.yaml")
+
+
+def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> list[dict[str, str]]:
+    with (directory / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:
+    """Errors are not known in the first row."""
+    directory = cases[0].job.output.directory
+    directory.mkdir(parents=True)
+    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction"
+    (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,\n1,1,0,0.1,0.2,1e-5,0.25,3e-3\n")
+    sweep_table.write(Path("out/job"), cases)
+    row = table()[0]
+    assert [row[name] for name in ("residual", "error_friction", "error_area")] == ["2e-05", "0.003", ""]
+    assert (row["state"], row["seconds"], row["mu_max"], row["contact_area"]) == ("begun", "0.75", "", "0.2")
+
+
+def test_errors_are_those_of_the_slide(cases: tuple[Case, ...]) -> None:
+    """For which its friction and area stand: neither of the press before it nor of the rest after it."""
+    first = cases[0].job
+    press = first.history[0].model_copy(update={"velocity": (0.0, 0.0), "distance": None, "duration": 1.0})
+    slide = press.model_copy(update={"velocity": (1e-3, 0.0)})
+    changed = cases[0]._replace(job=first.model_copy(update={"history": (press, slide, press)}))
+    changed.job.output.directory.mkdir(parents=True)
+    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,error_area"
+    errors = [("", ""), ("0.9", "0.8"), ("0.02", "0.03"), ("0.01", "0.04"), ("0.7", "0.6")]
+    instants = [(0.0, 0.0), (1.0, 0.0), (1.5, 5e-4), (2.0, 1e-3), (3.0, 1e-3)]
+    lines = [
+        f"{step},{time},{distance},0.1,0.2,1e-5,1.0,{friction},{area}"
+        for step, ((time, distance), (friction, area)) in enumerate(zip(instants, errors, strict=True))
+    ]
+    (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
+    sweep_table.write(Path("out/job"), (changed,))
+    assert [table()[0][name] for name in ("error_friction", "error_area")] == ["0.02", "0.04"]
+
+
+def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point is the same in all curves, whatever the rounding of the load that it was solved under."""
+    monkeypatch.chdir(tmp_path)
+    curve = "steady: {velocities: [0.1, 1.0], pressures: [1.0e+4]}\n"
+    Path("job.yaml").write_text(JOB[: JOB.index("history:")] + curve + "sweep: [{surface.seed: [1, 2, 3]}]\n")
+    cases = load_cases(Path("job.yaml"))
+    for case, friction in zip(cases, (0.1, 0.2, 0.6), strict=True):
+        case.job.output.directory.mkdir(parents=True)
+        rows = f"0.1,{1e4 * (1 + case.number * 1e-15)!r},{friction},0.5\n1.0,1e4,{friction / 2},0.25\n"
+        text = "velocity,pressure,friction,contact_area\n" + rows
+        (case.job.output.directory / "steady.csv").write_text(text)
+    sweep_table.write(Path("out/job"), cases)
+    points, means = table("sweep_curves.csv"), table("sweep_curves_mean.csv")
+    assert [(row["surface.seed"], row["velocity"], row["friction"]) for row in points[2:4]] == [
+        ("2", "0.1", "0.2"),
+        ("2", "1.0", "0.1"),
+    ]
+    assert [(row["velocity"], row["pressure"], row["number"]) for row in means] == [
+        ("0.1", "10000.0", "3"),
+        ("1.0", "10000.0", "3"),
+    ]
+    assert [float(row["friction_mean"]) for row in means] == pytest.approx([0.3, 0.15], rel=1e-12)
+    assert float(means[0]["friction_std"]) == pytest.approx(0.07**0.5, rel=1e-12)
+    assert not Path("out/job/sweep_mean.csv").exists()
+    chart, _ = pictures.charts(Path("out/job"))
+    mean, each = chart.series
+    assert (chart.x.name, mean.x.tolist(), each.x.size) == ("velocity", [0.1, 1.0], 6)
+    assert mean.y.tolist() == pytest.approx([0.3, 0.15], rel=1e-12)
+
+
+def test_errors_of_the_highest_and_the_mean_friction(cases: tuple[Case, ...]) -> None:
+    """The highest friction, 0.3, has the error of its own step, and the mean of 0.3 and 0.2 that of both. No step is
+    shorter than a cell, so there is no ripple."""
+    slide = cases[0].job.history[-1]
+    changed = cases[0]._replace(job=cases[0].job.model_copy(update={"history": (slide,)}))
+    changed.job.output.directory.mkdir(parents=True)
+    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,error_area"
+    way = slide.seconds * slide.velocity[0]
+    rows = [(0, 0.0, 0.0, 0.0, ""), (1, 0.25, 0.25, 0.3, "0.1"), (2, 1.0, 1.0, 0.2, "0.3")]
+    lines = [f"{k},{t * slide.seconds},{x * way},{mu},0.2,1e-5,1.0,{error},0.1" for k, t, x, mu, error in rows]
+    (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
+    sweep_table.write(Path("out/job"), (changed,))
+    row = table()[0]
+    found = [float(row[name]) for name in ("mu_max", "mu_max_error", "mu_dyn", "mu_dyn_error")]
+    assert found == pytest.approx([0.3, 0.03, 0.25, (0.03 + 0.06) / 2], rel=1e-9)
+
+
+def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:
+    for case in cases[:2]:
+        directory = case.job.output.directory
+        directory.mkdir(parents=True)
+        text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e5,0.0,0.1\n0.001,0.0,1e5,0.0,0.2\n"
+        (directory / "theory.csv").write_text(f"{text}0.051,0.0005,1e5,0.02,0.3\n")
+    sweep_table.write(Path("out/job"), cases)
+    assert [row["theory_mu_max"] for row in table()] == ["0.02", "0.02", "", "", "", ""]
+    assert [row["mu_max"] for row in table()] == [""] * 6
