@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -21,7 +20,7 @@ from ..steady_sliding.point import Point
 from ..steady_sliding.sliding import SteadySliding
 from ..steady_sliding.table import describe_missed, value_of
 from ..storage.curve_points import Wanted
-from .given_jobs import Given, all_ranks, read, warn_of
+from .given_jobs import Given, all_ranks, read, warn, warn_of
 
 Array = NDArray[np.float64]
 Values = str | float | Sequence[float] | Array | None
@@ -104,10 +103,10 @@ def steady(
         except RunError as error:
             points.append(None)
             failures.append(str(error))
-            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+            warn(str(error), RuntimeWarning)
     if slab.root:
         for text in describe_missed([point for point in points if point], found):
-            warnings.warn(text, UserWarning, stacklevel=2)
+            warn(text)
     return _curve(wanted.points, points, tuple(failures))
 
 

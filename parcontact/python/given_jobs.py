@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,6 +27,7 @@ ANYTHING = {"model": "elastic", "shear_modulus": 1.0e6}
 A_TOUCH = [{"pressure": 1.0}]
 DEEPEST = 50  # mappings and lists in each other
 SHOWN = 60  # characters of a value in a message
+PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 
 def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> Job:
@@ -110,4 +112,12 @@ def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:
     """Warn, on root, of what is allowed but means little, also at temperatures [deg C]; collective."""
     for text in sanity.find_doubts(setup, temperatures):
         if setup.slab.root:
-            warnings.warn(text, UserWarning, stacklevel=4)
+            warn(text)
+
+
+def warn(text: str, category: type[Warning] = UserWarning) -> None:
+    """Warn, of the line of the user's script that has called this package."""
+    level, frame = 1, inspect.currentframe()
+    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, category, stacklevel=level)

@@ -23,8 +23,9 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     """Return what a run has measured and saved, also one that still goes on.
 
     The columns of measures.csv by their names, along `step` and with the coordinate `time` [s]; each map of fields.h5
-    as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used. Variables have
-    their `units`; what was not asked for is NaN. Raises InputError for a directory without results, ImportError where
+    as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used, with the
+    coordinates `t` [s] and `map_step`: `friction.sel(step=map_step)` is that of each map. Variables have their `units`;
+    what was not asked for is NaN. Raises InputError for a directory without results, ImportError where
     xarray is not installed.
     """
     try:
@@ -59,6 +60,7 @@ def _add_maps(path: Path, found: dict[str, Any], coordinates: dict[str, Any]) ->
             layout = fields.SavedFields(file)
             saved = np.flatnonzero(~np.isnan(layout.times))
             coordinates["t"] = ("t", layout.times[saved], {"units": "s"})
+            coordinates["map_step"] = ("t", file["step"][...][saved])
             coordinates |= {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
             maps = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}
     except hdf5.FAILURES as error:

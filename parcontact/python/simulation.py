@@ -110,7 +110,12 @@ class Simulation:
     @property
     def finished(self) -> bool:
         """Whether all steps of the history are made, or surfaces that stick have come off under their load."""
-        return bool(self._march.detached) or self._march.row.step >= len(self._march.timeline())
+        return bool(self.detached) or self._march.row.step >= len(self._march.timeline())
+
+    @property
+    def detached(self) -> str:
+        """When and why surfaces that stick have come off under their load, which ends the history; empty otherwise."""
+        return self._march.detached
 
     # -- fields -------------------------------------------------------------------------------------------------------
 

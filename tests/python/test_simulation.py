@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.__main__ import main
+from parcontact.job.sections.height_arrays import Heights
 
 ROOT = Path(__file__).parents[2]
 JOB: dict[str, Any] = {
@@ -235,6 +236,9 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert data.t.values[-1] == data.time.values[-1] == run.row.time
     assert np.array_equal(data.gap_map[-1], run.field("gap"))
     assert np.array_equal(data.pressure_map[:, 3:5, 7][-1], run.field("pressure")[3:5, 7])
+    of_maps = data.friction.sel(step=data.map_step)
+    assert of_maps[-1] == run.row.friction
+    assert of_maps.time.values.tolist() == data.t.values.tolist()
     assert float(data.pressure_map.isel(t=-1).mean()) == pytest.approx(1e4)
     (nowhere / "here" / "fields.h5").rename("elsewhere.h5")
     with pytest.raises(FileNotFoundError):
@@ -249,10 +253,19 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_warnings_are_those_of_python() -> None:
     """A slope beyond linear theory: the surface is steep, as the command line says."""
     steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}
-    with pytest.warns(UserWarning, match="slope"):
+    with pytest.warns(UserWarning, match="slope") as said:
         next(pc.Simulation(steep, comm=MPI.COMM_SELF).steps())
-    with pytest.warns(UserWarning, match="slope"):
+    with pytest.warns(UserWarning, match="slope") as also:
         pc.steady({**steep, "numerics": {"accuracy": 0.1}}, 0.1, 1e6, comm=MPI.COMM_SELF)
+    assert {warning.filename for warning in [*said, *also]} == {__file__}
+
+
+def test_heights_with_names_of_axes() -> None:
+    """They are taken by these, whatever their order."""
+    xarray = pytest.importorskip("xarray")
+    heights = np.arange(12.0).reshape(3, 4)
+    named = xarray.DataArray(heights, dims=("y", "x"))
+    assert Heights(named) == Heights(named.transpose("x", "y")) == Heights(heights)
 
 
 def test_a_finished_run_has_its_last_row(nowhere: Path) -> None:

@@ -27,6 +27,8 @@ class Heights:
         """Raise TypeError or ValueError for what is no map of finite real numbers."""
         import numpy as np  # slow to import, and jobs in files do without
 
+        if getattr(given, "dims", None) == ("x", "y"):
+            given = given.transpose("y", "x")  # xarray's axes have names
         found = np.asanyarray(given)
         if found.ndim != 2 or not np.can_cast(found.dtype, np.float64, "same_kind"):
             raise TypeError(f"an array of shape {found.shape} of {found.dtype}")
