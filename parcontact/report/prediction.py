@@ -124,7 +124,8 @@ def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     """Write theory.csv for a job on one rank, and return sentences about it, beside the job's run if there is one."""
     settings = TheorySettings(gamma, waves)
     path = write(job, predict(job, Slab(MPI.COMM_SELF, *job.grid.points), gamma, waves), settings)
-    return [f"Persson's theory, {settings.sentence}: {path}", *theory_beside.describe(path.parent, job.history)]
+    beside = theory_beside.describe(path.parent, job.history, job.grid.dx)
+    return [f"Persson's theory, {settings.sentence}: {path}", *beside]
 
 
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:

@@ -59,7 +59,7 @@ def _theory(directory: Path, run: Run) -> list[Table]:
     """Return the results of Persson's theory beside those of the run, where there is a theory."""
     rows = [
         (one.name, *map(format_cell, (one.run or math.nan, one.theory)), f"{one.theory / one.run - 1:+.0%}")
-        for one in theory_beside.compare(directory, run.job.history)
+        for one in theory_beside.compare(directory, run.job.history, run.job.grid.dx)
         if one.run
     ]
     head = ("result", "run", "Persson's theory", "difference of the theory")

@@ -38,6 +38,9 @@ class Prepared:
                 f"road: {done.outliers} points stick out of their neighbours by far; they are as measured. "
                 "Missing points have to be nan in the file"
             )
+            height, count = treatment.repeated(self.cut)
+            if count:
+                lines[-1] += f": {quantity(height, 'm', 4)}, far from all others, occurs {count} times"
         if len(done.trend) > 1:
             tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], self.size, strict=True)]
             lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")

@@ -43,6 +43,17 @@ def treat(heights: Array, detrend: Detrend, periodic: Periodic) -> Treated:
     return Treated(made, int((~known).sum()), odd, tuple(map(float, trend)))
 
 
+def repeated(heights: Array) -> tuple[float, int]:
+    """Return a height that occurs several times, further from all others than these are from each other, and how often;
+    (0, 0) if there is none. So it is with a number that stands for missing points."""
+    for height in (np.nanmin(heights), np.nanmax(heights)):
+        others = heights[np.isfinite(heights) & (heights != height)]
+        count = int(np.count_nonzero(heights == height))
+        if count > 1 and others.size and np.abs(others - height).min() > np.ptp(others):
+            return float(height), count
+    return 0.0, 0
+
+
 def _terms(shape: tuple[int, ...], detrend: Detrend) -> Sequence[Array]:
     y, x = (np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(n) for n in shape)
     one, x, y = np.ones(shape), np.broadcast_to(x, shape), np.broadcast_to(y[:, None], shape)

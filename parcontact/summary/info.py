@@ -189,7 +189,8 @@ def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
         raise
     yield count + (settings.sentence if settings else "of unknown settings")
     if (resolved := table.with_name(RESOLVED)).exists():
-        yield from (f"  {text}" for text in theory_beside.describe(table.parent, shown_job(resolved).history))
+        job = shown_job(resolved)
+        yield from (f"  {text}" for text in theory_beside.describe(table.parent, job.history, job.grid.dx))
 
 
 def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -21,7 +21,6 @@ DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over whi
 SAME_INSTANT = 1e-9  # accuracy: relative: instants this close are the same
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
-FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 
 
 class Slide(NamedTuple):
@@ -57,15 +56,19 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
     return Slide(float(friction[highest]), float(distance[highest] - start), *means)
 
 
-def friction_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
-    """Return the absolute errors of mu_max and mu_dyn of `measure`, as far as they are estimated; `cell` is the spacing
-    of the grid along x [m]."""
-    known = errors(history, columns).get(ERRORS[0], math.nan)
-    if known != known or measure(history, columns) is None:
+def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
+    """Return the absolute errors of mu_max, mu_dyn and the corrected contact area of a slide, as far as they are
+    estimated; `cell` is the spacing of the grid along x [m]."""
+    known = errors(history, columns)
+    rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
+    if measure(history, columns) is None:
         return {}
-    rows = _during(history, np.asarray(columns["time"], float))
-    found = _highest(columns, rows, cell)[1], _mean(columns, rows, "friction", ERRORS[0])[1]
-    return dict(zip(FRICTION_ERRORS, found, strict=True))
+    if not math.isnan(known.get(ERRORS[0], math.nan)):
+        found["mu_max"] = _highest(columns, rows, cell)[1]
+        found["mu_dyn"] = _mean(columns, rows, "friction", ERRORS[0])[1]
+    if CORRECTED in columns and not math.isnan(known.get(ERRORS[1], math.nan)):
+        found["contact_area"] = _mean(columns, rows, CORRECTED, ERRORS[1])[1]
+    return found
 
 
 def errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:

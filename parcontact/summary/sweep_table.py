@@ -25,8 +25,9 @@ PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
+FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(f"theory_{name}" for name in RESULTS)
-COLUMNS = ("state", *RESULTS, *slide.FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
+COLUMNS = ("state", *RESULTS, *FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
 NUMBERS = {"case", *COLUMNS, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
@@ -98,7 +99,8 @@ def _row(case: Case) -> dict[str, Any]:
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
             row |= slide.errors(case.job.history, columns)
-            row |= slide.friction_errors(case.job.history, columns, case.job.grid.dx)
+            within = slide.absolute_errors(case.job.history, columns, case.job.grid.dx)
+            row |= {name: within.get(name.removesuffix("_error"), math.nan) for name in FRICTION_ERRORS}
     return row
 
 

@@ -1,54 +1,60 @@
 """Persson's theory beside a run: highest and dynamic friction and the contact area of both, from their tables."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ..job import Stage
+from ..printed import with_error
 from ..storage import tables
 from . import slide, theory_settings
 
 RUN = "measures.csv"
-Columns = Mapping[str, Sequence[float]]
 
 
 class Beside(NamedTuple):
-    """A result [-] of the theory, and that of the run, None where there is no run."""
+    """A result [-] of the theory, that of the run, None where there is no run, and its error, nan if not known."""
 
     name: str
     theory: float
     run: float | None
+    error: float = math.nan
 
 
-def compare(directory: Path, history: Sequence[Stage]) -> list[Beside]:
-    """Return results of theory.csv and of measures.csv in a directory; nothing without the former.
+def compare(directory: Path, history: Sequence[Stage], cell: float) -> list[Beside]:
+    """Return results of theory.csv and of measures.csv in a directory; nothing without the former;
+    `cell` is the spacing of the grid along x [m].
 
     They are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure`), the run's as corrected for its
     edges; without a slide the contact area of the last instant. Raises InputError for damaged tables.
     """
-    predicted = _results(directory / theory_settings.TABLE, history)
-    found = _results(directory / RUN, history)
-    return [Beside(name, value, found.get(name)) for name, value in predicted.items()]
+    predicted, found = (_results(directory / name, history, cell) for name in (theory_settings.TABLE, RUN))
+    nothing = None, math.nan
+    return [Beside(name, value, *found.get(name, nothing)) for name, (value, _) in predicted.items()]
 
 
-def _results(path: Path, history: Sequence[Stage]) -> dict[str, float]:
+def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tuple[float, float]]:
+    """Return results and their errors, by name."""
     columns = tables.read(path) if path.is_file() else {}
     if not columns.get("time"):
         return {}
     area = columns.get(slide.CORRECTED, columns["contact_area"])
     found = slide.measure(history, {**columns, "contact_area": area})
     if found is None:
-        return {"contact area": area[-1]}
-    return {"mu_max": found.mu_max, "mu_dyn": found.mu_dyn, "contact area": found.contact_area}
+        return {"contact area": (area[-1], columns.get(slide.ERRORS[1], [math.nan])[-1] * area[-1])}
+    within = slide.absolute_errors(history, columns, cell)
+    values = {"mu_max": found.mu_max, "mu_dyn": found.mu_dyn, "contact area": found.contact_area}
+    return {name: (value, within.get(name.replace(" ", "_"), math.nan)) for name, value in values.items()}
 
 
-def describe(directory: Path, history: Sequence[Stage]) -> Iterator[str]:
+def describe(directory: Path, history: Sequence[Stage], cell: float) -> Iterator[str]:
     """Yield a sentence, if there is a theory. Raises InputError for damaged tables."""
-    results = compare(directory, history)
+    results = compare(directory, history, cell)
     if results:
         pairs = (f"{one.name} {one.theory:.3g}{_run(one)}" for one in results)
         yield f"Persson's theory predicts {', '.join(pairs)}"
 
 
 def _run(one: Beside) -> str:
-    return "" if one.run is None else f" (run: {one.run:.3g})"
+    return "" if one.run is None else f" (run: {with_error(one.run, one.error)})"

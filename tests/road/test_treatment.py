@@ -101,3 +101,12 @@ def test_outliers_are_counted() -> None:
     spiked[90, 3] -= 50e-6
     assert treatment.count_outliers(ROAD) == 0
     assert treatment.count_outliers(spiked) == 2
+
+
+def test_a_number_that_stands_for_missing_points() -> None:
+    """It occurs several times, far from all other heights; a single low point is none."""
+    heights = np.random.default_rng(1).normal(size=(16, 16))
+    heights[0, 0] = -9999.0
+    assert treatment.repeated(heights) == (0.0, 0)
+    heights[5, 3:6] = -9999.0
+    assert treatment.repeated(heights) == (-9999.0, 4)
