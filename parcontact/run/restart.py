@@ -132,7 +132,7 @@ def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
     if claim is None or not found:
         return
     there = f"{directory.path} holds {', '.join(found)}"
-    if different := "; ".join(marker.differences(claim.job, plain, SAME)):
+    if different := marker.told(marker.differences(claim.job, plain, SAME)):
         raise InputError(f"{there} of another job: {different}; {ADVICE}")
     if claim.saved:
         how = f"a run that has finished at t = {claim.finished[1]:g} s" if claim.finished else "a run"
@@ -143,7 +143,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
     """Return a checkpoint without its maps, or why it will not do; root only."""
     try:
         contents = checkpoint.inspect(path)
-        if found := "; ".join(marker.differences(contents.job, plain, SAME)):
+        if found := marker.told(marker.differences(contents.job, plain, SAME)):
             return f"{path} belongs to another job: {found}"
         return contents
     except (InputError, OSError) as error:

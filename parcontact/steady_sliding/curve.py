@@ -130,7 +130,7 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
     """Return whether points of the same curve are there; root only. Raises InputError if they are of another."""
     if (claim := directory.claim) is None or not directory.results():
         return False
-    if different := "; ".join(marker.differences(claim.job, plain, (*SAME, "steady"))):
+    if different := marker.told(marker.differences(claim.job, plain, (*SAME, "steady"))):
         raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {ADVICE}")
     return True
 

@@ -7,6 +7,7 @@ import json
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ MARKER = ".parcontact"
 FORMAT = 1
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
 SCENE = ("grid", "surface", "material", "body")  # sections in which all that shares a directory must agree
+SHOWN = 4  # differences of two jobs in a message
 SECTIONS = (*SCENE, "initial", "numerics", "steady")  # what a marker keeps of a job
 
 
@@ -71,6 +73,13 @@ def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence
         for key in (key for key in {**old, **new} if f"{key}.".startswith(f"{name}.")):
             if old.get(key) != new.get(key):
                 yield f"{key} was {old.get(key)}, is {new.get(key)}"
+
+
+def told(differences: Iterator[str]) -> str:
+    """Return differences in one line: the first of them, and how many more there are."""
+    first = list(islice(differences, SHOWN))
+    more = sum(1 for _ in differences)
+    return "; ".join(first) + (f"; and {more} more" if more else "")
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:

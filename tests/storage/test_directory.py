@@ -91,3 +91,9 @@ def test_differences_of_jobs() -> None:
         "grid.points was [8, 8], is [8, 9]",
         "surface.0.seed was 1, is 2",
     ]
+
+
+def test_many_differences_are_counted() -> None:
+    """Of another rubber with many branches, say."""
+    branches = marker.differences({"k": dict.fromkeys("abcdef", 1)}, {"k": dict.fromkeys("abcdef", 2)}, ("k",))
+    assert marker.told(branches) == "k.a was 1, is 2; k.b was 1, is 2; k.c was 1, is 2; k.d was 1, is 2; and 2 more"
