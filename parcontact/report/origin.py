@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import h5py
@@ -16,6 +17,7 @@ from ..summary.slide import ERRORS
 from . import log
 from .parts import Section, Table
 
+FRICTION = ERRORS[0]
 NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
 
 
@@ -44,6 +46,8 @@ def describe_errors(
     """Return nothing for a table without errors, else those of the points of a friction curve, or of the means over a
     run and of its steps. The log has the parts: of a curve those of the worst point, if that misses the accuracy."""
     known = {what: [float(one) for one in columns.get(name, ()) if one == one] for name, what in NAMES.items()}
+    if not of_curve:
+        known[NAMES[FRICTION]] = _in_motion(columns)
     known = {what: values for what, values in known.items() if values}
     if not known:
         return Section("Error budget")
@@ -68,6 +72,15 @@ def describe_errors(
         head = ("estimated error of", "in all", *names)
         tables.insert(0, Table(head, parts, f"parts, {where}"))
     return Section("Error budget", said, tables)
+
+
+def _in_motion(columns: Mapping[str, Sequence[float]]) -> list[float]:
+    """Return the known errors of friction of the rows before which the surface has moved: friction at rest is 0, which
+    no error can be compared with. Without a motion all are."""
+    places, errors = columns.get("distance", ()), columns.get(FRICTION, ())
+    moved = [place != before for before, place in pairwise([*places[:1], *places])]
+    kept = zip(errors, moved, strict=True) if any(moved) else ((one, True) for one in errors)
+    return [float(error) for error, motion in kept if motion and error == error]
 
 
 def _judge(name: str, errors: Sequence[float], worst: log.Estimate | None, accuracy: float, of_curve: bool) -> str:

@@ -142,6 +142,10 @@ def describe(
     if CORRECTED in columns:
         area = f"{with_error(*_mean(columns, rows, CORRECTED, ERRORS[1]))} as corrected for its edges, and {area}"
     yield f"the mean contact area over the same distance is {area}"
+    if "flash_temperature" in columns:
+        flash, _ = _mean(columns, rows, "flash_temperature", "")
+        hottest = largest(columns["max_temperature"][row] for row in rows[1:])
+        yield f"the mean flash temperature over the same distance is {flash:.3g} K, at most {hottest:.3g} K at a point"
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))

@@ -152,7 +152,8 @@ def test_the_errors_of_a_run(tmp_path: Path, total: str, told: str) -> None:
     said = "estimated error of friction: {} % (solver 0.25 %, time 1 %, folded 0 %, mesh 4e-05 %), mean over time"
     lines = [f"2026-01-01 00:00:00,000 {said.format(number)}\n" for number in ("77", total)]
     (tmp_path / "run.log").write_text("".join(lines))
-    columns = {"error_friction": [0.02, 0.03, np.nan], "error_area": [np.nan, np.nan, np.nan]}
+    columns = {"error_friction": [16.0, 0.02, 0.03, np.nan], "error_area": [np.nan] * 4}  # the first one at rest
+    columns["distance"] = [0.0, 1.0, 2.0, 3.0]
     section = origin.describe_errors(columns, log.read(tmp_path).estimates, (0.01, 0.01), of_curve=False)
     assert section.sentences == [
         f"{said.format(total)}.",

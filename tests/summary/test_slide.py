@@ -89,6 +89,10 @@ def test_sentences_about_a_slide() -> None:
         "largest estimated errors of single steps of the slide: friction 3 %",
     ]
     assert not said([REST], table)
+    table |= {"flash_temperature": [0.0, 9.0, 0.5, 0.5, 0.5, 0.5], "max_temperature": [0.0, 9.0, 2.0, 3.0, 1.0, 1.0]}
+    assert "the mean flash temperature over the same distance is 0.5 K, at most 3 K at a point" in said(
+        [REST, CLIMB, SETTLE], table
+    )
 
 
 def test_sentences_about_a_slide_that_others_follow() -> None:
