@@ -1,7 +1,7 @@
 """Results of a study: limits, errors of every case, which settings are worth their price, and sentences about it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..printed import per_cent, with_error
@@ -25,7 +25,7 @@ class Found:
     limit: Limit
 
     def __str__(self) -> str:
-        last = "no order found: the last case, and how much the last ones differ"
+        last = "no order found: the last case, and how much it differs from those before and finer ones"
         order = last if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
         name = f"{self.quantity} with {self.integrator}, {self.ladder}"
         if math.isnan(self.limit.uncertainty):
@@ -70,8 +70,27 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
         for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
             for quantity in QUANTITIES:
                 values = [float(getattr(outcomes[case], quantity)) for case in cases]
-                found.append(Found(quantity, integrator, name, extrapolate(sizes, values)))
+                finer = [getattr(outcomes[case], quantity) for case in _finer(outcomes, cases[-1])]
+                found.append(Found(quantity, integrator, name, _cover(extrapolate(sizes, values), finer)))
     return found
+
+
+def _finer(outcomes: Outcomes, last: Settings) -> list[Settings]:
+    """The cases that are in mesh and time as fine as the last one of a ladder, or finer, with all else the same."""
+    alike = [c for c in outcomes if replace(c, mesh=last.mesh, cells_per_step=last.cells_per_step) == last]
+    return [case for case in alike if case.mesh >= last.mesh and case.time_step <= last.time_step]
+
+
+def _cover(limit: Limit, finer: Sequence[float]) -> Limit:
+    """Let a limit without an order be as uncertain as it differs from cases that are as fine as the last one."""
+    if not math.isnan(limit.order):
+        return limit
+    apart = [abs(value - limit.value) for value in finer if value != limit.value]
+    return (
+        replace(limit, uncertainty=max(*apart, 0.0 if math.isnan(limit.uncertainty) else limit.uncertainty))
+        if apart
+        else limit
+    )
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,10 +12,11 @@ from conftest import Main, RunParcontact
 from mpi4py import MPI
 
 from parcontact.job import load
+from parcontact.job.sections.calculation import Study
 from parcontact.parallel.slab import Slab
 from parcontact.study import outcome, verdict
 from parcontact.study.extrapolation import Limit
-from parcontact.study.ladders import Settings, ladders, overrides
+from parcontact.study.ladders import Ladders, Settings, ladders, overrides
 from parcontact.study.outcome import Outcome
 
 WAVE = """
@@ -130,6 +132,20 @@ def test_front_and_sentences() -> None:
         f"for 0.3 %: none of these settings is good enough; the best, {last}, have an error of 0.4 %"
     )
     assert lines[4].endswith("(the reference itself is known to 0.4 %)")
+
+
+def test_a_limit_without_an_order_covers_finer_cases() -> None:
+    """Meshes come to 1, 1.02 and 1.01; on the finest one half as long steps give 1.2."""
+    own = Settings(32, 1.0, "exponential", 1e-4, "double", "spectral")
+    cases = {replace(own, mesh=mesh): make(1.0, error) for mesh, error in ((32, 0.0), (64, 0.02), (128, 0.01))}
+    cases[replace(own, mesh=128, cells_per_step=0.5)] = make(2.0, 0.2)
+    ladders = Ladders(
+        (32, 64, 128), (1.0, 0.5), ("exponential",), Study.model_validate({"mesh": [32, 64, 128]}), own, 0.0
+    )
+    found = {(one.quantity, one.ladder): one.limit for one in verdict.limits(ladders, cases)}
+    limit = found["mu_max", verdict.TOGETHER]
+    assert (limit.value, math.isnan(limit.order)) == (1.01, True)
+    assert limit.uncertainty == pytest.approx(0.19, rel=1e-12)
 
 
 def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
