@@ -15,7 +15,7 @@ import numpy as np
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..summary import sweep_table
-from ..summary.sweep_table import SEED
+from ..summary.sweep_table import SAMPLES
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
 
@@ -71,13 +71,13 @@ def title(directory: Path) -> str:
 
 
 def _find_keys(rows: Rows) -> list[str]:
-    """Return the keys that have several numbers and are no seeds, the first of those that move together."""
+    """Return the keys that have several numbers and choose no sample, the first of those that move together."""
     names = list(rows[0]) if rows else ["case", "state"]
     keys: dict[tuple[int, ...], str] = {}  # by which rows have the same value
     for name in names[names.index("case") + 1 : names.index("state")]:
         values = [row[name] for row in rows]
         order = tuple(values.index(value) for value in values)
-        if name.split(".")[-1] != SEED and any(order):
+        if name.split(".")[-1] not in SAMPLES and any(order):
             keys.setdefault(order, name)
     return [name for name in keys.values() if all(isinstance(row[name], float) for row in rows)]
 

@@ -53,10 +53,8 @@ def prepare(part: Topography, grid: Grid) -> Prepared:
     periodic = part.periodic or ("smooth" if grid.boundary == "periodic" else "none")
     copies = 2 if periodic == "mirror" else 1
     rows, columns = (
-        _range(part, name, length / copies, available, count, points)
-        for name, length, available, count, points in zip(
-            "yx", grid.size[::-1], found.size[::-1], found.heights.shape, grid.points[::-1], strict=True
-        )
+        _range(part, axis, grid.size[axis] / copies, found.size[axis], found.heights.shape[1 - axis], grid.points[axis])
+        for axis in (1, 0)
     )
     cut = found.heights[rows, columns]
     if np.isnan(cut).any() and not part.fill:
@@ -67,8 +65,9 @@ def prepare(part: Topography, grid: Grid) -> Prepared:
     return Prepared(heights - heights.mean(), cut, done, (grid.lx / copies, grid.ly / copies))
 
 
-def _range(part: Topography, name: str, length: float, available: float, count: int, points: int) -> slice:
-    """The points in the middle of the map that are as long as the box, which has so many `points` of its own."""
+def _range(part: Topography, axis: int, length: float, available: float, count: int, points: int) -> slice:
+    """The points of the map around its centre that are as long as the box, which has so many `points` of its own."""
+    name = "xy"[axis]
     if length > available * (1.0 + SLACK):
         raise InputError(
             f"{part.path}: the box is {length:.6g} m along {name}, the map only {available:.6g} m; make the box "
@@ -80,7 +79,15 @@ def _range(part: Topography, name: str, length: float, available: float, count: 
             f"{part.path}: the box is {length:.3g} m along {name}, and points of the map are {available / count:.3g} m "
             "apart: it would be flat; make the box larger (grid.size), or take a finer map"
         )
-    first = (count - wanted) // 2
+    if part.centre is None:
+        first = (count - wanted) // 2
+        return slice(first, first + wanted)
+    first = round(part.centre[axis] / available * count - wanted / 2)
+    if not 0 <= first <= count - wanted:
+        raise InputError(
+            f"{part.path}: a box of {length:.6g} m around {part.centre[axis]:.6g} m along {name} leaves the map, which "
+            f"has {available:.6g} m; {length / 2:.6g} to {available - length / 2:.6g} m would do"
+        )
     return slice(first, first + wanted)
 
 

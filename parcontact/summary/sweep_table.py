@@ -31,7 +31,7 @@ COLUMNS = ("state", *RESULTS, *FRICTION_ERRORS, "residual", *slide.ERRORS, "seco
 NUMBERS = {"case", *COLUMNS, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
-SEED = "seed"  # the last word of keys over whose values means are taken
+SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
 FAILURE = ".failure"  # why a case has failed
 
 
@@ -41,7 +41,7 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
     Several programs, each with a case, may do so at a time.
     """
     with _alone(directory):
-        keys, seeded = list(cases[0].settings), any(key.split(".")[-1] == SEED for key in cases[0].settings)
+        keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
         rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
         save(directory / TABLE, ["case", *keys, *COLUMNS], rows)
         if points:
@@ -143,9 +143,11 @@ def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]])
 def _means(
     rows: Sequence[dict[str, Any]], keys: Sequence[str], names: Sequence[str]
 ) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the columns and rows of the means of some results over the cases that differ by their seeds only, with the
-    standard deviation of a single case, the standard error of the mean, and the number of cases."""
-    kept = [key for key in keys if key.split(".")[-1] != SEED]
+    """Return the columns and rows of the means of some results over the cases that differ by their sample only.
+
+    With them are the standard deviation of a single case, the standard error of the mean, and the number of cases.
+    """
+    kept = [key for key in keys if key.split(".")[-1] not in SAMPLES]
     groups: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         groups.setdefault(repr([row[key] for key in kept]), []).append(row)

@@ -97,12 +97,25 @@ def test_missing_points_may_be_refused(road: Path) -> None:
         heights_of(road, MPI.COMM_SELF, more=", fill: false")
 
 
+def test_another_part_of_the_map(road: Path) -> None:
+    """Of a map that has no trend and is not resampled, the points around the centre are the box, exactly."""
+    plain, half = ", periodic: none, detrend: mean", POINTS // 2
+    heights = np.load(road / "truth.npy")
+    np.save(road / "road.npy", heights * 1e6)
+    found = heights_of(road, MPI.COMM_SELF, half, LENGTH / 2, f"{plain}, centre: [2.5e-4, 7.5e-4]")
+    part = heights[half:, :half]
+    assert np.abs(found - (part - part.mean())).max() <= 1e-12 * np.ptp(part)
+    with pytest.raises(InputError, match=r"around 0.0002 m along x leaves the map.*; 0.00025 to 0.00075 m would do"):
+        heights_of(road, MPI.COMM_SELF, half, LENGTH / 2, f"{plain}, centre: [2.0e-4, 7.5e-4]")
+
+
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
         (", path: none.nc", "surface.path must be an existing file"),
         (", unit: inch", "surface.unit must be m | mm | um | nm, got 'inch'"),
         (", size: 1.0e-3", "surface.size must be two positive lengths"),
+        (", centre: 1.0e-3", "surface.centre must be two positive lengths"),
         (", detrend: slope", "surface.detrend must be none | mean | tilt | curvature, got 'slope'"),
         (", periodic: yes", "surface.periodic must be smooth | window | mirror | none"),
         (", fill: 1", "surface.fill must be true or false"),

@@ -118,7 +118,8 @@ class HeightFile(Part):
 class Topography(Part):
     """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .txt and .xyz.
 
-    The middle of the map that is as large as the box is levelled, filled, made periodic and resampled to the grid.
+    The part of the map around `centre` that is as large as the box is levelled, filled, made periodic and resampled to
+    the grid.
     """
 
     shape: Literal["topography"] = "topography"
@@ -128,6 +129,9 @@ class Topography(Part):
         tuple[Positive, Positive] | None, Field(description="two positive lengths [m], only for formats that have none")
     ] = None
     channel: str | None = Field(default=None, description="the name of a channel of the file (text)")
+    centre: Annotated[
+        tuple[Positive, Positive] | None, Field(description="two positive lengths [m] from the corner of the map")
+    ] = None  # the middle of the map
     detrend: Literal["none", "mean", "tilt", "curvature"] = "tilt"
     fill: Flag = Field(default=True, description="true or false: whether missing points are filled")
     periodic: Literal["smooth", "window", "mirror", "none"] | None = None  # smooth; none in a free scene
