@@ -8,8 +8,10 @@
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
+    layers   operator calls of layers over those of the half space, at equal contact area: for --points 128 --rounds 5
     folded   what branches without a map save, and what friction is then wrong by
     effects  what each effect adds to a step at equal iterations; --picture draws it
+    flow     leakage through the gap of a contact of 30 %, along x and along y: for --points 2048
     start    the command line, over an interpreter that only imports numpy
     scale    a transform, a cold solve and a sliding step on two ranks, over one
     sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
@@ -37,6 +39,8 @@ import runs
 from bench.adhesive import adhesion
 from bench.dilute import dilute
 from bench.effects import effects
+from bench.layers import layers
+from bench.leakage import flow
 from bench.program import start
 from bench.scaling import WORLD, march, scale
 from bench.slides import folded, slide, steady
@@ -46,7 +50,15 @@ from bench.table import Line
 FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
 PARTS = {"solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
-PARTS |= {"folded": folded, "sizes": sizes, "large": large, "adhesion": adhesion, "dilute": dilute}
+PARTS |= {
+    "folded": folded,
+    "sizes": sizes,
+    "large": large,
+    "adhesion": adhesion,
+    "dilute": dilute,
+    "layers": layers,
+    "flow": flow,
+}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 

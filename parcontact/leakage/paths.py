@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
+from ..compiled import loop
+
 Mask = NDArray[np.bool_]
 
 
@@ -22,18 +24,49 @@ def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
 def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tuple[float, tuple[int, int] | None]:
     """Return the smallest gap on the path from end to end whose smallest gap is the largest, and its row and column.
 
-    Returns 0 and None where contact closes all paths. The gap is found by bisection over the gaps that occur.
+    Returns 0 and None where contact closes all paths. Cells open one after the other, the largest gap first, until both
+    ends are connected: the last one is the constriction.
     """
-    values = np.unique(gap[gap > 0.0])
-    closed, open_ = len(values), -1  # numbers of values at which the paths are closed, and open
-    while closed - open_ > 1:
-        middle = (closed + open_) // 2
-        if connected_from_end_to_end(gap >= values[middle], periodic_sides).any():
-            open_ = middle
-        else:
-            closed = middle
-    if open_ < 0:
+    open_ = np.flatnonzero(gap > 0.0)
+    cell = _open_until_connected(open_[np.argsort(-gap.ravel()[open_])], *gap.shape, periodic_sides)
+    if cell < 0:
         return 0.0, None
-    on_path = connected_from_end_to_end(gap >= values[open_], periodic_sides) & (gap == values[open_])
-    row, column = np.argwhere(on_path)[0]
-    return float(values[open_]), (int(row), int(column))
+    row, column = divmod(int(cell), gap.shape[1])
+    return float(gap[row, column]), (row, column)
+
+
+@loop
+def _open_until_connected(order, ny, nx, periodic):
+    """Open cells in an order until a path leads from the first row to the last; return the last one, -1 if none does.
+
+    Open cells that touch are one tree, `parent` leading to its root; both ends are cells of their own.
+    """
+    first, last = nx * ny, nx * ny + 1
+    parent = np.full(nx * ny + 2, -1, np.int64)
+    parent[first], parent[last] = first, last
+    for cell in order:
+        parent[cell] = cell
+        row, column = cell // nx, cell % nx
+        for side in range(4):
+            if side == 0:
+                other = cell - nx if row > 0 else first
+            elif side == 1:
+                other = cell + nx if row < ny - 1 else last
+            elif side == 2:
+                other = cell - 1 if column > 0 else (cell + nx - 1 if periodic else cell)
+            else:
+                other = cell + 1 if column < nx - 1 else (cell - nx + 1 if periodic else cell)
+            if parent[other] >= 0:
+                parent[_root(parent, other)] = _root(parent, cell)
+        if _root(parent, first) == _root(parent, last):
+            return cell
+    return -1
+
+
+@loop
+def _root(parent, cell):
+    """Return the root of a tree, and let cells on the way there skip every other one."""
+    while parent[cell] != cell:
+        parent[cell] = parent[parent[cell]]
+        cell = parent[cell]
+    return cell
