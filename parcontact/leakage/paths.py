@@ -27,11 +27,11 @@ def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tup
     Returns 0 and None where contact closes all paths. Cells open one after the other, the largest gap first, until both
     ends are connected: the last one is the constriction.
     """
-    open_ = np.flatnonzero(gap > 0.0)
-    cell = _open_until_connected(open_[np.argsort(-gap.ravel()[open_])], *gap.shape, periodic_sides)
+    open_, (ny, nx) = np.flatnonzero(gap > 0.0), gap.shape
+    cell = int(_open_until_connected(open_[np.argsort(-gap.ravel()[open_])], ny, nx, periodic_sides))
     if cell < 0:
         return 0.0, None
-    row, column = divmod(int(cell), gap.shape[1])
+    row, column = divmod(cell, nx)
     return float(gap[row, column]), (row, column)
 
 
