@@ -21,9 +21,10 @@ from ..physics.measures import Measures
 from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
-from ..solve.nonsymmetric import proximal
+from ..solve.nonsymmetric import proximal, striped
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
+from ..solve.nonsymmetric.striped import StripedSolver
 from .heating import Feedback, warm
 from .losses import branch_powers
 from .point import Point
@@ -102,8 +103,9 @@ class SteadySliding:
     def _solve(self, velocity: Vector, pressure: float) -> Point:
         """Solve at the temperature that was taken."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
+        along_axis = striped.applies(velocity, self.setup.grid.points)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
-        for start, solver in self._starts(factor * speed, pressure):
+        for start, solver in self._starts(factor * speed, pressure, along_axis):
             contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start, solver)
             calls += more
             if contact.converged:
@@ -182,10 +184,10 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(self, speed: float, pressure: float) -> Iterator[tuple[Array | None, Make]]:
+    def _starts(self, speed: float, pressure: float, along_axis: bool) -> Iterator[tuple[Array | None, Make]]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
-        each, what makes the solver: as a rule the usual one, then the `narrow` one, which it always is on a line of
-        points, and at last the one of proximal points.
+        each, what makes the solver: as a rule the usual one, then without stripes the `narrow` one, which it always is
+        on a line of points, and at last the one of proximal points.
 
         The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
@@ -197,7 +199,7 @@ class SteadySliding:
             yield from ((self.contact.p, self._solver), (None, self._solver))
         else:
             yield from ((None, self._solver), (self.contact.p, self._solver))
-        if 1 not in self.setup.grid.points:
+        if 1 not in self.setup.grid.points and not along_axis:
             yield None, partial(self._solver, narrow=True)
         yield None, self._proximal
 
@@ -228,23 +230,26 @@ class SteadySliding:
 
     def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> tuple[SteadySolver, Convolution]:
         operator, inverse = self._operators(level, velocity)
-        return self._solver_for(level, operator, inverse, narrow), operator
+        return self._solver_for(level, velocity, operator, inverse, narrow), operator
 
     def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
         operator, inverse = self._operators(level, velocity)
         kind = self.setup.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
-        solver = self._solver_for(level, nearer, nearer_inverse, narrow=True)
+        solver = self._solver_for(level, velocity, nearer, nearer_inverse, narrow=True)
         pull = operator.mapped(proximal.pull, np.float64)
         return Proximal(solver, operator, pull), operator
 
     def _solver_for(
-        self, level: Level, operator: Convolution, preconditioner: Convolution, narrow: bool
+        self, level: Level, velocity: Vector, operator: Convolution, preconditioner: Convolution, narrow: bool
     ) -> SteadySolver:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
         tolerance = max(tolerance_of(numerics.tolerance), 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
         limit = 20 * numerics.max_iterations
-        return SteadySolver(level.slab, operator, preconditioner, height, tolerance, limit, narrow=narrow)
+        given = level.slab, operator, preconditioner, height, tolerance, limit
+        if striped.applies(velocity, self.setup.grid.points):
+            return StripedSolver(int(velocity[0] != 0.0), *given)
+        return SteadySolver(*given, narrow=narrow)
 
     def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""

@@ -16,6 +16,7 @@ from ...compiled import loop
 from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..problem import Operator
+from .stripes import OnSet
 
 
 class Directions:
@@ -29,7 +30,7 @@ class Directions:
         self,
         slab: Slab,
         operator: Operator,
-        preconditioner: Operator,
+        preconditioner: OnSet,
         count: int,
         kept: type,
         pairs: Sequence[tuple[Array, Array]] = (),
@@ -62,7 +63,7 @@ class Directions:
             if size <= goal or size == 0.0:
                 return step
             t, w = self._pair(step)
-            self.preconditioner.apply(r, t)
+            self.preconditioner.apply(working, r, t)
             _, mean = self.slab.sum(*sum_on(working, t))
             kernels.turn(working, t, 0.0, mean / members, t)
             self.operator.apply(t, w)

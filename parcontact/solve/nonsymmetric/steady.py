@@ -15,6 +15,7 @@ coarser grids makes it cheap; from far away it may cycle, and then it says so.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,7 @@ from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
 from .gcr import Directions, gaps_on
 from .projected import DIRECTIONS, Projected, extension_on
+from .stripes import OnSet, Plain
 
 MAX_STEPS_TO_HALVE = 20  # tuning: projected steps in which the certificate must halve
 FAR, FEW = 0.3, 4  # tuning: while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
@@ -91,7 +93,8 @@ class SteadySolver:
         self.constraint = NonNegative()
         self._projected = Projected(slab, operator, preconditioner, self.constraint, narrow)
         kept = precision_of_directions(tolerance, LOOSE)
-        self._linear = Directions(slab, operator, preconditioner, directions, kept, self._projected.pairs)
+        on_sets = self._on_sets(preconditioner)
+        self._linear = Directions(slab, operator, on_sets, directions, kept, self._projected.pairs)
         self._u = slab.zeros()
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
@@ -115,6 +118,10 @@ class SteadySolver:
             start.fill(0.0)
             return SteadyContact(start, self._u, math.nan, nothing, 0, 0, 0, "no point is left that carries load")
 
+    def _on_sets(self, preconditioner: Operator) -> OnSet:
+        """Return the preconditioner of linear solves on a set."""
+        return Plain(preconditioner)
+
     def judge(self, operator: Operator, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, such as a solution, for another operator, whose
         image of it is then `u`. Collective."""
@@ -124,20 +131,23 @@ class SteadySolver:
     def _solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         if not self.slab.sum(kernels.total(start))[0] > 0.0:
             start.fill(mean)
-        d, certificate, projections = self._project(start, h, mean)
+        d, certificate, projections = self._project(start, h, mean, (True, False), MAX_STEPS_TO_HALVE)
         if certificate.worst <= self.tolerance:
             return SteadyContact(start, self._u, d, certificate, projections, 0, 0, "")
         return self._change_sets(start, h, mean, projections)
 
-    def _project(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate, int]:
-        """Projected steps as long as they help, in one way and then in the other."""
+    def _project(
+        self, p: Array, h: Array, mean: float, ways: Sequence[bool], steps_to_halve: int
+    ) -> tuple[float, Certificate, int]:
+        """Projected steps as long as they halve the certificate in so many, in one way and then in the next: the load
+        is restored near by, or not."""
         self._admit(p, mean)
         d, certificate = self._certify(p, h, mean)
         steps = 0
-        for near_by in (True, False):
+        for near_by in ways:
             best, since = certificate.worst, 0
             self._projected.begin(near_by)
-            while certificate.worst > self.tolerance and since < MAX_STEPS_TO_HALVE:
+            while certificate.worst > self.tolerance and since < steps_to_halve:
                 self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
                 d, certificate = self._certify(p, h, mean)
                 steps += 1

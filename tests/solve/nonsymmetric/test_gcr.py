@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.solve.nonsymmetric.gcr import Directions, residual
+from parcontact.solve.nonsymmetric.stripes import Plain
 
 Map = NDArray[np.float64]
 NX, NY = 5, 4
@@ -55,7 +56,7 @@ class Problem:
 
     def improve(self, limit: int, reduction: float = 1e-13, preconditioner: Map | None = None) -> int:
         inverse = np.eye(NX * NY) if preconditioner is None else preconditioner
-        directions = Directions(self.slab, Dense(self.A), Dense(inverse), 13, np.float64)
+        directions = Directions(self.slab, Dense(self.A), Plain(Dense(inverse)), 13, np.float64)
         return directions.improve(self.x, self.u, self.h, self.working, limit, reduction)
 
     def residual(self) -> float:
