@@ -5,6 +5,7 @@
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
     dilute   cold elastic solves at 0.07 to 2 % contact in free boxes of two and four times as many points, and aspher's
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
+    sticking operator calls of steps with adhesion over those of the same steps without, in nine scenes
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
@@ -45,6 +46,7 @@ from bench.program import start
 from bench.scaling import WORLD, march, scale
 from bench.slides import folded, slide, steady
 from bench.solves import large, sizes, solve
+from bench.sticking import sticking
 from bench.table import Line
 
 FEWEST = 64  # points along a side
@@ -58,6 +60,7 @@ PARTS |= {
     "dilute": dilute,
     "layers": layers,
     "flow": flow,
+    "sticking": sticking,
 }
 ON_TWO_RANKS = {"march": march, "scale": scale}
 

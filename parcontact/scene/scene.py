@@ -29,8 +29,9 @@ from ..physics.surface import Surface
 from ..physics.tiles import SIDE, Tiles
 from ..physics.units import Units
 from ..printed import quantity
+from ..solve.adhesive.iterate import GapOperators
 from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
-from ..solve.adhesive.solver import GapOperators, GapSolver
+from ..solve.adhesive.solver import GapSolver
 from ..solve.adhesive.sticking import StickingSolver
 from ..solve.bounded import Bounded
 from ..solve.constraint import Constraint, NonNegative
@@ -279,9 +280,8 @@ def _sticking(setup: Setup, workspace: Workspace, operators: Operators) -> Stick
     numerics = setup.choices.numerics
     by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
     gaps = GapSolver(setup.slab, by_gap, numerics.max_iterations)
-    return StickingSolver(
-        gaps, workspace, numerics.tolerance, operators.operator if setup.choices.isolated.on else None
-    )
+    free = operators.operator if setup.choices.isolated.on else None
+    return StickingSolver(gaps, workspace, numerics.tolerance, free)
 
 
 def _body_and_energy(

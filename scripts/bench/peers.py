@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,8 +26,8 @@ heights, load = given["heights"], float(given["load"])
 {attempt}
 def tried(exponent):
     print(json.dumps({{"began": time.process_time()}}), flush=True)
-    seconds, error = attempt(10.0**exponent)
-    print(json.dumps({{"seconds": seconds, "error": error}}), flush=True)
+    seconds, error, *flips = attempt(10.0**exponent)
+    print(json.dumps({{"seconds": seconds, "error": error, "flips": flips}}), flush=True)
     return error <= given["wanted"]
 exponent = float(given["exponent"])
 if tried(exponent):
@@ -44,6 +44,15 @@ def attempt(tolerance):
     seconds = time.process_time() - began
     reference = given["reference"]
     return seconds, float(np.linalg.norm(p - reference) / np.linalg.norm(reference))
+"""
+STICKY = """
+def attempt(tolerance):
+    began = time.process_time()
+    p, gap = solve(tolerance)
+    seconds = time.process_time() - began
+    reference = given["reference"]
+    flips = int(np.count_nonzero((gap == 0.0) != given["touching"]))
+    return seconds, float(np.linalg.norm(p - reference) / np.linalg.norm(reference)), flips
 """
 TAMAAS = """\
 import tamaas as tm
@@ -81,8 +90,8 @@ def solve(tolerance):
     solver.addFunctionalTerm(law)
     solver.max_iter = 20000
     solver.solve(float(given["gap"]))
-    return model.traction
-{COLD}"""
+    return model.traction, model["gap"].reshape(heights.shape)
+{STICKY}"""
 ADHESION_COLD = f"""\
 from Adhesion.Interactions import Exponential
 from Adhesion.System import BoundedSmoothContactSystem
@@ -99,8 +108,8 @@ def solve(tolerance):
     gaps = found.x.reshape(heights.shape)
     p = -body.evaluate_force(gaps + heights) / body.area_per_pt
     free = gaps > 0.0  # there p is -sigma: its mean is the load
-    return p - (p + law.evaluate(gaps, gradient=True)[1])[free].mean()
-{COLD}"""
+    return p - (p + law.evaluate(gaps, gradient=True)[1])[free].mean(), gaps
+{STICKY}"""
 TAMAAS_SLIDING = f"""{TAMAAS}
 def attempt(tolerance):
     model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
@@ -125,8 +134,9 @@ def attempt(tolerance):
 
 
 class Task(NamedTuple):
-    """Work for a program: its `code` defines `attempt(tolerance) -> (seconds, error)`, with what is `given` to it; the
-    search begins at the tolerance `10**exponent`."""
+    """Work for a program: its `code` defines `attempt(tolerance) -> (seconds, error)`, with what is `given` to it, and
+    with adhesion the number of points that touch where the reference is open, or the other way round; the search begins
+    at the tolerance `10**exponent`."""
 
     program: str
     code: str
@@ -135,11 +145,12 @@ class Task(NamedTuple):
 
 class Found(NamedTuple):
     """The time of a program [s] by the loosest tolerance with which its error was small enough; or, if it did not get
-    there, the longest try."""
+    there, the longest try. `flips` are those of a contact with adhesion."""
 
     reached: bool
     seconds: float
     error: float
+    flips: Sequence[float] = ()
 
 
 def compare_peers(directory: Path, tasks: tuple[Task, ...], given: Mapping[str, Any], ours: float) -> Iterator[Line]:
@@ -154,6 +165,7 @@ def compare_peers(directory: Path, tasks: tuple[Task, ...], given: Mapping[str, 
         least = "" if found.reached else ", error not reached in time: more than"
         if found.reached:
             yield Line(f"{task.program}: error", found.error)
+            yield from (Line(f"{task.program}: points on another branch", flips) for flips in found.flips)
         yield Line(f"{task.program}{least}", 1e3 * found.seconds, "ms")
         yield Line(f"{task.program} over ours{least}", found.seconds / ours)
 
@@ -170,11 +182,11 @@ def search(python: Path, task: Task, given: Mapping[str, Any]) -> Found:
     return judge([json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")], given["wanted"])
 
 
-def judge(said: list[dict[str, float]], wanted: float) -> Found:
+def judge(said: list[dict[str, Any]], wanted: float) -> Found:
     """The cheapest try that was good enough; else the longest one, of which the last may not have ended in time."""
     if good := [one for one in said if one.get("error", np.inf) <= wanted]:
         cheapest = min(good, key=lambda one: one["seconds"])
-        return Found(True, cheapest["seconds"], cheapest["error"])
+        return Found(True, cheapest["seconds"], cheapest["error"], cheapest.get("flips", ()))
     tries = [one["seconds"] for one in said if "seconds" in one]
     began = [one["began"] for one in said if "began" in one]
     unfinished = [LIMIT - began[-1]] if len(began) > len(tries) else []

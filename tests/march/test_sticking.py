@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import begun, column, marched
+from marching import column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from restarting import ELASTIC, ROUGH, SPHERE, ZENER, Bench, cut, rows, same
@@ -115,11 +115,47 @@ def test_open_after_detachment() -> None:
     assert ["any more" in row.remark for row in found].count(True) == 1  # when they come off, not while they are apart
 
 
-def test_no_adhesion_remembers_nothing() -> None:
-    job = {"grid": {"points": 8, "size": 1e-3}, "surface": SPHERE, "material": ELASTIC, "history": [{"pressure": 1e3}]}
-    march = begun(job)
+def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A job without the section makes no solver of gaps, no operators for it and no memory of gaps, and calls nothing
+    of them; it holds what its plan tells, to the byte, which has no map of theirs."""
+    from parcontact.job import Job
+    from parcontact.plan import memory
+
+    def refuse(*given: Any, **named: Any) -> None:
+        raise AssertionError("called without an adhesion section")
+
+    places = ["solve.adhesive.solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
+    places += ["march.sticking_energies.after_step", "scene.scene.Scene.law"]
+    places += [f"march.sticking.{name}" for name in ("at_rest", "solve", "front_of", "is_apart", "open_up")]
+    for place in places:
+        monkeypatch.setattr(f"parcontact.{place}", refuse)
+    history = [{**LOAD, "pressure": 2e3}, SLIDE]
+    grid = {"points": [20, 14], "size": [1e-3, 7e-4]}
+    job = {"grid": grid, "surface": ROUGH, "material": ZENER, "history": history, "output": {"energy": True}}
+    planned = Job.model_validate(job)
+    march, _ = marched(planned)
+    assert march.scene.sticking is None
     assert march.state.sticking is None
     assert not [name for name in march.entries() if name.startswith("sticking")]
+    assert march.scene.slab.tally["map bytes"] == memory.total(planned)
+    with pytest.raises(AssertionError, match="without an adhesion section"):
+        marched({**job, "adhesion": STICK})
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_surfaces_far_apart_pull_each_other(boundary: str) -> None:
+    """A sphere is pulled off, and 20 ranges on: from 8 on it is pulled by what rigid surfaces are at its approach, the
+    sum of the attraction over the points, to 1 % of it, however little that is beside the pull-off."""
+    grid = {"points": 24, "size": 3e-4, "boundary": boundary}
+    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": ELASTIC}
+    pull = {"approach": {"from": 5e-7, "to": -2e-5}, "duration": 1.0, "time_step": 1 / 43}
+    march, made = marched({**job, "adhesion": STICK, "history": [pull]})
+    height = march.field("height")
+    apart = [row.measures for row in made if row.measures.approach < -8e-6]
+    assert len(apart) > 20
+    for each in apart:
+        rigid = -0.05 / 1e-6 * np.exp((height + each.approach) / 1e-6).mean()
+        assert each.pressure == pytest.approx(rigid, rel=0.01)
 
 
 def test_the_memory_that_a_plan_tells(bench: Bench, tmp_path: Path) -> None:

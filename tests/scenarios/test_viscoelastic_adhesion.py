@@ -6,7 +6,21 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
-from sticking import FORCE, LENGTH, MODULUS, UNLOADED, WORK, Job, gathered, nominal_area, pull_off, ramp, sphere, steps
+from sticking import (
+    FORCE,
+    LENGTH,
+    MODULUS,
+    UNLOADED,
+    WORK,
+    Job,
+    cells_per_zone,
+    gathered,
+    nominal_area,
+    pull_off,
+    ramp,
+    sphere,
+    steps,
+)
 
 import parcontact as pc
 
@@ -25,20 +39,23 @@ def relaxed(approach: float) -> Job:
 
 @pytest.mark.parametrize(("rate", "fall", "exact"), [(0.03, 20, 1.365), (0.3, 20, 2.481), (3, 8, 7.38)])
 def test_pull_off_over_rate(rate: float, fall: float, exact: float) -> None:
-    """V tau over the unit of length is `rate`; an independent axisymmetric program's numbers, to 2 % on cells of 0.4
+    """V tau over the unit of length is `rate`; an independent axisymmetric program's numbers, to 1 % on cells of 0.4
     process zones."""
     start, duration = 17.875 * LENGTH, fall * TIME / rate
-    job = sphere(48, 8, 1, relaxed(start), ramp(start, start - fall * LENGTH, 80, duration), material=zener())
-    assert_allclose(pull_off(job), -exact * FORCE, rtol=0.02)
+    job = sphere(48, 8, 1, relaxed(start), ramp(start, start - fall * LENGTH, 160, duration), material=zener())
+    assert_allclose(pull_off(job), -exact * FORCE, rtol=0.01)
 
 
-@pytest.mark.parametrize(("radius", "exact"), [(2, 8.61), (3, 11.21)])
-def test_instant_retraction(radius: float, exact: float) -> None:
-    """Relaxed with a contact of two or three radii of the unloaded one, then pulled off within 1e-6 relaxation times:
-    the program of the other test, 1 %."""
+@pytest.mark.parametrize(("radius", "exact"), [(2, 8.61), (3, 11.21), (4, 11.84)])
+def test_instant_retraction(radius: int, exact: float) -> None:
+    """Relaxed with a contact of two to four radii of the unloaded one, then pulled off within 1e-6 relaxation times:
+    the program of the other test, 1 % on cells of at most half a process zone."""
     start = (radius * UNLOADED) ** 2 / 1e-3 - np.sqrt(2 * np.pi * WORK * radius * UNLOADED / MODULUS)
     fall = (radius**2 + 4) * LENGTH
-    job = sphere(48, 3 * radius, 1, relaxed(start), ramp(start, start - fall, 80, 1e-6 * TIME), material=zener())
+    job = sphere(
+        16 * max(radius, 3), 3 * radius, 1, relaxed(start), ramp(start, start - fall, 80, 1e-6 * TIME), material=zener()
+    )
+    assert cells_per_zone(job) > 2.0
     assert_allclose(pull_off(job), -exact * FORCE, rtol=0.01)
 
 

@@ -42,3 +42,17 @@ def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
     for _ in range(66):
         slide.step()
     assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load
+
+
+@pytest.mark.parametrize("name", ["rough, elastic, middle", "rough, rubber, middle"])
+def test_a_resolved_step_with_adhesion(name: str) -> None:
+    """It takes at most three times the operator calls of the same step without, and more than half of them: both are
+    solved to the same tolerance."""
+    sticking = load_script("bench.sticking")
+    job = sticking.job_of(sticking.SCENES[name], 128)
+    calls, front = sticking.count(job)
+    without, still = sticking.count({key: value for key, value in job.items() if key != "adhesion"})
+    resolved = front <= 1.0
+    assert resolved.sum() >= 5
+    assert not still.any()
+    assert 0.5 < calls[resolved].sum() / without[resolved].sum() < 3.0

@@ -33,17 +33,14 @@ A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 the working set. Everything is dimens
 """
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ...parallel.slab import Array, Slab
 from .. import kernels as maps
-from ..certificate import Certificate
-from ..iterate import LEAST_SHARE
-from ..problem import Approach, MeanPressure, Operator
+from ..problem import Approach, MeanPressure
 from . import kernels
+from .iterate import GapOperators, GapSolution, Iterate, certify
 from .law import Law
 
 # tuning
@@ -55,59 +52,8 @@ MAX_STALLED_ITERATIONS = 120  # iterations without a better certificate after wh
 LEAST_DESCENT = 0.1  # over that without the last direction: with less it is forgotten
 # accuracy
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of the terms of a change of E
-SHARPER = 10.0  # times the certificate of contacts that do not stick: with it the load is as right as theirs
-LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to less are none
 HELD = 0.5  # of a load that pulls: all points being open, with less attraction than that nothing holds
 FAR = 4.0  # times the range, by which all points are open where nothing holds any more
-
-
-class GapOperators(NamedTuple):
-    """The operator of a body and its inverse K, which is 0 for mean values; `mean` is the displacement over a uniform
-    pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive."""
-
-    operator: Operator
-    inverse: Operator
-    mean: float
-    least_mean: float
-
-
-@dataclass(frozen=True)
-class GapSolution:
-    """Solved gap (the map that was given as the start) and pressure (the solver's map, valid until the next solve).
-
-    `failure` is empty, or says what happened instead; `detached` says that no equilibrium was left under the load.
-    """
-
-    gap: Array
-    p: Array
-    d: float
-    certificate: Certificate
-    iterations: int
-    failure: str
-    detached: bool = False
-
-
-@dataclass
-class _Iterate:
-    """A gap in numbers: its mean, the uniform part m of the pressure, the approach; under which load or mean gap.
-
-    The last step went `share` of its way, which moves the mean gap by `moved`, and m by `change`; it was that of Newton
-    if it was `stable`. The next one is first tried with the length `step`.
-    """
-
-    law: Law
-    heights: Array
-    mean_height: float
-    control: Approach | MeanPressure
-    given: float | None
-    mean_gap: float
-    m: float = 0.0
-    d: float = 0.0
-    share: float = 0.0
-    moved: float = 0.0
-    change: float = 0.0
-    stable: bool = True
-    step: float = 1.0
 
 
 class GapSolver:
@@ -134,13 +80,13 @@ class GapSolver:
         while True:
             members, lost = self._find_residual(it, g)
             self.operators.operator.apply(self._way, self._way)
-            certificate = self._certify(it, g)
+            certificate = certify(self.slab, it, self._working, g, self._q, self._sigma, self._way)
             best = min(best, (certificate.worst, iteration))
             failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best, stuck)
             if failure is not None:
                 if g is not gap:
                     gap[...] = g
-                self._q += it.m
+                self._find_pressure(it)
                 return GapSolution(gap, self._q, it.d, certificate, iteration, failure, lost)
             scale = self._turn(it, members, scale)
             if not self._descend(it, g, other):
@@ -155,7 +101,7 @@ class GapSolver:
 
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
-    def _begin(self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array) -> _Iterate:
+    def _begin(self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array) -> Iterate:
         """Give the start its mean where that is given, find its pressure, and forget the last direction."""
         self._t.fill(0.0)
         sums = self.slab.sum(maps.total(heights), maps.total(gap))
@@ -171,15 +117,15 @@ class GapSolver:
         np.add(gap, heights, out=self._q)
         self.operators.inverse.apply(self._q, self._q)
         kernels.attract(*law, gap, self._sigma)
-        return _Iterate(law, heights, mean_h, control, given, mean_g)
+        return Iterate(law, heights, mean_h, control, given, mean_g)
 
-    def _uniform(self, it: _Iterate, mean_gap: float) -> float:
+    def _uniform(self, it: Iterate, mean_gap: float) -> float:
         """The uniform part m of the pressure, where it is not a multiplier."""
         if isinstance(it.control, MeanPressure):
             return it.control.value
         return (mean_gap + it.mean_height + it.control.value) / self.operators.mean
 
-    def _find_residual(self, it: _Iterate, g: Array) -> tuple[float, bool]:
+    def _find_residual(self, it: Iterate, g: Array) -> tuple[float, bool]:
         """Let the pressure follow the last step, and find the working set and c on it, in the map of the way; the size
         of the set, and whether the surface has come off; collective."""
         q, sigma, before = self._q, self._sigma, it.m
@@ -187,7 +133,7 @@ class GapSolver:
         if it.given is None:
             it.m = self._uniform(it, it.mean_gap)
         else:
-            it.m = -total / count if count else self._lowest(it)
+            it.m = -total / count if count else self._least_uniform(it)
         sums = kernels.residual(g, q, sigma, it.m, self._working, self._way)
         members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
         if it.given is not None and members:
@@ -195,30 +141,24 @@ class GapSolver:
             kernels.centre(self._working, total / members, self._way)
         it.change = it.m - before
         it.d = self.operators.mean * it.m - it.mean_gap - it.mean_height
-        if not isinstance(it.control, MeanPressure) or -least <= 0.0:
+        it.lowest = -least
+        if not isinstance(it.control, MeanPressure) or it.lowest <= 0.0:
             return members, False
         held = attracted / self.slab.points  # with all points open it only falls from here on
-        return members, held < HELD * -it.m or (held < -it.m and -least > FAR * it.law.range)
+        return members, held < HELD * -it.m or (held < -it.m and it.lowest > FAR * it.law.range)
 
-    def _lowest(self, it: _Iterate) -> float:
+    def _find_pressure(self, it: Iterate) -> None:
+        """Put the pressure into its map. Where nothing touches under an approach it is minus the attraction: far apart
+        that is less than what is wrong with K (g + h)."""
+        if isinstance(it.control, Approach) and it.lowest > 0.0:
+            np.negative(self._sigma, out=self._q)
+        else:
+            self._q += it.m
+
+    def _least_uniform(self, it: Iterate) -> float:
         """The least uniform pressure that holds full contact; collective."""
         lowest = float((-self._q).max(initial=-np.inf))
         return self.slab.reduce((), [lowest])[0] - it.law.strength
-
-    def _certify(self, it: _Iterate, g: Array) -> Certificate:
-        """Return how wrong the gap is: by z, weighted by the pressure, over a length; collective.
-
-        The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it.
-        """
-        sums = kernels.judge(self._working, g, it.heights, self._q, it.m, self._sigma, self._way)
-        load, first, second, wrong = self.slab.sum(*sums)
-        least = LEAST_TRACTION * it.law.strength
-        spread, mean = 0.0, 0.0
-        if load > 0.0:
-            mean = first / load
-            spread = math.sqrt(max(second / load - mean**2, 0.0))
-        length = min(max(spread, LEAST_SHARE * abs(mean + it.d), LEAST_SHARE * it.law.range), it.law.range)
-        return Certificate(SHARPER * wrong / max(load, least) / length, 0.0, 0.0, length)
 
     def _verdict(
         self, worst: float, tolerance: float, iteration: int, best: float, best_at: int, stuck: bool
@@ -237,7 +177,7 @@ class GapSolver:
             return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
         return None
 
-    def _turn(self, it: _Iterate, members: float, scale: float) -> float:
+    def _turn(self, it: Iterate, members: float, scale: float) -> float:
         """Make the new direction from z; returns `<c, z>`; collective.
 
         `scale` is that of the last one, 0 for one to be forgotten.
@@ -253,7 +193,7 @@ class GapSolver:
         kernels.turn(working, z, beta, mean, self._t)
         return c_z
 
-    def _descend(self, it: _Iterate, g: Array, out: Array) -> bool:
+    def _descend(self, it: Iterate, g: Array, out: Array) -> bool:
         """Make a step along the direction to the gap `out` and its attraction; returns whether any lowers E;
         collective."""
         share = self._share(it, g)
@@ -272,7 +212,7 @@ class GapSolver:
         it.share = 0.0
         return False
 
-    def _share(self, it: _Iterate, g: Array) -> float:
+    def _share(self, it: Iterate, g: Array) -> float:
         """Find a way along the direction; returns which share of it to go; collective."""
         for _ in range(MAX_TRIES):
             total, cut = self.slab.sum(*kernels.lead(g, self._t, it.step, self._way))
@@ -285,7 +225,7 @@ class GapSolver:
         it.step *= wanted if wanted > 0.0 else 1.0
         return 1.0 if cut > 0.0 and wanted >= WHOLE else min(wanted, most)
 
-    def _newton(self, it: _Iterate, g: Array) -> tuple[float, float]:
+    def _newton(self, it: Iterate, g: Array) -> tuple[float, float]:
         """The share of the way that is the step of Newton, or the majorized one, and the most that gaps allow;
         collective."""
         self.operators.inverse.apply(self._way, self._image)

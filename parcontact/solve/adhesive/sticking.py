@@ -15,8 +15,9 @@ from ..contact import Contact
 from ..problem import Approach, MeanPressure, Operator
 from ..workspace import Workspace
 from . import kernels
+from .iterate import SHARPER, GapSolution
 from .law import Law
-from .solver import SHARPER, GapSolution, GapSolver
+from .solver import GapSolver
 
 MAX_PASSES = 100  # accuracy: of a free body; one to three do as a rule, and many where it is about to snap
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged

@@ -8,8 +8,9 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
+from parcontact.solve.adhesive.iterate import GapOperators
 from parcontact.solve.adhesive.law import Law
-from parcontact.solve.adhesive.solver import GapOperators, GapSolver
+from parcontact.solve.adhesive.solver import GapSolver
 from parcontact.solve.problem import Approach, MeanPressure
 
 NX, NY = 24, 20

@@ -1,0 +1,82 @@
+"""A gap and its pressure in numbers, with what a solve is given and returns, and how wrong it is."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ...parallel.slab import Array, Slab
+from ..certificate import Certificate
+from ..iterate import LEAST_SHARE
+from ..problem import Approach, MeanPressure, Operator
+from . import kernels
+from .law import Law
+
+# accuracy
+SHARPER = 5.0  # times the certificate of contacts that do not stick: with it load and area are as right as theirs
+LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to less are none
+
+
+class GapOperators(NamedTuple):
+    """The operator of a body and its inverse K, which is 0 for mean values; `mean` is the displacement over a uniform
+    pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive."""
+
+    operator: Operator
+    inverse: Operator
+    mean: float
+    least_mean: float
+
+
+@dataclass(frozen=True)
+class GapSolution:
+    """Solved gap (the map that was given as the start) and pressure (the solver's map, valid until the next solve).
+
+    `failure` is empty, or says what happened instead; `detached` says that no equilibrium was left under the load.
+    """
+
+    gap: Array
+    p: Array
+    d: float
+    certificate: Certificate
+    iterations: int
+    failure: str
+    detached: bool = False
+
+
+@dataclass
+class Iterate:
+    """A gap in numbers: its mean and its lowest value, the uniform part m of the pressure, the approach; under which
+    load or mean gap.
+
+    The last step went `share` of its way, which moves the mean gap by `moved`, and m by `change`; it was that of Newton
+    if it was `stable`. The next one is first tried with the length `step`.
+    """
+
+    law: Law
+    heights: Array
+    mean_height: float
+    control: Approach | MeanPressure
+    given: float | None
+    mean_gap: float
+    m: float = 0.0
+    d: float = 0.0
+    lowest: float = 0.0
+    share: float = 0.0
+    moved: float = 0.0
+    change: float = 0.0
+    stable: bool = True
+    step: float = 1.0
+
+
+def certify(slab: Slab, it: Iterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
+    """Return how wrong the gap is: by z, weighted by the pressure, over a length; collective.
+
+    The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it.
+    """
+    load, first, second, wrong = slab.sum(*kernels.judge(working, g, it.heights, q, it.m, sigma, z))
+    least = LEAST_TRACTION * it.law.strength
+    spread, mean = 0.0, 0.0
+    if load > 0.0:
+        mean = first / load
+        spread = math.sqrt(max(second / load - mean**2, 0.0))
+    length = min(max(spread, LEAST_SHARE * abs(mean + it.d), LEAST_SHARE * it.law.range), it.law.range)
+    return Certificate(SHARPER * wrong / max(load, least) / length, 0.0, 0.0, length)
