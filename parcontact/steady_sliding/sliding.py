@@ -18,6 +18,7 @@ from ..physics.convolution import Convolution
 from ..physics.flash import Flash
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
+from ..physics.prony import complex_modulus
 from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
@@ -31,6 +32,7 @@ from .point import Point
 
 COARSE_TOLERANCE = 0.02  # tuning: of the certificate on all grids but the finest
 LOOSE, SHARE = 1e-3, 0.6  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
+LOSSY = 2.5  # tuning: loss tangent under the shortest wave, above which contacts are solved by proximal points first
 NEAR = 1.1  # tuning: a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 
@@ -103,9 +105,10 @@ class SteadySliding:
     def _solve(self, velocity: Vector, pressure: float) -> Point:
         """Solve at the temperature that was taken."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
+        lossy = self._loses_far_more_than_it_stores(velocity)
         along_axis = striped.applies(velocity, self.setup.grid.points)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
-        for start, solver in self._starts(factor * speed, pressure, along_axis):
+        for start, solver in self._starts(factor * speed, pressure, along_axis, lossy):
             contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start, solver)
             calls += more
             if contact.converged:
@@ -184,15 +187,19 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(self, speed: float, pressure: float, along_axis: bool) -> Iterator[tuple[Array | None, Make]]:
+    def _starts(
+        self, speed: float, pressure: float, along_axis: bool, lossy: bool
+    ) -> Iterator[tuple[Array | None, Make]]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
         each, what makes the solver: as a rule the usual one, then without stripes the `narrow` one, which it always is
-        on a line of points, and at last the one of proximal points.
+        on a line of points, and at last the one of proximal points, which comes first where a body is `lossy`.
 
         The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
         appear and vanish.
         """
+        if lossy and along_axis:
+            yield None, self._proximal
         if self.contact is None:
             yield None, self._solver
         elif pressure == self._pressure and max(speed, self._speed) <= NEAR * min(speed, self._speed):
@@ -202,6 +209,15 @@ class SteadySliding:
         if 1 not in self.setup.grid.points and not along_axis:
             yield None, partial(self._solver, narrow=True)
         yield None, self._proximal
+
+    def _loses_far_more_than_it_stores(self, velocity: Vector) -> bool:
+        """Return whether the body does, under the shortest wave of the surface."""
+        setup, known = self.setup, self._known
+        if known.cells_per_wave is None:
+            return False
+        wave = known.cells_per_wave * max(known.cell) / setup.units.length
+        modulus = complex_modulus(2.0 * math.pi * math.hypot(*setup.in_units(velocity)) / wave, *setup.prony)
+        return bool(modulus.imag > LOSSY * modulus.real)
 
     def _descend(
         self, velocity: Vector, mean: float, start: Array | None, solver: Make
