@@ -2,6 +2,7 @@
 points come and go there without an end, and proximal points lead to a solution."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,9 +60,14 @@ def test_proximal_points_come_first_where_losses_are_large(
     shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Under the shortest wave, 0.125 mm, the loss tangent is 12.6 at this speed, and 0.63 at a hundredth of it."""
-    states, made = sliding(shared_path, ROUGH, comm), list[int]()
+    states, made = sliding(shared_path, ROUGH, comm), list[bool]()
     usual = SteadySliding._solver
-    monkeypatch.setattr(SteadySliding, "_solver", lambda *given, **more: made.append(1) or usual(*given, **more))
+
+    def noted(*given: Any, **more: Any) -> Any:
+        made.append(True)
+        return usual(*given, **more)
+
+    monkeypatch.setattr(SteadySliding, "_solver", noted)
     states.solve((PEAK, 0.0), 0.1 * 0.05 * MODULUS * float(np.sqrt(RATIO)))
     assert not made
     sliding(shared_path, ROUGH, comm).solve((1e-2 * PEAK, 0.0), 0.1 * 0.05 * MODULUS)
