@@ -190,11 +190,11 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
         return _solve_stuck(scene, state, step, trial, control)
     solver, operators = scene.in_double if state.rounding > 0.0 else (scene.solver, scene.operators)
     problem = Problem(*operators, trial.effective, scene.constraint(trial.alpha), control)
-    moved_start = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare)
+    moved_start, contact = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare), None
     if state.alpha == 0.0:  # nothing has been solved before
         on = partial(solver_on, scene.setup)
-        cold_start.prepare(solver, problem, state.spare, on, solver_on_tiles(scene.setup))
-    contact, remark = solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
+        contact = cold_start.prepare(solver, problem, state.spare, on, solver_on_tiles(scene.setup))
+    contact, remark = contact or solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
     if contact.failure:
         contact, remark = _retry(scene, state, step, problem, contact)
     if step.passed:

@@ -1,6 +1,7 @@
 """Convolutions on a grid: a symbol on the wavenumbers of a transform, given as such or by coefficients in space."""
 
 from collections.abc import Callable
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from ..parallel.fft import FFT
 from ..parallel.fftw import pyfftw
 from ..parallel.slab import Array, deal
 
+Symbols = list[NDArray[Any]]  # one for each block of columns
+Make = Callable[[], Symbols]
 ALL = slice(None)
 PARTS = 16  # tuning: of a spectrum, for which something is calculated at once: what it takes is small beside the whole
 
@@ -20,14 +23,31 @@ class Convolution:
 
     `part(rows)` is the symbol on these rows of the spectrum, `dtype` what it is kept in, times the scale of the
     transforms, in `symbols` for each block of columns. Of one that is `even` in q_y only the rows of q_y >= 0 are made
-    and kept.
+    and kept; one made `later` has them from when it is first applied.
     """
 
     def __init__(
-        self, fft: FFT, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, even: bool = True
+        self,
+        fft: FFT,
+        part: Callable[[slice], NDArray[np.inexact]],
+        dtype: DTypeLike,
+        even: bool = True,
+        later: bool = False,
     ) -> None:
         self.fft, self.even = fft, even
-        self.symbols = _in_blocks(fft, part, dtype, fft.my // 2 + 1 if even else fft.my)
+        self._make: Make | None = partial(_in_blocks, fft, part, dtype, fft.my // 2 + 1 if even else fft.my)
+        if not later:
+            self.symbols = self._made()
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        return self._made()
+
+    def _made(self) -> Symbols:
+        """Make the symbols, once."""
+        assert self._make is not None
+        symbols, self._make = self._make(), None
+        return symbols
 
     @staticmethod
     def footprint(spectrum: int, my: int, even: bool = True, is_complex: bool = False) -> int:
@@ -76,8 +96,12 @@ class MirroredConvolution:
     """
 
     def __init__(self, cosines: Cosines, part: Callable[[slice], NDArray[np.complexfloating]]) -> None:
-        self.fft = cosines
-        self.symbols = _in_blocks(cosines, part, cosines.fft.complex, cosines.my)
+        self.fft, self._part = cosines, part
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        """They are made when it is first applied."""
+        return _in_blocks(self.fft, self._part, self.fft.fft.complex, self.fft.my)
 
     @staticmethod
     def footprint(spectrum: int, my: int, itemsize: int) -> int:
@@ -92,10 +116,10 @@ class MirroredConvolution:
 
 def _in_blocks(
     fft: FFT | Cosines, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, count: int
-) -> list[NDArray[Any]]:
+) -> Symbols:
     """The first `count` rows of a symbol, times the scale of the transforms, for each block of columns."""
     widths = [columns.stop - columns.start for columns in fft.column_blocks]
-    symbols: list[NDArray[Any]] = [np.empty((count, width), dtype) for width in widths]
+    symbols: Symbols = [np.empty((count, width), dtype) for width in widths]
     for symbol in symbols:
         fft.slab.tally.hold(symbol)
     for rows in deal(count, PARTS):
@@ -125,22 +149,41 @@ def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
 
 
 def tabulate(
-    fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array], even: bool = False
+    fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array], even: bool = False, inside: bool = False
 ) -> NDArray[np.complexfloating]:
     """Symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at distance (x, y) [length]
     that a unit pressure on one cell causes; collective, and no rank holds the whole table. One that is `even` in x and
-    in y is calculated for each distance once.
+    in y is calculated for each distance once. One made `inside` the memory of the transform is lost at its next call.
     """
-    slab = fft.slab
-    dx, dy = size[0] / slab.nx, size[1] / slab.ny
-    padded = slab.resized(fft.mx, fft.my)
-    x, y = _distances(fft.mx), _distances(fft.my)[padded.rows]
+    transform = table_transform(fft, inside)
+    dx, dy = size[0] / fft.slab.nx, size[1] / fft.slab.ny
+    x, y = _distances(fft.mx), _distances(fft.my)[transform.slab.rows]
     if not even:
         table = coefficient(dx * x[None, :], dy * y[:, None], dx, dy)
-        return FFT(padded, measured=fft.measured).forward(np.ascontiguousarray(table))
+        return transform.forward(np.ascontiguousarray(table))
     (near_x, from_x), (near_y, from_y) = (np.unique(np.abs(each), return_inverse=True) for each in (x, y))
-    quadrant = coefficient(dx * near_x[None, :], dy * near_y[:, None], dx, dy)
-    return FFT(padded, measured=fft.measured).forward(quadrant[from_y[:, None], from_x[None, :]])
+    if dx == dy and np.array_equal(near_x, near_y):
+        quadrant = _symmetric(coefficient, near_x, dx)
+    else:
+        quadrant = coefficient(dx * near_x[None, :], dy * near_y[:, None], dx, dy)
+    return transform.forward(quadrant.take(from_x, axis=1).take(from_y, axis=0))
+
+
+def table_transform(fft: FFT, inside: bool) -> FFT:
+    """The transform of a table of coefficients on the lengths of another one; collective."""
+    sharing = fft if inside and fft.dtype == np.float64 else None
+    return FFT(fft.slab.resized(fft.mx, fft.my), measured=fft.measured, sharing=sharing)
+
+
+def _symmetric(coefficient: Callable[..., Array], distances: NDArray[np.int64], step: float) -> Array:
+    """Coefficients of square cells, which do not tell x from y: those of x >= y, and what they are for the others."""
+    count = len(distances)
+    quadrant = np.empty((count, count))
+    for rows in deal(count, PARTS):
+        from_x = slice(rows.start, count)
+        quadrant[rows, from_x] = coefficient(step * distances[None, from_x], step * distances[rows, None], step, step)
+        quadrant[from_x, rows] = quadrant[rows, from_x].T
+    return quadrant
 
 
 def _distances(count: int) -> NDArray[np.int64]:

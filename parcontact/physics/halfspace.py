@@ -20,7 +20,7 @@ Around an isolated contact the wake is not periodic: its influence coefficients 
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Literal
 
 import numpy as np
@@ -36,6 +36,7 @@ from .convolution import (
     Convolution,
     MirroredConvolution,
     padded_lengths,
+    table_transform,
     tabulate,
     travelling_wavenumbers,
     wavenumbers,
@@ -43,7 +44,8 @@ from .convolution import (
 from .layer import Layer, LongWaves
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
-from .tiles import LONGEST_CELL, TileConvolution, TileOperator, Tiles, tile_inverse
+from .tile_operator import TileOperator
+from .tiles import LONGEST_CELL, TileConvolution, Tiles, tile_inverse
 from .wake import wake
 
 Vector = tuple[float, float]
@@ -140,13 +142,19 @@ class HalfSpace:
         """Pressure -> displacement; collective where the half space is free.
 
         There the box is padded to twice its size with zeros, which makes the cyclic convolution with Love's
-        coefficients a linear one (paper, reference [12]).
+        coefficients a linear one (paper, reference [12]). They are calculated when it is first applied: a contact that
+        is solved on tiles needs none. Transforms are planned at once.
         """
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
         padded = _padded(fft, fft.dtype, fft.measured)
-        table = tabulate(padded, self.size, self._coefficient, self.layer is None)
-        return Convolution(padded, lambda rows: table[rows].real, fft.dtype)
+        table_transform(padded, inside=True)
+
+        @cache
+        def table() -> Spectrum:
+            return tabulate(padded, self.size, self._coefficient, self.layer is None, inside=True)
+
+        return Convolution(padded, lambda rows: table()[rows].real, fft.dtype, later=True)
 
     def _coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
         """Displacement at distance (x, y) under a unit pressure on one cell of a body around which there is nothing."""

@@ -1,41 +1,23 @@
-"""Operators on tiles of a box with nothing around: they cost what the tiles have of points, not what the box has.
+"""Tiles of a grid, and convolutions between tiles that are near each other.
 
 Maps of T tiles of SIDE x SIDE points are stacked to one of `T SIDE` rows. The coefficients between two tiles depend on
-their offset only, and are taken apart (P. P. Ewald, Ann. Phys. 369 (1921) 253) with s a length and r the distance:
-
-    1/r = (1 - erf(r/s))/r + erf(r/s)/r.
-
-The first part vanishes beyond `REACH s`: it is a cyclic convolution between tiles that are near each other, of twice
-their side. The second one varies over s: loads of points are given to the nodes of a regular grid, at distances of
-`s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A. Brandt
-and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell. What the
-two lengths leave out is below 1e-6 of the displacement.
+their offset only: the transforms of tiles, of twice their side, are multiplied and summed.
 """
 
-import math
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import loop, pointwise
-from ..parallel.fft import FFT
+from ..compiled import loop
 from ..parallel.fftw import pyfftw
-from ..parallel.slab import Array, Slab, allocate
+from ..parallel.slab import Array, allocate
 from ..parallel.tally import Tally
-from .convolution import Convolution, padded_lengths, tabulate
 
 SIDE = 32  # tuning: points of a tile; twice as many in its transforms
-ORDER = 8  # accuracy: nodes of an interpolation along each direction
-FINENESS = 6.0  # accuracy: distances of nodes in the length s
-REACH = 4.0  # accuracy: lengths s beyond which the first part is left out, which is 1.5e-8 there
-NODES = 256  # tuning: nodes along the longer side of a box, at most, where a tile has enough of them
-FEWEST_NODES = 2  # along a tile
 LONGEST_CELL = 2.0  # tuning: times its width: beyond it too many tiles are near each other
-FAR = 6.0  # lengths s beyond which erf is 1 in double precision
-GAUSS = 0.5 / math.sqrt(3.0)  # of a cell: places of two points whose mean is that over the cell, to third degree
 
 
 @dataclass(frozen=True)
@@ -85,19 +67,40 @@ class TileConvolution:
         make = partial(pyfftw.FFTW, axes=(1, 2), flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"))
         self._forward = make(self._padded, self._waves)
         self._backward = make(self._sums, self._padded, direction="FFTW_BACKWARD")
+        self._backward_of_one = make(self._sums[:1], self._padded[:1], direction="FFTW_BACKWARD")
         self._symbols = _symbols(quadrant, reach, tally)
 
     def apply(self, field: Array, out: Array) -> Array:
         """Apply it to a stacked map; both may be the same."""
         self.tally["operator"] += 1
-        self._padded[:, :SIDE, :SIDE] = field.reshape(-1, SIDE, SIDE)
-        self._padded[:, SIDE:, :] = 0.0
-        self._padded[:, :SIDE, SIDE:] = 0.0
-        self._forward.execute()
+        self.transform(field)
         _add_products(self.tiles.numbers, self.tiles.rows, self.tiles.columns, self._symbols, self._waves, self._sums)
         self._backward.execute()
         out.reshape(-1, SIDE, SIDE)[...] = self._padded[:, :SIDE, :SIDE]
         return out
+
+    def transform(self, field: Array) -> None:
+        """Transform a stacked map, for `at`."""
+        self._padded[:, :SIDE, :SIDE] = field.reshape(-1, SIDE, SIDE)
+        self._padded[:, SIDE:, :] = 0.0
+        self._padded[:, :SIDE, SIDE:] = 0.0
+        self._forward.execute()
+
+    def at(self, row: int, columns: NDArray[np.intp]) -> Iterator[Array]:
+        """What the map that was transformed causes at any tiles of a row of them, each valid until the next one."""
+        own, rows = self._sums[:1], np.array([row])
+        for place in range(len(columns)):
+            _add_products(self.tiles.numbers, rows, columns[place : place + 1], self._symbols, self._waves, own)
+            self._backward_of_one.execute()
+            yield self._padded[0, :SIDE, :SIDE]
+
+    def reached(self) -> NDArray[np.bool_]:
+        """Which tiles of the grid are near one of these."""
+        reached = np.zeros(self.tiles.numbers.shape, np.bool_)
+        for row, column in zip(self.tiles.rows.tolist(), self.tiles.columns.tolist(), strict=True):
+            rows, columns = (slice(max(place - self._reach, 0), place + self._reach + 1) for place in (row, column))
+            reached[rows, columns] = True
+        return reached
 
 
 def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128]:
@@ -111,91 +114,6 @@ def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128
         kernels = quadrant[places[row][None, :, None], places[:, None, :]]
         symbols[row] = np.fft.rfft2(kernels) / length**2
     return symbols
-
-
-class TileOperator:
-    """Pressure -> displacement on tiles of a box of `size` with nothing around; `coefficient(x, y, dx, dy)` is the
-    displacement at a distance from a cell under a unit pressure, `poisson` of the half space."""
-
-    def __init__(
-        self,
-        tiles: Tiles,
-        size: tuple[float, float],
-        poisson: float,
-        coefficient: Callable[[Array, Array, float, float], Array],
-        tally: Tally,
-    ) -> None:
-        nx, ny = tiles.points
-        dx, dy = size[0] / nx, size[1] / ny
-        step = step_of_nodes(tiles.points)
-        length = FINENESS * step * max(dx, dy)
-        reach = math.ceil(REACH * length / min(dx, dy) / SIDE)
-        x, y = (each * np.arange(SIDE * (reach + 1)) for each in (dx, dy))
-        factor = (1.0 - poisson) / (2.0 * np.pi) * dx * dy
-
-        def smooth(x: Array, y: Array) -> Array:
-            return factor * np.asarray(_mean_smooth(x, y, GAUSS * dx, GAUSS * dy, length))
-
-        near = coefficient(x[None, :], y[:, None], dx, dy) - smooth(x[None, :], y[:, None])
-        self._near = TileConvolution(tiles, reach, near, tally)
-        self._weights, wide = _interpolation(step), SIDE // step + ORDER
-        self._places = [
-            (slice(row, row + wide), slice(column, column + wide))
-            for row, column in zip(tiles.rows * (wide - ORDER), tiles.columns * (wide - ORDER), strict=True)
-        ]
-        shape = [SIDE // step * count + ORDER for count in tiles_along(tiles.points)]
-        slab = Slab.alone(shape[0], shape[1], tally)
-        self._nodes = slab.zeros()
-        padded = FFT(slab, padded_lengths(shape[0], shape[1]), measured=False)
-        box = step * dx * shape[0], step * dy * shape[1]
-        table = tabulate(padded, box, lambda x, y, *_: smooth(x, y), even=True)
-        self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
-
-    def apply(self, field: Array, out: Array) -> Array:
-        """Apply it to a stacked map, not in its place."""
-        self._near.apply(field, out)
-        weights, nodes = self._weights, self._nodes
-        nodes.fill(0.0)
-        patches = np.matmul(np.matmul(weights.T, field.reshape(-1, SIDE, SIDE)), weights)
-        for place, patch in zip(self._places, patches, strict=True):
-            nodes[place] += patch
-        self._far.apply(nodes, nodes)
-        for place, patch in zip(self._places, patches, strict=True):
-            patch[...] = nodes[place]
-        out += np.matmul(np.matmul(weights, patches), weights.T).reshape(out.shape)
-        return out
-
-
-def step_of_nodes(points: tuple[int, int]) -> int:
-    """Points from one node to the next, a divisor of SIDE."""
-    step = 4
-    while step * NODES < max(points) and step < SIDE // FEWEST_NODES:
-        step *= 2
-    return step
-
-
-def _interpolation(step: int) -> Array:
-    """Weights of nodes for the points of a tile, shape (SIDE, nodes); ORDER/2 nodes are before the tile."""
-    weights = np.zeros((SIDE, SIDE // step + ORDER))
-    places = (np.arange(SIDE) + 0.5) / step - 0.5 + ORDER // 2
-    for point, place in enumerate(places):
-        first = math.floor(place) - ORDER // 2 + 1
-        nodes = np.arange(first, first + ORDER)
-        for node in nodes:
-            others = nodes[nodes != node]
-            weights[point, node] = np.prod((place - others) / (node - others))
-    return weights
-
-
-@pointwise
-def _mean_smooth(x, y, a, b, length):  # type: ignore[no-untyped-def]  # numba finds the types itself
-    """Mean of erf(r/length)/r over a cell."""
-    total, beyond = 0.0, FAR * length
-    for i in (-1.0, 1.0):
-        for j in (-1.0, 1.0):
-            r = math.sqrt((x + i * a) ** 2 + (y + j * b) ** 2)
-            total += (math.erf(r / length) if r < beyond else 1.0) / r
-    return 0.25 * total
 
 
 def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally: Tally) -> TileConvolution:

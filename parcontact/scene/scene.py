@@ -38,7 +38,7 @@ from ..solve.constraint import Constraint, NonNegative
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
-from ..solve.tiles import LARGER_CELLS, OnTiles
+from ..solve.tiles import LARGER_CELLS, OnTiles, SolverOnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
 from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
@@ -223,10 +223,10 @@ def solver_on_tiles(setup: Setup) -> OnTiles | None:
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 
-    def on(tiles: Tiles, tolerance: float) -> tuple[ContactSolver, Operators]:
+    def on(tiles: Tiles, tolerance: float) -> SolverOnTiles:
         workspace = Workspace(Slab.alone(SIDE, tiles.count * SIDE, tally), tolerance)
         solver = ContactSolver(workspace, height, tolerance, limit, LARGER_CELLS, free=True)
-        return solver, Operators(*body.on_tiles(tiles, tally))
+        return solver, *body.on_tiles(tiles, tally)
 
     return on if body.works_on_tiles(setup.slab.nx, setup.slab.ny) else None
 

@@ -7,20 +7,23 @@ displacement u that this causes there, a block can touch only if its highest poi
 
 with L the length by which u varies within the contact (`certificate.Certificate`). Tiles with such blocks, or with
 pressure, or beside one, are stacked to a map of their own, on which `contact.ContactSolver` solves the same problem
-with operators on tiles (`physics.tiles`). What comes out is a start for the whole grid, whose first certificate judges
-it at all points. Root solves and tells the others.
+with operators on tiles (`physics.tile_operator`). These give the displacement at all points of the grid, too, by which
+`contact.ContactSolver.judge` sees whether the pressure holds everywhere. To less than FINEST, or if it does not, the
+operator of the whole grid judges it, and the solve goes on from there. Root solves and tells the others.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..parallel import regrid
+from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from ..physics.tiles import SIDE, Tiles, tiles_along
-from .contact import ContactSolver
+from ..physics.tile_operator import TileOperator
+from ..physics.tiles import SIDE, TileConvolution, Tiles, tiles_along
+from .contact import Contact, ContactSolver
 from .preconditioner.extension import Grids
 from .problem import Control, MeanPressure, Operators, Problem
 
@@ -30,8 +33,10 @@ BLOCKS = 256  # points along the longer side of the grid of blocks, at most, unl
 LARGER_CELLS = Grids(2)  # tuning: of solvers on tiles; still larger cells would be those of tiles far apart
 SHARE = 0.5  # of a tolerance, to which tiles are solved: the whole grid has to agree
 LEAST = 1e-7  # accuracy: tolerance: beyond it operators on tiles have no more digits
+FINEST = 1e-5  # accuracy: tolerance: to less the operator of the whole grid judges, of which tiles are off by 2e-7
 
-OnTiles = Callable[[Tiles, float], tuple[ContactSolver, Operators]]  # of the same body, with a tolerance
+SolverOnTiles = tuple[ContactSolver, TileOperator, TileConvolution]  # with the body's operator, and a preconditioner
+OnTiles = Callable[[Tiles, float], SolverOnTiles]  # of the same body, with a tolerance
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,7 @@ def choose(blocks: Slab, operators: Operators, below: Found, slab: Slab, heights
     u = operators.operator.apply(p, blocks.empty())
     gap = u - regrid.highest(slab, blocks, heights) - below.d
     near = blocks.to_root(np.where((p > 0.0) | (gap < MARGIN * below.length), 1.0, 0.0))
-    return slab.agree(None if near is None else _tiles_of(near > 0.0, slab))
+    return on_root(slab.comm, lambda: None if near is None else _tiles_of(near > 0.0, slab))
 
 
 def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles | None:
@@ -75,25 +80,65 @@ def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles | None:
     return tiles if 0 < tiles.count * SIDE**2 <= LARGEST_SHARE * slab.points else None
 
 
-def solve(
-    tiles: Tiles, on_tiles: OnTiles, problem: Problem, slab: Slab, height: float, tolerance: float, p: Array
-) -> Found:
-    """Solve a problem on tiles of a grid from the pressure p, in whose place the solution will be; collective."""
-    lowest = float(problem.heights.min(initial=np.inf))
-    heights, start = (_stacked(slab, tiles, each) for each in (problem.heights, p))
-    lowest = -slab.reduce((), [-lowest])[0]
-    told: tuple[Array, float, float] | None = None
-    if heights is not None and start is not None:
-        _bury(heights, tiles, lowest - height)
-        solver, operators = on_tiles(tiles, tolerance)
-        control = _on_part(problem.control, slab.points / solver.slab.points)
-        contact = solver.solve(Problem(*operators, heights, problem.constraint, control), start)
-        told = contact.p, contact.d, contact.certificate.length
-    told = slab.agree(told)
-    assert told is not None
-    stacked, d, length = told
-    _unstack(slab, tiles, stacked, p)
-    return Found(slab, p, d, length)
+class OnTheseTiles:
+    """A problem on tiles of a grid, and its solution; root has the operators."""
+
+    def __init__(self, tiles: Tiles, on_tiles: OnTiles, problem: Problem, slab: Slab, height: float) -> None:
+        self._tiles, self._on_tiles, self._problem, self._slab = tiles, on_tiles, problem, slab
+        self._height = height
+        self._operator: TileOperator | None = None
+        self._stacked: Array = np.empty(0)
+
+    def solve(self, tolerance: float, p: Array) -> Found:
+        """Solve it from the pressure p, in whose place the solution will be; collective."""
+        slab, tiles, problem = self._slab, self._tiles, self._problem
+        lowest = -slab.reduce((), [-float(problem.heights.min(initial=np.inf))])[0]
+        heights, start = (_stacked(slab, tiles, each) for each in (problem.heights, p))
+
+        def act() -> tuple[Array, float, float]:
+            assert heights is not None
+            assert start is not None
+            _bury(heights, tiles, lowest - self._height)
+            solver, self._operator, inverse = self._on_tiles(tiles, tolerance)
+            control = _on_part(problem.control, slab.points / solver.slab.points)
+            contact = solver.solve(Problem(self._operator, inverse, heights, problem.constraint, control), start)
+            return contact.p, contact.d, contact.certificate.length
+
+        self._stacked, d, length = on_root(slab.comm, act)
+        _unstack(slab, tiles, self._stacked, p)
+        return Found(slab, p, d, length)
+
+    def judge(self, solver: ContactSolver, p: Array) -> Contact | None:
+        """The contact of the solution p, if it holds at all points to the solver's tolerance; collective."""
+        if solver.tolerance < FINEST:
+            return None
+        self._displace(solver.workspace.displacement)
+        contact = solver.judge(replace(self._problem, operator=_Displaced()), p, "does not hold beside the tiles")
+        return contact if contact.converged else None
+
+    def _displace(self, u: Array) -> None:
+        """Put the displacement under the solution into the rows of a map; collective."""
+        comm = self._slab.comm
+
+        def take(rank: int, rows: Array) -> None:
+            if rank == 0:
+                u[...] = rows
+            elif rows.size:
+                comm.Send(rows, rank)
+
+        if self._operator is not None:
+            self._operator.displace(self._stacked, self._slab.dealt, take)
+        elif u.size:
+            rows = np.empty(self._slab.shape)
+            comm.Recv(rows, 0)
+            u[...] = rows
+
+
+class _Displaced:
+    """The operator where the map that it is to fill has the displacement already."""
+
+    def apply(self, _: Array, out: Array) -> Array:
+        return out
 
 
 def _on_part(control: Control, share: float) -> Control:

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.parallel.tally import Tally
-from parcontact.physics import tiles as module
+from parcontact.physics import tile_operator as module
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.tiles import SIDE, Tiles
 
@@ -30,7 +30,8 @@ def stacked(tiles: Tiles, field: np.ndarray) -> np.ndarray:
 def test_displacement_is_that_of_the_whole_box(
     points: tuple[int, int], size: tuple[float, float], nodes: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Under a random pressure on scattered tiles, near each other and far apart; it is symmetric, too."""
+    """Under a random pressure on scattered tiles, near each other and far apart, on these and at all points; it is
+    symmetric, too."""
     monkeypatch.setattr(module, "NODES", nodes)
     nx, ny = points
     tiles = Tiles(points, np.array([0, 0, 1, 3, (ny - 1) // SIDE]), np.array([0, 1, 4, 2, (nx - 1) // SIDE]))
@@ -45,6 +46,9 @@ def test_displacement_is_that_of_the_whole_box(
     operator, _ = body.on_tiles(tiles, Tally())
     u, v = operator.apply(p, np.empty_like(p)), operator.apply(q, np.empty_like(q))
     assert_allclose(u * marked, stacked(tiles, expected), rtol=0.0, atol=ERROR * expected.max())
+    parts = list[np.ndarray]()
+    operator.displace(p, [slice(0, 7), slice(7, 7), slice(7, 70), slice(70, ny)], lambda _, rows: parts.append(rows))
+    assert_allclose(np.concatenate(parts), expected, rtol=0.0, atol=ERROR * expected.max())
     assert np.vdot(q, u) == pytest.approx(np.vdot(p, v), rel=1e-12)
 
 

@@ -1,12 +1,14 @@
 """Elastic jobs whichever way the load is given, in other units, and from other starts."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from numpy.testing import assert_allclose
 from static_jobs import run
 
 from parcontact.errors import RunError
+from parcontact.solve import nested
 from parcontact.solve.fallback import cold_start
 
 BUMPS = """
@@ -132,9 +134,13 @@ def test_only_the_first_solve_of_a_large_job_starts_on_coarser_grids(
     words = ("grid.points=64", "surface.short_wavelength=1.25e-4", "history=[{pressure: 5.0e3}, {pressure: 6.0e3}]")
     (small, fields), (small_after, _) = run(bumps, *words)
     monkeypatch.setattr(cold_start, "WORTHWHILE", 64 * 64)
-    grids = list[int]()
-    start = cold_start.start_on_coarse_grids
-    monkeypatch.setattr(cold_start, "start_on_coarse_grids", lambda *all: grids.append(start(*all)))
+    grids, descend = list[int](), nested.descend
+
+    def counted(levels: list[nested.Level], *given: Any) -> None:
+        grids.append(len(levels))
+        descend(levels, *given)
+
+    monkeypatch.setattr(nested, "descend", counted)
     (large, expected), (large_after, _) = run(bumps, *words)
     assert grids == [2]
     assert_allclose(fields["pressure"], expected["pressure"], rtol=0, atol=1e-7 * expected["pressure"].max())

@@ -36,9 +36,13 @@ def spheres() -> Map:
 
 
 def found(
-    comm: MPI.Intracomm, control: MeanPressure | Approach, monkeypatch: pytest.MonkeyPatch, on_tiles: bool = True
+    comm: MPI.Intracomm,
+    control: MeanPressure | Approach,
+    monkeypatch: pytest.MonkeyPatch,
+    on_tiles: bool = True,
+    tolerance: float = TOLERANCE,
 ) -> tuple[Contact, Array | None, int]:
-    """A contact found from nothing, its whole pressure on root, and calls of the operators."""
+    """A contact found from nothing, its whole pressure on root, and calls of the operators of the whole grid."""
     monkeypatch.setattr(module, "BLOCKS", POINTS // 4)
     slab, whole = Slab(comm, POINTS, POINTS), spheres()
     h, height = np.ascontiguousarray(whole[slab.rows]), float(np.ptp(whole))
@@ -48,30 +52,37 @@ def found(
         solver = ContactSolver(Workspace(on, tolerance), height, tolerance, 500, free=True)
         return solver, Operators(BODY.operator(fft), BODY.inverse(fft))
 
-    def tiles_on(tiles: Tiles, tolerance: float) -> tuple[ContactSolver, Operators]:
+    def tiles_on(tiles: Tiles, tolerance: float) -> module.SolverOnTiles:
         work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, slab.tally), tolerance)
         solver = ContactSolver(work, height, tolerance, 500, module.LARGER_CELLS, free=True)
-        return solver, Operators(*BODY.on_tiles(tiles, slab.tally))
+        return solver, *BODY.on_tiles(tiles, slab.tally)
 
-    solver, operators = solver_on(slab, TOLERANCE)
+    solver, operators = solver_on(slab, tolerance)
     problem, p = Problem(*operators, h, NonNegative(), control), slab.zeros()
-    cold_start.prepare(solver, problem, p, solver_on, tiles_on if on_tiles else None)
+    contact = cold_start.prepare(solver, problem, p, solver_on, tiles_on if on_tiles else None)
     before = slab.tally["operator"]
-    contact = solver.solve(problem, p)
+    contact = contact or solver.solve(problem, p)
     return contact, slab.to_root(contact.p), slab.tally["operator"] - before
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("control", [LIGHT, Approach(0.001)], ids=["load", "approach"])
-def test_one_call_of_the_whole_operator(
-    comm: MPI.Intracomm, control: MeanPressure | Approach, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("tolerance", "fewest"), [(TOLERANCE, 0), (0.9 * module.FINEST, 1)], ids=["loose", "tight"])
+def test_few_calls_of_the_whole_operator(
+    comm: MPI.Intracomm,
+    control: MeanPressure | Approach,
+    tolerance: float,
+    fewest: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The first certificate on the whole grid is good, peak included; the pressure is that of a solve without tiles."""
-    contact, p, calls = found(comm, control, monkeypatch)
-    _, expected, more = found(comm, control, monkeypatch, on_tiles=False)
+    """The first certificate at all points is good, peak included, by the operators on tiles or, to a tight tolerance,
+    the whole one; the pressure is that of a solve without tiles, and so is the displacement."""
+    contact, p, calls = found(comm, control, monkeypatch, tolerance=tolerance)
+    other, expected, more = found(comm, control, monkeypatch, on_tiles=False)
     assert contact.converged
-    assert (contact.iterations, calls) == (0, 1)
+    assert (contact.iterations, calls) == (0, fewest)
     assert more > 5
+    assert np.abs(contact.u - other.u).max(initial=0.0) <= 1e-4 * np.abs(other.u).max(initial=1e-300)
     if p is not None and expected is not None:
         assert p[40, 250] > 0.0
         assert np.linalg.norm(p - expected) <= 1e-4 * np.linalg.norm(expected)
@@ -104,6 +115,21 @@ def test_maps_of_ranks_without_rows(comm: MPI.Intracomm) -> None:
     assert np.array_equal(back, np.where(outside, 0.0, whole)[slab.rows])
 
 
+@pytest.mark.mpi
+def test_all_ranks_learn_that_root_failed(comm: MPI.Intracomm) -> None:
+    """A script that catches the exception goes on with all ranks, none of which waits for root."""
+    slab, tiles = Slab(comm, 64, 64), Tiles((64, 64), np.array([0]), np.array([1]))
+
+    def on(_: Tiles, __: float) -> Any:
+        raise MemoryError("no room for tiles")
+
+    nothing: Any = None
+    problem = Problem(nothing, nothing, slab.zeros(), NonNegative(), Approach(1.0))
+    with pytest.raises(MemoryError, match="no room for tiles"):
+        module.OnTheseTiles(tiles, on, problem, slab, 1.0).solve(1e-3, slab.zeros())
+    assert slab.sum(1.0) == [comm.size]
+
+
 def test_a_contact_that_is_not_dilute(monkeypatch: pytest.MonkeyPatch) -> None:
     """It starts and ends to the last bit as if there were no tiles."""
     contact, p, calls = found(MPI.COMM_SELF, HEAVY, monkeypatch)
@@ -125,12 +151,12 @@ def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
             found.append(problem.heights.reshape(2, 2, 32, 32).transpose(0, 2, 1, 3).reshape(64, 64))
             return SimpleNamespace(p=start, d=0.0, certificate=SimpleNamespace(length=1.0))
 
-        return SimpleNamespace(slab=Slab.alone(32, 128, slab.tally), solve=solve), (None, None)
+        return SimpleNamespace(slab=Slab.alone(32, 128, slab.tally), solve=solve), None, None
 
     heights = np.random.default_rng(1).uniform(-3.0, -1.0, (36, 40))
     nothing: Any = None
     problem = Problem(nothing, nothing, heights, NonNegative(), Approach(1.0))
-    module.solve(grid, on, problem, slab, 2.0, 1e-3, slab.zeros())
+    module.OnTheseTiles(grid, on, problem, slab, 2.0).solve(1e-3, slab.zeros())
     (stacked,) = found
     assert (stacked[:36, :40] == heights).all()
     stacked[:36, :40] = heights.min() - 2.0

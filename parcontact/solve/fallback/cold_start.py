@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ...parallel.slab import Array, Slab
-from ...physics.tiles import SIDE
+from ...physics.tiles import SIDE, Tiles
 from .. import nested, tiles
-from ..contact import ContactSolver
+from ..contact import Contact, ContactSolver
 from ..problem import Operators, Problem
 from ..tiles import OnTiles
 
@@ -23,27 +23,29 @@ SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # of the sa
 
 def prepare(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: OnTiles | None = None
-) -> None:
+) -> Contact | None:
     """On a large grid put a start into `start`, which is 0, for a body that nothing has been pressed into; collective.
 
     Operator calls of solvers on other grids, or on tiles, are counted by their share of the points. With operators
-    `on_tiles` a dilute contact is solved on these, to the solver's tolerance on the finest grid.
+    `on_tiles` a dilute contact is solved on these, to the solver's tolerance on the finest grid. It is returned if it
+    holds at all points.
     """
-    if solver.slab.points >= WORTHWHILE:
-        start_on_coarse_grids(solver, problem, start, solver_on, on_tiles)
+    if solver.slab.points < WORTHWHILE:
+        return None
+    return start_on_coarse_grids(solver, problem, start, solver_on, on_tiles)[1]
 
 
 def start_on_coarse_grids(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: OnTiles | None = None
-) -> int:
+) -> tuple[int, Contact | None]:
     """Solve loosely on coarser grids and put the start that follows into `start`, 0 if there is none; returns how many
-    grids there are; collective."""
+    grids there are, and the contact if it was solved on tiles and holds at all points; collective."""
     levels = nested.levels_of(solver.slab, problem.heights)
     descent = _Descent(solver, problem, solver_on, on_tiles)
     nested.descend(levels, descent.solve, start)
-    descent.solve_finest(levels[0], start)
+    contact = descent.solve_finest(levels[0], start)
     descent.count()
-    return len(levels)
+    return len(levels), contact
 
 
 class _Descent:
@@ -58,7 +60,8 @@ class _Descent:
 
     def solve(self, level: nested.Level, p: Array) -> Array:
         """Solve loosely on a coarse level from p."""
-        if self._on_blocks(level, max(LOOSE, self._solver.tolerance), p):
+        if (chosen := self._tiles_of(level)) is not None:
+            self._solve_on(chosen, level, max(LOOSE, self._solver.tolerance), p)
             return p
         calls = self._tally["operator"]
         coarse, operators = self._solver_on(level.slab, max(LOOSE, self._solver.tolerance))
@@ -70,26 +73,34 @@ class _Descent:
         self._add(calls, level.slab.points)
         return contact.p
 
-    def solve_finest(self, level: nested.Level, p: Array) -> None:
-        """Solve on tiles of the finest grid from p, or leave it as it is."""
-        self._on_blocks(level, max(tiles.SHARE * self._solver.tolerance, tiles.LEAST), p)
+    def solve_finest(self, level: nested.Level, p: Array) -> Contact | None:
+        """Solve on tiles of the finest grid from p, or leave it as it is; the contact, if it holds at all points."""
+        if (chosen := self._tiles_of(level)) is None:
+            return None
+        solved = self._solve_on(chosen, level, max(tiles.SHARE * self._solver.tolerance, tiles.LEAST), p)
+        calls = self._tally["operator"]
+        contact = solved.judge(self._solver, p)
+        self._add(calls, level.slab.points)
+        return contact
 
     def count(self) -> None:
         """Count the operator calls of all levels by their share of points."""
         self._tally["operator"] = self._before + round(self._cost)
 
-    def _on_blocks(self, level: nested.Level, tolerance: float, p: Array) -> bool:
-        """Solve on tiles of a level, if they are few."""
+    def _tiles_of(self, level: nested.Level) -> Tiles | None:
+        """The tiles of a level that may touch, if they are few."""
         if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
-            return False
+            return None
+        return tiles.choose(*self._blocks, self._below, level.slab, level.heights)
+
+    def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> tiles.OnTheseTiles:
+        """Solve on tiles of a level from p."""
         assert self._on_tiles is not None
-        chosen = tiles.choose(*self._blocks, self._below, level.slab, level.heights)
-        if chosen is None:
-            return False
         calls, there = self._tally["operator"], replace(self._problem, heights=level.heights)
-        self._below = tiles.solve(chosen, self._on_tiles, there, level.slab, self._solver.height, tolerance, p)
+        solved = tiles.OnTheseTiles(chosen, self._on_tiles, there, level.slab, self._solver.height)
+        self._below = solved.solve(tolerance, p)
         self._add(calls, chosen.count * SIDE**2)
-        return True
+        return solved
 
     def _add(self, calls: int, points: int) -> None:
         """Add the calls since so many by their share of points."""

@@ -61,7 +61,7 @@ def _attempts(
         yield "an operator in double precision", contact
     if np.isfinite(contact.certificate.worst):
         yield "shorter steps", solver.solve(problem, p, SHORT_STEP)
-    grids = start_on_coarse_grids(solver, problem, p, solver_on)
+    grids, _ = start_on_coarse_grids(solver, problem, p, solver_on)
     contact = solver.solve(problem, p)
     yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact
     if np.isfinite(contact.certificate.worst):

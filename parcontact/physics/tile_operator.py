@@ -1,0 +1,152 @@
+"""Operators on tiles, and from tiles to the whole grid: they cost what the tiles have of points, not what the box has.
+
+The coefficients between two tiles depend on their offset only, and are taken apart (P. P. Ewald, Ann. Phys. 369 (1921)
+253) with s a length and r the distance:
+
+    1/r = (1 - erf(r/s))/r + erf(r/s)/r.
+
+The first part vanishes beyond `REACH s`: it is a cyclic convolution between tiles that are near each other, of twice
+their side. The second one varies over s: loads of points are given to the nodes of a regular grid, at distances of
+`s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A. Brandt
+and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell. What the
+two lengths leave out is below 1e-6 of the displacement.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import pointwise
+from ..parallel.fft import FFT
+from ..parallel.slab import Array, Slab
+from ..parallel.tally import Tally
+from .convolution import Convolution, padded_lengths, tabulate
+from .tiles import SIDE, TileConvolution, Tiles, tiles_along
+
+ORDER = 8  # accuracy: nodes of an interpolation along each direction
+FINENESS = 6.0  # accuracy: distances of nodes in the length s
+REACH = 4.0  # accuracy: lengths s beyond which the first part is left out, which is 1.5e-8 there
+NODES = 256  # tuning: nodes along the longer side of a box, at most, where a tile has enough of them
+FEWEST_NODES = 2  # along a tile
+FAR = 6.0  # lengths s beyond which erf is 1 in double precision
+GAUSS = 0.5 / math.sqrt(3.0)  # of a cell: places of two points whose mean is that over the cell, to third degree
+
+
+class TileOperator:
+    """Pressure -> displacement on tiles of a box of `size` with nothing around; `coefficient(x, y, dx, dy)` is the
+    displacement at a distance from a cell under a unit pressure, `poisson` of the half space."""
+
+    def __init__(
+        self,
+        tiles: Tiles,
+        size: tuple[float, float],
+        poisson: float,
+        coefficient: Callable[[Array, Array, float, float], Array],
+        tally: Tally,
+    ) -> None:
+        nx, ny = tiles.points
+        dx, dy = size[0] / nx, size[1] / ny
+        step = step_of_nodes(tiles.points)
+        length = FINENESS * step * max(dx, dy)
+        reach = math.ceil(REACH * length / min(dx, dy) / SIDE)
+        x, y = (each * np.arange(SIDE * (reach + 1)) for each in (dx, dy))
+        factor = (1.0 - poisson) / (2.0 * np.pi) * dx * dy
+
+        def smooth(x: Array, y: Array) -> Array:
+            return factor * np.asarray(_mean_smooth(x, y, GAUSS * dx, GAUSS * dy, length))
+
+        near = coefficient(x[None, :], y[:, None], dx, dy) - smooth(x[None, :], y[:, None])
+        self._tiles = tiles
+        self._near = TileConvolution(tiles, reach, near, tally)
+        self._weights, self._per_tile = _interpolation(step), SIDE // step
+        wide = self._per_tile + ORDER
+        self._places = [
+            (slice(row, row + wide), slice(column, column + wide))
+            for row, column in zip(tiles.rows * self._per_tile, tiles.columns * self._per_tile, strict=True)
+        ]
+        shape = [self._per_tile * count + ORDER for count in tiles_along(tiles.points)]
+        slab = Slab.alone(shape[0], shape[1], tally)
+        self._nodes = slab.zeros()
+        padded = FFT(slab, padded_lengths(shape[0], shape[1]), measured=False)
+        box = step * dx * shape[0], step * dy * shape[1]
+        table = tabulate(padded, box, lambda x, y, *_: smooth(x, y), even=True)
+        self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
+
+    def apply(self, field: Array, out: Array) -> Array:
+        """Apply it to a stacked map, not in its place."""
+        self._near.apply(field, out)
+        nodes, weights = self._displace_nodes(field), self._weights
+        patches = np.stack([nodes[place] for place in self._places])
+        out += np.matmul(np.matmul(weights, patches), weights.T).reshape(out.shape)
+        return out
+
+    def _displace_nodes(self, field: Array) -> Array:
+        """The second part's displacement of all nodes under a stacked map."""
+        nodes, weights = self._nodes, self._weights
+        nodes.fill(0.0)
+        patches = np.matmul(np.matmul(weights.T, field.reshape(-1, SIDE, SIDE)), weights)
+        for place, patch in zip(self._places, patches, strict=True):
+            nodes[place] += patch
+        return self._far.apply(nodes, nodes)
+
+    def displace(self, field: Array, parts: list[slice], take: Callable[[int, Array], None]) -> None:
+        """Hand the displacement of the whole grid under a stacked map on, for each part of its rows: `take(number of
+        the part, map of its rows)`, in their order."""
+        nodes = self._displace_nodes(field)
+        self._near.transform(field)
+        nx, _ = self._tiles.points
+        across, down = tiles_along(self._tiles.points)
+        reached = self._near.reached()
+        for number, rows in enumerate(parts):
+            whole = np.empty((max(rows.stop - rows.start, 0), nx))
+            first, last = rows.start // SIDE, min(-(-rows.stop // SIDE), down)
+            for row in range(first, last if whole.size else first):
+                strip = self._interpolate_row(nodes, row, across)
+                columns = np.nonzero(reached[row])[0]
+                for column, block in zip(columns, self._near.at(row, columns), strict=True):
+                    strip[:, column * SIDE : (column + 1) * SIDE] += block
+                top = row * SIDE
+                start, stop = max(top, rows.start), min(top + SIDE, rows.stop)
+                whole[start - rows.start : stop - rows.start] = strip[start - top : stop - top, :nx]
+            take(number, whole)
+
+    def _interpolate_row(self, nodes: Array, row: int, across: int) -> Array:
+        """The displacement of nodes at the points of a row of tiles."""
+        wide = self._per_tile + ORDER
+        along_y = self._weights @ nodes[row * self._per_tile : row * self._per_tile + wide]
+        windows = np.lib.stride_tricks.sliding_window_view(along_y, wide, axis=1)[:, :: self._per_tile]
+        return np.matmul(windows[:, :across], self._weights.T).reshape(SIDE, across * SIDE)
+
+
+def step_of_nodes(points: tuple[int, int]) -> int:
+    """Points from one node to the next, a divisor of SIDE."""
+    step = 4
+    while step * NODES < max(points) and step < SIDE // FEWEST_NODES:
+        step *= 2
+    return step
+
+
+def _interpolation(step: int) -> NDArray[np.float64]:
+    """Weights of nodes for the points of a tile, shape (SIDE, nodes); ORDER/2 nodes are before the tile."""
+    weights = np.zeros((SIDE, SIDE // step + ORDER))
+    places = (np.arange(SIDE) + 0.5) / step - 0.5 + ORDER // 2
+    for point, place in enumerate(places):
+        first = math.floor(place) - ORDER // 2 + 1
+        nodes = np.arange(first, first + ORDER)
+        for node in nodes:
+            others = nodes[nodes != node]
+            weights[point, node] = np.prod((place - others) / (node - others))
+    return weights
+
+
+@pointwise
+def _mean_smooth(x, y, a, b, length):  # type: ignore[no-untyped-def]  # numba finds the types itself
+    """Mean of erf(r/length)/r over a cell."""
+    total, beyond = 0.0, FAR * length
+    for i in (-1.0, 1.0):
+        for j in (-1.0, 1.0):
+            r = math.sqrt((x + i * a) ** 2 + (y + j * b) ** 2)
+            total += (math.erf(r / length) if r < beyond else 1.0) / r
+    return 0.25 * total
