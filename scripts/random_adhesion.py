@@ -1,35 +1,49 @@
 #!/usr/bin/env python3
 """Random scenes of contacts that stick: laws, surfaces, bodies, loads, rates and grids; every run must come to its end.
 
-    .venv/bin/python scripts/random_adhesion.py [--scenes 200] [--seed 0] [--only NUMBER] [--finer 0]
+    .venv/bin/python scripts/random_adhesion.py [--scenes 200] [--seed 0] [--only NUMBER] [--finer 10] [--sample 10]
 
 A scene that was not pulled off under a load ends after its last step. After each step the gap is not negative, the
-pressure is minus the attraction where the gap is open, energies add up, and what snaps lose never falls. Scenes that
-came off are made again, with `--finer 1`, in steps a quarter as long: they must come off within the steps before and
-after. A solve that does not reach its tolerance is a fault. Ends with 0 if all held.
+pressure is minus the attraction where the gap is open, energies add up, and what snaps lose never falls. A solve that
+does not reach its tolerance is a fault. Each scene is made again in steps `--finer` times as short: where contact ends
+in one of both, it ends in the other, but for a step. One scene of `--sample` is made again on three ranks, to the same
+pressures and areas, and from a checkpoint in its middle, to the same bits. 0 leaves these out. Ends with 0 if all held.
 """
 
+import json
 import math
+import subprocess
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from functools import partial
+from itertools import pairwise
+from pathlib import Path
 from random import Random
 from typing import Any
 
 import campaign
 import numpy as np
-from runs import begun
+import runs
+from mpi4py import MPI
+from numpy.typing import NDArray
 
+import parcontact as pc
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march.loop import March
+from parcontact.python.row import Row
 
 MODULUS = 1e6  # Pa; of the relaxed body
 STEPS = 12  # of a stage
 BALANCE = 1e-9  # of the largest energy: rounding
 WRONG = 0.05  # of all pressure: certificates allow a gap to be wrong by a part of the range
 LEAST = 1e-3  # of the strength: less is none
+LATE = 1.5  # steps: between the ends of contact with longer and with shorter ones
+APART = 0.05  # of the largest: areas and pressures on one rank and on three
+RANKS = 3
+Map = NDArray[np.float64]
 
 
 def scene(random: Random) -> dict[str, Any]:
@@ -54,7 +68,7 @@ def scene(random: Random) -> dict[str, Any]:
         found["body"] = {"thickness": size * random.uniform(0.2, 1.0), "base": random.choice(["bonded", "smooth"])}
     if random.random() < 0.15 and poisson == 0.5:
         found["interface"] = {"shear_stress": 1e4}
-    found["history"] = list(history(random, height, size, work, modulus))
+    found["history"] = list(history(random, height, 0.0 if surface["shape"] == "sphere" else height / 2, size, modulus))
     return found
 
 
@@ -80,15 +94,15 @@ def body(random: Random, poisson: float) -> dict[str, Any]:
     return {"model": "zener", "modulus_inf": MODULUS, "branches": branches, "poisson": poisson}
 
 
-def history(random: Random, height: float, size: float, work: float, modulus: float) -> Iterator[dict[str, Any]]:
-    """One to three stages: approaches between apart and half of the height, loads of either sign, slides."""
+def history(random: Random, height: float, top: float, size: float, modulus: float) -> Iterator[dict[str, Any]]:
+    """One to three stages: approaches between apart and a tenth of the height below its `top`, loads of either sign,
+    slides."""
     control = random.choice(["approach", "approach", "pressure"])
-    scale = 0.4 * height if control == "approach" else 0.2 * modulus * height / size
-    now = -random.uniform(0.5, 1.0) * height if control == "approach" else 0.0
+    moves = control == "approach"
+    level, scale = (-top, 0.4 * height) if moves else (0.0, 0.2 * modulus * height / size)
+    now = level - random.uniform(0.0, 0.5) * height if moves else 0.0
     for _ in range(random.randint(1, 3)):
-        then = (
-            random.uniform(-1.0 if control == "approach" else -0.3, 0.3) * scale - (control == "approach") * height / 2
-        )
+        then = level + random.uniform(-1.0 if moves else -0.3, 0.3) * scale
         duration = 10 ** random.uniform(-2.0, 1.0)
         stage: dict[str, Any] = {control: {"from": now, "to": then}, "duration": duration}
         if random.random() < 0.75:
@@ -118,51 +132,123 @@ def violations(march: March, before: float) -> Iterator[str]:
         yield f"snaps give back {before - lost:g} J"
 
 
-def go(job: dict[str, Any], counts: Counter[str]) -> tuple[March, list[str]]:
-    """March a job to its end; what was wrong."""
-    march, wrong, lost = begun(Job.model_validate(job)), list[str](), 0.0
+def go(job: dict[str, Any], counts: Counter[str], comm: MPI.Intracomm = MPI.COMM_SELF) -> tuple[March, Map, list[str]]:
+    """March a job to its end: time, contact area and pressure of each step, and what was wrong on one rank."""
+    march, made, wrong, lost = runs.begun(Job.model_validate(job), comm=comm), [], list[str](), 0.0
     for step in march.steps():
         march.advance(step)
+        row = march.row
         if march.detached:
             break
-        found = list(violations(march, lost))
-        wrong += [f"step {march.row.step}: {text}" for text in found]
-        lost = march.row.added[3]
-        counts["calls"] += march.row.operator_calls
+        made.append((row.time, row.measures.contact_area, row.measures.pressure))
+        if comm.size == 1:
+            wrong += [f"step {row.step}: {text}" for text in violations(march, lost)]
+        lost = row.added[3]
+        counts["calls"] += row.operator_calls
         counts["steps"] += 1
-        counts["steps that took more than 100 iterations"] += march.row.iterations > 100
+        counts["steps that took more than 100 iterations"] += row.iterations > 100
         if len(wrong) > 2:
             break
-    return march, wrong
+    if march.detached and march.state.sticking is not None:
+        made.append((march.state.sticking.detached[0], 0.0, 0.0))
+    return march, np.array(made).reshape(-1, 3), wrong
 
 
-def trial(counts: Counter[str], seed: int, finer: int, number: int) -> Iterator[str]:
-    """March a scene, and once more in finer steps where it came off."""
+def trial(counts: Counter[str], seed: int, finer: int, sample: int, number: int) -> Iterator[str]:
+    """March a scene; once more in finer steps; and of some on several ranks, and from a checkpoint."""
     job = scene(Random(f"{seed} {number}"))
     about = f"({job['grid']['boundary']} {job['surface']['shape']} {job['material']['model']} {job['adhesion']['law']})"
     try:
-        march, wrong = go(job, counts)
+        march, made, wrong = go(job, counts)
+        counts["snaps"] += march.state.sticking.snaps if march.state.sticking is not None else 0
+        counts["touched"] += bool(made[:, 1].max(initial=0.0) > 0.0)
+        counts["came off"] += bool(march.detached)
+        wrong += in_finer_steps(job, made, counts, finer) if finer else []
+        if sample and number % sample == 0:
+            wrong += [*on_ranks(seed, number, made), *restarted(job, len(made), counts)]
     except RunError as error:
         counts["failed"] += 1
-        yield f"{about} {str(error)[:250]}"
-        return
+        wrong = [str(error)[:250]]
     yield from (f"{about} {text}" for text in wrong)
-    counts["snaps"] += march.state.sticking.snaps if march.state.sticking is not None else 0
-    counts["came off"] += bool(march.detached)
-    if not march.detached or not finer:
+
+
+# -- the same scene in other ways --------------------------------------------------------------------------------------
+
+
+def in_finer_steps(job: dict[str, Any], made: Map, counts: Counter[str], finer: int) -> Iterator[str]:
+    """Where contact ends in steps that are shorter or in those that are not, but not in both."""
+    steps = [{**stage, "time_step": stage["duration"] / (finer * STEPS)} for stage in job["history"]]
+    _, again, wrong = go({**job, "history": steps}, Counter())
+    yield from (f"in finer steps: {text}" for text in wrong)
+    late = LATE * max(stage["duration"] / STEPS for stage in job["history"])
+    for one, other, what in ((made, again, "not in finer steps"), (again, made, "in finer steps only")):
+        for time in ends(one, 2.0 * late):
+            counts["ends of contact"] += 1
+            near = np.abs(other[:, 0] - time) <= late
+            if not np.any(other[near, 1] == 0.0):
+                yield f"contact ends at {time:g} s, {what}"
+
+
+def ends(made: Map, lasts: float) -> Iterator[float]:
+    """Times at which contact ends and does not begin again for a while, or before the history ends."""
+    for before, now in pairwise(made):
+        after = (made[:, 0] >= now[0]) & (made[:, 0] <= now[0] + lasts)
+        if before[1] > 0.0 and not made[after, 1].any():
+            yield float(now[0])
+
+
+def on_ranks(seed: int, number: int, made: Map) -> Iterator[str]:
+    """By how much areas and pressures on several ranks differ from those on one."""
+    words = [Path(sys.executable).with_name("mpirun"), "-n", RANKS, sys.executable, __file__]
+    words += ["--seed", seed, "--only", number, "--inside"]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=runs.environment())
+    if done.returncode:
+        yield f"on {RANKS} ranks: {done.stderr.strip()[-250:]}"
         return
-    steps = [{**stage, "time_step": stage["duration"] / (4 * STEPS)} for stage in job["history"]]
-    again, _ = go({**job, "history": steps}, counts)
-    longest = max(stage["duration"] / STEPS for stage in job["history"])
-    one, other = (each.state.sticking.detached[0] for each in (march, again) if each.state.sticking is not None)
-    if not again.detached or abs(one - other) > 1.01 * longest:
-        yield f"{about} came off at {one:g} s, in finer steps at {other:g} s"
+    other = np.array(json.loads(done.stdout.splitlines()[-1])).reshape(-1, 3)
+    if len(other) != len(made):
+        yield f"{len(other)} steps on {RANKS} ranks, {len(made)} on one"
+        return
+    apart = np.abs(other - made).max(axis=0, initial=0.0) / np.maximum(np.abs(made).max(axis=0, initial=0.0), 1e-300)
+    for name, far in zip(("times", "areas", "pressures"), apart, strict=True):
+        if far > APART:
+            yield f"{name} on {RANKS} ranks and on one are {far:.2g} of the largest apart"
+
+
+def restarted(job: dict[str, Any], steps: int, counts: Counter[str]) -> Iterator[str]:
+    """What differs after a restart in the middle of so many steps."""
+    whole, rows = pc.Simulation(job, comm=MPI.COMM_SELF), list[tuple[float, ...]]()
+    with tempfile.TemporaryDirectory() as where:
+        file = Path(where, "middle.h5")
+        for row in whole.steps():
+            if row.step == steps // 2:
+                whole.save(file)
+            if row.step > steps // 2:
+                rows.append(numbers(row))
+        second = pc.Simulation.restore(file, comm=MPI.COMM_SELF)
+        later = [numbers(row) for row in second.steps() if row.step > steps // 2]
+    counts["restarts"] += 1
+    if later != rows:
+        yield f"rows differ after a restart at step {steps // 2}"
+    for name in ("gap", "pressure"):
+        if whole.field(name).tobytes() != second.field(name).tobytes():
+            yield f"maps of the {name} differ after a restart at step {steps // 2}"
+
+
+def numbers(row: Row) -> tuple[float, ...]:
+    return row.time, row.approach, row.pressure, row.contact_area, row.work, row.snap_loss, row.iterations
 
 
 def main() -> int:
-    options = campaign.parser(__doc__, trials=200, what="scenes", finer=(1, "1: in finer steps, too"))
+    more = {"finer": (10, "times as many steps, or 0"), "sample": (10, "scenes, of which one on ranks and restarted")}
+    options = campaign.parser(__doc__, trials=200, what="scenes", **more, inside=(False, "on several ranks"))
     asked, counts = options.parse_args(), Counter[str]()
-    return int(campaign.go(asked, partial(trial, counts, asked.seed, asked.finer), counts) > 0)
+    if asked.inside:
+        _, made, _ = go(scene(Random(f"{asked.seed} {asked.only}")), counts, MPI.COMM_WORLD)
+        if MPI.COMM_WORLD.rank == 0:
+            print(json.dumps(made.tolist()))
+        return 0
+    return int(campaign.go(asked, partial(trial, counts, asked.seed, asked.finer, asked.sample), counts) > 0)
 
 
 if __name__ == "__main__":

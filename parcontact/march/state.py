@@ -156,7 +156,8 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
     if follows(scene):
         found |= state.tolerance.entries()
     if state.sticking is not None:
-        found |= prefixed("sticking", sticking.entries(state.sticking, scene.units.height, scene.units.modulus))
+        units = scene.units.height, scene.units.modulus
+        found |= prefixed("sticking", sticking.entries(state.sticking, state.row.measures, *units))
     return found | rounding.entries(scene, state.rounding) | state.errors.entries()
 
 
@@ -182,8 +183,11 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         energy = scene.energy.restored(energy, saved)
     for name, effect in scene.followers.items():
         effect.restore(part_of(name, saved))
+    row = Row(contents.step, contents.time, float(saved["clock/distance"]))
+    if state.sticking is not None:
+        row = replace(row, measures=sticking.restored_measures(part_of("sticking", saved)))
     found = State(
-        Row(contents.step, contents.time, float(saved["clock/distance"])),
+        row,
         _restored_pasts(state.pasts, saved),
         state.spare,
         scene.material.restored(state.body, part_of("material", saved)),

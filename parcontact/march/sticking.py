@@ -5,7 +5,7 @@ starts from the last two gaps, extrapolated in time and moved with the surface b
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -243,8 +243,8 @@ def _columns(scene: Scene, trial: Trial, p: Array) -> tuple[float, ...]:
 # -- checkpoints ------------------------------------------------------------------------------------------------------
 
 
-def entries(memory: StickingMemory, height: float, modulus: float) -> dict[str, Entry]:
-    """Return what a checkpoint has of it, in units of heights [m] and moduli [Pa]."""
+def entries(memory: StickingMemory, measures: Measures, height: float, modulus: float) -> dict[str, Entry]:
+    """Return what a checkpoint has of it and of the last measures, in units of heights [m] and moduli [Pa]."""
     now, before = memory.pasts
     found = {
         "gap": Entry(now.gap, height, "m"),
@@ -255,8 +255,15 @@ def entries(memory: StickingMemory, height: float, modulus: float) -> dict[str, 
         "energies": Entry(np.array(memory.energies), 1.0, "J"),
         "detached": Entry(np.array(memory.detached)),
         "snaps": Entry(float(memory.snaps)),
+        "measures": Entry(np.array(astuple(measures), dtype=np.float64)),
     }
     return found if memory.lag is None else {**found, "lag": Entry(memory.lag, height, "m")}
+
+
+def restored_measures(saved: Saved) -> Measures:
+    """Return the measures of the last step: loads and areas with which the next one is compared."""
+    numbers = dict(zip(Measures.__dataclass_fields__, saved["measures"].tolist(), strict=True))
+    return Measures(**{**numbers, "at_edge": bool(numbers["at_edge"])})
 
 
 def restored(memory: StickingMemory, saved: Saved) -> StickingMemory:

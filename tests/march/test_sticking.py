@@ -18,18 +18,21 @@ PULL = {"name": "pull", "approach": {"from": 1e-6, "to": -2e-6}, "duration": 4e-
 LOAD = {"name": "load", "pressure": {"from": 2e3, "to": 1e3}, "duration": 3e-4, "time_step": 1e-4}
 SLIDE = {"name": "slide", "pressure": 1e3, "velocity": [0.2, 0.1], "duration": 2e-4, "time_step": 1e-4}
 OFF = {"name": "off", "force": {"from": 0.0, "to": -5e-3}, "duration": 1e-3, "time_step": 1e-4}
+NEAR = {"name": "near", "approach": {"from": -6e-6, "to": -2e-6}, "duration": 3e-4, "time_step": 1e-4}
+AWAY = {"name": "away", "approach": -8e-6, "velocity": [0.2, 0.1], "duration": 3e-4, "time_step": 1e-4}
 CHOSEN = {"name": "chosen", "approach": {"from": 1e-6, "to": 5e-7}, "duration": 4e-4}
 SCENES: dict[str, tuple[str, dict[str, Any]]] = {
     "rough": ("viscoelastic", {"history": [LOAD, SLIDE]}),
     "free": ("free", {"history": [PULL, {**SLIDE, "name": "slide on"}]}),
     "off": ("free", {"history": [OFF]}),
+    "snaps": ("elastic", {"history": [NEAR, AWAY], "adhesion": {"work": 0.5, "range": 1e-6}}),
     "chosen": ("free", {"history": [CHOSEN], "numerics": {"accuracy": 0.2}}),
 }
 
 
 def sticking(bench: Bench, name: str) -> dict[str, Any]:
     scene, changes = SCENES[name]
-    return bench.job(scene, adhesion=STICK, **changes)
+    return bench.job(scene, **{"adhesion": STICK, **changes})
 
 
 @pytest.mark.mpi(2, 3)
