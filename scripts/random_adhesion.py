@@ -132,8 +132,10 @@ def violations(march: March, before: float) -> Iterator[str]:
         yield f"snaps give back {before - lost:g} J"
 
 
-def go(job: dict[str, Any], counts: Counter[str], comm: MPI.Intracomm = MPI.COMM_SELF) -> tuple[March, Map, list[str]]:
-    """March a job to its end: time, contact area and pressure of each step, and what was wrong on one rank."""
+def go(
+    job: dict[str, Any], counts: Counter[str], comm: MPI.Intracomm = MPI.COMM_SELF, checks: bool = True
+) -> tuple[March, Map, list[str]]:
+    """March a job to its end: time, contact area and pressure of each step, and what was wrong, if it is checked."""
     march, made, wrong, lost = runs.begun(Job.model_validate(job), comm=comm), [], list[str](), 0.0
     for step in march.steps():
         march.advance(step)
@@ -141,7 +143,7 @@ def go(job: dict[str, Any], counts: Counter[str], comm: MPI.Intracomm = MPI.COMM
         if march.detached:
             break
         made.append((row.time, row.measures.contact_area, row.measures.pressure))
-        if comm.size == 1:
+        if checks:
             wrong += [f"step {row.step}: {text}" for text in violations(march, lost)]
         lost = row.added[3]
         counts["calls"] += row.operator_calls
@@ -178,8 +180,12 @@ def trial(counts: Counter[str], seed: int, finer: int, sample: int, number: int)
 def in_finer_steps(job: dict[str, Any], made: Map, counts: Counter[str], finer: int) -> Iterator[str]:
     """Where contact ends in steps that are shorter or in those that are not, but not in both."""
     steps = [{**stage, "time_step": stage["duration"] / (finer * STEPS)} for stage in job["history"]]
-    _, again, wrong = go({**job, "history": steps}, Counter())
-    yield from (f"in finer steps: {text}" for text in wrong)
+    try:
+        _, again, _ = go({**job, "history": steps}, Counter(), checks=False)
+    except RunError as error:
+        counts["failed in finer steps"] += 1
+        yield f"in finer steps: {str(error)[:250]}"
+        return
     late = LATE * max(stage["duration"] / STEPS for stage in job["history"])
     for one, other, what in ((made, again, "not in finer steps"), (again, made, "in finer steps only")):
         for time in ends(one, 2.0 * late):
@@ -244,7 +250,7 @@ def main() -> int:
     options = campaign.parser(__doc__, trials=200, what="scenes", **more, inside=(False, "on several ranks"))
     asked, counts = options.parse_args(), Counter[str]()
     if asked.inside:
-        _, made, _ = go(scene(Random(f"{asked.seed} {asked.only}")), counts, MPI.COMM_WORLD)
+        _, made, _ = go(scene(Random(f"{asked.seed} {asked.only}")), counts, MPI.COMM_WORLD, checks=False)
         if MPI.COMM_WORLD.rank == 0:
             print(json.dumps(made.tolist()))
         return 0

@@ -48,7 +48,7 @@ SMALL = {
     ),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
-    "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*[1-9]\d+ steps"),
+    "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*1 restarts, .*[1-9]\d+ steps"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),
     "random_steady": Small(["--bodies", "3"], r"(?m)^3 made: 0 with faults; 3 solved"),
     "screenshots": Small(["nowhere"], r"^no screenshots: "),  # more: test_screenshots.py, where there is chromium

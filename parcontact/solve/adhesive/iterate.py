@@ -12,7 +12,7 @@ from . import kernels
 from .law import Law
 
 # accuracy
-SHARPER = 5.0  # times the certificate of contacts that do not stick: with it load and area are as right as theirs
+SHARPER = 10.0  # times the certificate of contacts that do not stick: with it the load is as right as theirs
 LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to less are none
 
 
