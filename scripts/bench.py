@@ -3,7 +3,10 @@
     .venv/bin/python scripts/bench.py [PART...] [--points 512] [--rounds 15] [--json FILE] [--peers DIRECTORY]
 
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
-    dilute   cold elastic solves at 0.07 to 2 % contact in free boxes of two and four times as many points, and aspher's
+    dilute   cold elastic solves at 0.07 to 2 % contact on two and four times as many points: in free boxes, with
+             aspher's, and in periodic ones on all points and on tiles
+    free     operator calls of cold solves in free boxes at 0.2 to 35 % contact to a pressure error of 1e-5: on
+             512 x 512 points, and on ever finer grids
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
     sticking operator calls of steps with adhesion over those of the same steps without, in nine scenes
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
@@ -38,7 +41,7 @@ from pathlib import Path
 
 import runs
 from bench.adhesive import adhesion
-from bench.dilute import dilute
+from bench.dilute import dilute, free
 from bench.effects import effects
 from bench.layers import layers
 from bench.leakage import flow
@@ -58,6 +61,7 @@ PARTS |= {
     "large": large,
     "adhesion": adhesion,
     "dilute": dilute,
+    "free": free,
     "layers": layers,
     "flow": flow,
     "sticking": sticking,

@@ -44,7 +44,7 @@ from .convolution import (
 from .layer import Layer, LongWaves
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
-from .tile_operator import TileOperator
+from .tile_operator import TileOperator, free_operator, periodic_operator
 from .tiles import LONGEST_CELL, TileConvolution, Tiles, tile_inverse
 from .wake import wake
 
@@ -93,12 +93,16 @@ class HalfSpace:
     def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Displacement over pressure of each wave of a periodic body, `(1 - nu)/|q|`; a mean moves a layer only."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
-        with np.errstate(divide="ignore"):
-            symbol = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
+        symbol = self._compliance(q)
         if self.layer is not None:
             symbol *= self.layer.compliance_ratio(q)
             symbol[q == 0.0] = self.layer.mean_compliance
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
+
+    def _compliance(self, q: Array) -> Array:
+        """Displacement over pressure of a wave on a half space."""
+        with np.errstate(divide="ignore"):
+            return np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Pressure over displacement of each wave, `|q|/(1 - nu)`, whatever the kernel.
@@ -171,14 +175,20 @@ class HalfSpace:
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     def works_on_tiles(self, nx: int, ny: int) -> bool:
-        """Return whether tiles have operators: on a half space with nothing around, and on cells that are not
-        long."""
+        """Return whether tiles have operators: on a half space, with the spectral kernel or nothing around, and on
+        cells that are not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
-        return self.free and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
+        one_of_both = self.free or self.kernel == "spectral"
+        return one_of_both and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
-        """The operator of a body with nothing around on tiles of its grid, and a preconditioner; no layers."""
-        operator = TileOperator(tiles, self.size, self.poisson, self._coefficient, tally)
+        """The operator of a half space on tiles of its grid, and a preconditioner."""
+        if self.free:
+            operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
+        else:
+            operator = periodic_operator(
+                tiles, self.size, self.poisson, lambda qx, qy: self._compliance(np.hypot(qx, qy)), tally
+            )
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
     # -- of contacts that stick -------------------------------------------------------------------------------------

@@ -20,59 +20,35 @@ from numpy.typing import NDArray
 
 from ..compiled import pointwise
 from ..parallel.fft import FFT
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array, Slab, allocate
 from ..parallel.tally import Tally
-from .convolution import Convolution, padded_lengths, tabulate
+from .convolution import Convolution, padded_lengths, tabulate, wavenumbers
 from .tiles import SIDE, TileConvolution, Tiles, tiles_along
 
 ORDER = 8  # accuracy: nodes of an interpolation along each direction
 FINENESS = 6.0  # accuracy: distances of nodes in the length s
 REACH = 4.0  # accuracy: lengths s beyond which the first part is left out, which is 1.5e-8 there
-NODES = 256  # tuning: nodes along the longer side of a box, at most, where a tile has enough of them
+NODES, PERIODIC_NODES = 256, 512  # tuning: along the longer side of a box, at most, where a tile has enough of them
 FEWEST_NODES = 2  # along a tile
 FAR = 6.0  # lengths s beyond which erf is 1 in double precision
 GAUSS = 0.5 / math.sqrt(3.0)  # of a cell: places of two points whose mean is that over the cell, to third degree
 
 
 class TileOperator:
-    """Pressure -> displacement on tiles of a box of `size` with nothing around; `coefficient(x, y, dx, dy)` is the
-    displacement at a distance from a cell under a unit pressure, `poisson` of the half space."""
+    """Pressure -> displacement on tiles: `near` are the coefficients of the first part at distances from 0 on along y
+    and x, and `nodes` do the second one."""
 
-    def __init__(
-        self,
-        tiles: Tiles,
-        size: tuple[float, float],
-        poisson: float,
-        coefficient: Callable[[Array, Array, float, float], Array],
-        tally: Tally,
-    ) -> None:
-        nx, ny = tiles.points
-        dx, dy = size[0] / nx, size[1] / ny
-        step = step_of_nodes(tiles.points)
-        length = FINENESS * step * max(dx, dy)
-        reach = math.ceil(REACH * length / min(dx, dy) / SIDE)
-        x, y = (each * np.arange(SIDE * (reach + 1)) for each in (dx, dy))
-        factor = (1.0 - poisson) / (2.0 * np.pi) * dx * dy
-
-        def smooth(x: Array, y: Array) -> Array:
-            return factor * np.asarray(_mean_smooth(x, y, GAUSS * dx, GAUSS * dy, length))
-
-        near = coefficient(x[None, :], y[:, None], dx, dy) - smooth(x[None, :], y[:, None])
+    def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes | PeriodicNodes", tally: Tally) -> None:
         self._tiles = tiles
-        self._near = TileConvolution(tiles, reach, near, tally)
+        self._near = TileConvolution(tiles, len(near) // SIDE - 1, near, tally)
+        step = step_of_nodes(tiles)
         self._weights, self._per_tile = _interpolation(step), SIDE // step
         wide = self._per_tile + ORDER
         self._places = [
             (slice(row, row + wide), slice(column, column + wide))
             for row, column in zip(tiles.rows * self._per_tile, tiles.columns * self._per_tile, strict=True)
         ]
-        shape = [self._per_tile * count + ORDER for count in tiles_along(tiles.points)]
-        slab = Slab.alone(shape[0], shape[1], tally)
-        self._nodes = slab.zeros()
-        padded = FFT(slab, padded_lengths(shape[0], shape[1]), measured=False)
-        box = step * dx * shape[0], step * dy * shape[1]
-        table = tabulate(padded, box, lambda x, y, *_: smooth(x, y), even=True)
-        self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
+        self._nodes = nodes
 
     def apply(self, field: Array, out: Array) -> Array:
         """Apply it to a stacked map, not in its place."""
@@ -84,12 +60,13 @@ class TileOperator:
 
     def _displace_nodes(self, field: Array) -> Array:
         """The second part's displacement of all nodes under a stacked map."""
-        nodes, weights = self._nodes, self._weights
+        nodes, weights = self._nodes.map, self._weights
         nodes.fill(0.0)
         patches = np.matmul(np.matmul(weights.T, field.reshape(-1, SIDE, SIDE)), weights)
         for place, patch in zip(self._places, patches, strict=True):
             nodes[place] += patch
-        return self._far.apply(nodes, nodes)
+        self._nodes.displace()
+        return nodes
 
     def displace(self, field: Array, parts: list[slice], take: Callable[[int, Array], None]) -> None:
         """Hand the displacement of the whole grid under a stacked map on, for each part of its rows: `take(number of
@@ -120,10 +97,104 @@ class TileOperator:
         return np.matmul(windows[:, :across], self._weights.T).reshape(SIDE, across * SIDE)
 
 
-def step_of_nodes(points: tuple[int, int]) -> int:
+class FreeNodes:
+    """Nodes of tiles of a box with nothing around; `smooth(x, y)` is what one does at a distance."""
+
+    def __init__(
+        self, tiles: Tiles, size: tuple[float, float], smooth: Callable[[Array, Array], Array], tally: Tally
+    ) -> None:
+        step = step_of_nodes(tiles)
+        shape = [SIDE // step * count + ORDER for count in tiles_along(tiles.points)]
+        slab = Slab.alone(shape[0], shape[1], tally)
+        self.map = slab.zeros()
+        padded = FFT(slab, padded_lengths(shape[0], shape[1]), measured=False)
+        nx, ny = tiles.points
+        box = step * size[0] / nx * shape[0], step * size[1] / ny * shape[1]
+        table = tabulate(padded, box, lambda x, y, *_: smooth(x, y), even=True)
+        self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
+
+    def displace(self) -> None:
+        """From loads to displacements, in their place."""
+        self._far.apply(self.map, self.map)
+
+
+class PeriodicNodes:
+    """Nodes of tiles of a periodic box, and those beyond its edges again; `smooth(qx, qy)` is the symbol of what they
+    do."""
+
+    def __init__(
+        self, tiles: Tiles, size: tuple[float, float], smooth: Callable[[Array, Array], Array], tally: Tally
+    ) -> None:
+        step = step_of_nodes(tiles)
+        slab = Slab.alone(tiles.points[0] // step, tiles.points[1] // step, tally)
+        self.map = allocate((slab.ny + ORDER, slab.nx + ORDER), np.float64, tally)
+        self._box = slab.zeros()
+        fft = FFT(slab, measured=False)
+        self._far = Convolution(fft, lambda rows: smooth(*wavenumbers(fft, size, rows)) / step**2, np.float64)
+
+    def displace(self) -> None:
+        """From loads to displacements, in their place."""
+        half, box = ORDER // 2, self._box
+        rows = self.map[half:-half]
+        rows[-half:] += self.map[:half]
+        rows[:half] += self.map[-half:]
+        box[...] = rows[:, half:-half]
+        box[:, -half:] += rows[:, :half]
+        box[:, :half] += rows[:, -half:]
+        self._far.apply(box, box)
+        self.map[...] = np.pad(box, half, mode="wrap")
+
+
+def free_operator(
+    tiles: Tiles,
+    size: tuple[float, float],
+    poisson: float,
+    coefficient: Callable[[Array, Array, float, float], Array],
+    tally: Tally,
+) -> TileOperator:
+    """Pressure -> displacement on tiles of a box of `size` with nothing around; `coefficient(x, y, dx, dy)` is the
+    displacement at a distance from a cell under a unit pressure, `poisson` of the half space."""
+    dx, dy, length, count = _lengths(tiles, size)
+    factor = (1.0 - poisson) / (2.0 * np.pi) * dx * dy
+
+    def smooth(x: Array, y: Array) -> Array:
+        return factor * np.asarray(_mean_smooth(x, y, GAUSS * dx, GAUSS * dy, length))
+
+    x, y = dx * np.arange(count)[None, :], dy * np.arange(count)[:, None]
+    return TileOperator(tiles, coefficient(x, y, dx, dy) - smooth(x, y), FreeNodes(tiles, size, smooth, tally), tally)
+
+
+def periodic_operator(
+    tiles: Tiles,
+    size: tuple[float, float],
+    poisson: float,
+    symbol: Callable[[Array, Array], Array],
+    tally: Tally,
+) -> TileOperator:
+    """Pressure -> displacement on tiles of a box of `size` that repeats itself, by its `symbol(qx, qy)`; that of the
+    second part is `(1 - nu)/q erfc(q s/2)`."""
+    dx, dy, length, count = _lengths(tiles, size)
+
+    def smooth(qx: Array, qy: Array) -> Array:
+        return (1.0 - poisson) * np.asarray(_smooth_wave(np.hypot(qx, qy), length))
+
+    qx, qy = (2.0 * np.pi * np.fft.fftfreq(2 * count, step) for step in (dx, dy))
+    waves = qx[None, : count + 1], qy[:, None]
+    near = np.fft.irfft2(symbol(*waves) - smooth(*waves), (2 * count, 2 * count))[:count, :count]
+    return TileOperator(tiles, near, PeriodicNodes(tiles, size, smooth, tally), tally)
+
+
+def _lengths(tiles: Tiles, size: tuple[float, float]) -> tuple[float, float, float, int]:
+    """Sides of a cell, the length s, and points up to where the first part ends, in whole tiles."""
+    dx, dy = size[0] / tiles.points[0], size[1] / tiles.points[1]
+    length = FINENESS * step_of_nodes(tiles) * max(dx, dy)
+    return dx, dy, length, SIDE * (math.ceil(REACH * length / min(dx, dy) / SIDE) + 1)
+
+
+def step_of_nodes(tiles: Tiles) -> int:
     """Points from one node to the next, a divisor of SIDE."""
-    step = 4
-    while step * NODES < max(points) and step < SIDE // FEWEST_NODES:
+    step, most = 4, PERIODIC_NODES if tiles.periodic else NODES
+    while step * most < max(tiles.points) and step < SIDE // FEWEST_NODES:
         step *= 2
     return step
 
@@ -150,3 +221,9 @@ def _mean_smooth(x, y, a, b, length):  # type: ignore[no-untyped-def]  # numba f
             r = math.sqrt((x + i * a) ** 2 + (y + j * b) ** 2)
             total += (math.erf(r / length) if r < beyond else 1.0) / r
     return 0.25 * total
+
+
+@pointwise
+def _smooth_wave(q, length):  # type: ignore[no-untyped-def]  # numba finds the types itself
+    """Fourier transform of erf(r/length)/r over 2 pi; at q = 0 what takes that of the first part back."""
+    return math.erfc(0.5 * length * q) / q if q > 0.0 else -length / math.sqrt(math.pi)

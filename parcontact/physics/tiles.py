@@ -23,11 +23,12 @@ LONGEST_CELL = 2.0  # tuning: times its width: beyond it too many tiles are near
 @dataclass(frozen=True)
 class Tiles:
     """Tiles of a grid of `points = (nx, ny)`: their rows and columns among all tiles; the last ones may be cut off by
-    the end of the grid."""
+    the end of the grid, but not of one that is `periodic`."""
 
     points: tuple[int, int]
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
+    periodic: bool = False
 
     @property
     def count(self) -> int:
@@ -74,7 +75,7 @@ class TileConvolution:
         """Apply it to a stacked map; both may be the same."""
         self.tally["operator"] += 1
         self.transform(field)
-        _add_products(self.tiles.numbers, self.tiles.rows, self.tiles.columns, self._symbols, self._waves, self._sums)
+        self._add_up(self.tiles.rows, self.tiles.columns, self._sums)
         self._backward.execute()
         out.reshape(-1, SIDE, SIDE)[...] = self._padded[:, :SIDE, :SIDE]
         return out
@@ -90,9 +91,14 @@ class TileConvolution:
         """What the map that was transformed causes at any tiles of a row of them, each valid until the next one."""
         own, rows = self._sums[:1], np.array([row])
         for place in range(len(columns)):
-            _add_products(self.tiles.numbers, rows, columns[place : place + 1], self._symbols, self._waves, own)
+            self._add_up(rows, columns[place : place + 1], own)
             self._backward_of_one.execute()
             yield self._padded[0, :SIDE, :SIDE]
+
+    def _add_up(self, rows: NDArray[np.intp], columns: NDArray[np.intp], sums: NDArray[np.complex128]) -> None:
+        """Sums of products at some tiles of the grid."""
+        tiles = self.tiles
+        _add_products(tiles.numbers, tiles.periodic, rows, columns, self._symbols, self._waves, sums)
 
     def reached(self) -> NDArray[np.bool_]:
         """Which tiles of the grid are near one of these."""
@@ -130,6 +136,7 @@ def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally:
 @loop
 def _add_products(
     numbers: NDArray[np.intp],
+    periodic: bool,
     rows: NDArray[np.intp],
     columns: NDArray[np.intp],
     symbols: NDArray[np.complex128],
@@ -143,9 +150,11 @@ def _add_products(
         total = sums[own]
         total[:] = 0.0
         row, column = rows[own], columns[own]
-        for j in range(max(row - reach, 0), min(row + reach + 1, down)):
-            for i in range(max(column - reach, 0), min(column + reach + 1, across)):
-                other = numbers[j, i]
+        for j in range(row - reach, row + reach + 1):
+            for i in range(column - reach, column + reach + 1):
+                if not periodic and not (0 <= j < down and 0 <= i < across):
+                    continue
+                other = numbers[j % down, i % across]
                 if other >= 0:
                     symbol, wave = symbols[row - j + reach, column - i + reach], waves[other]
                     for k in range(total.shape[0]):

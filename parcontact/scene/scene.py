@@ -225,10 +225,10 @@ def solver_on_tiles(setup: Setup) -> OnTiles | None:
 
     def on(tiles: Tiles, tolerance: float) -> SolverOnTiles:
         workspace = Workspace(Slab.alone(SIDE, tiles.count * SIDE, tally), tolerance)
-        solver = ContactSolver(workspace, height, tolerance, limit, LARGER_CELLS, free=True)
+        solver = ContactSolver(workspace, height, tolerance, limit, LARGER_CELLS, body.free)
         return solver, *body.on_tiles(tiles, tally)
 
-    return on if body.works_on_tiles(setup.slab.nx, setup.slab.ny) else None
+    return OnTiles(on, not body.free) if body.works_on_tiles(setup.slab.nx, setup.slab.ny) else None
 
 
 def describe_scene(scene: Scene) -> Iterator[str]:

@@ -9,7 +9,8 @@ with L the length by which u varies within the contact (`certificate.Certificate
 pressure, or beside one, are stacked to a map of their own, on which `contact.ContactSolver` solves the same problem
 with operators on tiles (`physics.tile_operator`). These give the displacement at all points of the grid, too, by which
 `contact.ContactSolver.judge` sees whether the pressure holds everywhere. To less than FINEST, or if it does not, the
-operator of the whole grid judges it, and the solve goes on from there. Root solves and tells the others.
+operator of the whole grid judges it, and the solve goes on from there; so it does in a periodic box, where that costs
+less. Root solves and tells the others.
 """
 
 from collections.abc import Callable
@@ -27,8 +28,9 @@ from .contact import Contact, ContactSolver
 from .preconditioner.extension import Grids
 from .problem import Control, MeanPressure, Operators, Problem
 
-MARGIN = 0.2  # tuning: of the length, by which a block may be off
+MARGIN = 0.1  # tuning: of the length, by which a block may be off
 LARGEST_SHARE = 0.25  # tuning: of the points of a grid: on more tiles, solving on all points is as fast
+LARGEST_PERIODIC_SHARE = 0.06  # tuning: the same in a periodic box, whose transforms are not padded
 BLOCKS = 256  # points along the longer side of the grid of blocks, at most, unless tiles have fewer than one
 LARGER_CELLS = Grids(2)  # tuning: of solvers on tiles; still larger cells would be those of tiles far apart
 SHARE = 0.5  # of a tolerance, to which tiles are solved: the whole grid has to agree
@@ -36,7 +38,18 @@ LEAST = 1e-7  # accuracy: tolerance: beyond it operators on tiles have no more d
 FINEST = 1e-5  # accuracy: tolerance: to less the operator of the whole grid judges, of which tiles are off by 2e-7
 
 SolverOnTiles = tuple[ContactSolver, TileOperator, TileConvolution]  # with the body's operator, and a preconditioner
-OnTiles = Callable[[Tiles, float], SolverOnTiles]  # of the same body, with a tolerance
+
+
+@dataclass(frozen=True)
+class OnTiles:
+    """What makes a solver on tiles, to a tolerance, of a body that may be periodic."""
+
+    make: Callable[[Tiles, float], SolverOnTiles]
+    periodic: bool
+
+    def work_on(self, slab: Slab) -> bool:
+        """Return whether a grid has tiles: a periodic one only whole ones."""
+        return not self.periodic or slab.nx % SIDE == slab.ny % SIDE == 0
 
 
 @dataclass(frozen=True)
@@ -55,29 +68,42 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
 
-def choose(blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array) -> Tiles | None:
+def choose(
+    blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, periodic: bool
+) -> Tiles | None:
     """Return the tiles of a grid that may touch, from the contact on the next coarser one; None where these are none,
     or more than LARGEST_SHARE of all; collective."""
+    most = (LARGEST_PERIODIC_SHARE if periodic else LARGEST_SHARE) * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
+    if _tiles_with(blocks, p > 0.0, slab, periodic).count > most:
+        return None
     u = operators.operator.apply(p, blocks.empty())
     gap = u - regrid.highest(slab, blocks, heights) - below.d
-    near = blocks.to_root(np.where((p > 0.0) | (gap < MARGIN * below.length), 1.0, 0.0))
-    return on_root(slab.comm, lambda: None if near is None else _tiles_of(near > 0.0, slab))
+    tiles = _tiles_with(blocks, (p > 0.0) | (gap < MARGIN * below.length), slab, periodic)
+    return tiles if 0 < tiles.count <= most else None
 
 
-def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles | None:
-    """The tiles of a grid with blocks that are near contact, or beside such a block."""
+def _tiles_with(blocks: Slab, near: NDArray[np.bool_], slab: Slab, periodic: bool) -> Tiles:
+    """The tiles of a grid with blocks that are near contact, or beside such a block; collective."""
+    whole = blocks.to_root(np.where(near, 1.0, 0.0))
+    tiles = on_root(slab.comm, lambda: None if whole is None else _tiles_of(whole > 0.0, slab, periodic))
+    assert tiles is not None
+    return tiles
+
+
+def _tiles_of(near: NDArray[np.bool_], slab: Slab, periodic: bool) -> Tiles:
     down, across = near.shape
-    around = np.zeros((down + 2, across + 2), np.bool_)
+    edged = np.pad(near, 1, mode="wrap") if periodic else np.pad(near, 1)
+    around = np.zeros_like(near)
     for j in range(3):
         for i in range(3):
-            around[j : j + down, i : i + across] |= near
-    rows, columns = np.nonzero(around[1:-1, 1:-1])
+            around |= edged[j : j + down, i : i + across]
+    rows, columns = np.nonzero(around)
     across, down = tiles_along((slab.nx, slab.ny))
     marked = np.zeros((down, across), np.bool_)
     marked[rows * slab.ny // near.shape[0] // SIDE, columns * slab.nx // near.shape[1] // SIDE] = True
-    tiles = Tiles((slab.nx, slab.ny), *np.nonzero(marked))
-    return tiles if 0 < tiles.count * SIDE**2 <= LARGEST_SHARE * slab.points else None
+    rows, columns = np.nonzero(marked)
+    return Tiles((slab.nx, slab.ny), rows, columns, periodic)
 
 
 class OnTheseTiles:
@@ -99,7 +125,7 @@ class OnTheseTiles:
             assert heights is not None
             assert start is not None
             _bury(heights, tiles, lowest - self._height)
-            solver, self._operator, inverse = self._on_tiles(tiles, tolerance)
+            solver, self._operator, inverse = self._on_tiles.make(tiles, tolerance)
             control = _on_part(problem.control, slab.points / solver.slab.points)
             contact = solver.solve(Problem(self._operator, inverse, heights, problem.constraint, control), start)
             return contact.p, contact.d, contact.certificate.length
@@ -109,8 +135,9 @@ class OnTheseTiles:
         return Found(slab, p, d, length)
 
     def judge(self, solver: ContactSolver, p: Array) -> Contact | None:
-        """The contact of the solution p, if it holds at all points to the solver's tolerance; collective."""
-        if solver.tolerance < FINEST:
+        """The contact of the solution p, if it holds at all points to the solver's tolerance, None also where the
+        operator of the whole grid is to judge; collective."""
+        if solver.tolerance < FINEST or self._tiles.periodic:
             return None
         self._displace(solver.workspace.displacement)
         contact = solver.judge(replace(self._problem, operator=_Displaced()), p, "does not hold beside the tiles")

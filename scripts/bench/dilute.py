@@ -1,4 +1,5 @@
-"""Part `dilute`: cold solves of few points in contact in free boxes, and aspher on the same surfaces in turns."""
+"""Parts `dilute` and `free`: cold solves of few points in contact, in free boxes beside aspher on the same surfaces in
+turns; and cold solves in free boxes of any contact."""
 
 import argparse
 import json
@@ -8,6 +9,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -20,15 +22,17 @@ from parcontact.physics.tiles import SIDE, Tiles
 from parcontact.solve.contact import ContactSolver
 from parcontact.solve.fallback import cold_start
 from parcontact.solve.problem import Operators
-from parcontact.solve.tiles import LARGER_CELLS, SolverOnTiles
+from parcontact.solve.tiles import LARGER_CELLS, OnTiles, SolverOnTiles
 from parcontact.solve.workspace import Workspace
 
 from .peers import installed
-from .table import Line, Map, quartiles
+from .table import Line, Map, compare, interleave, quartiles
 from .work import EXACT, MODULUS, TOLERANCES, Cold, Solver
 
 ERROR = 5e-5  # of pressures, of the other program; ours is never larger than its own
 CASES = ((2, 0.00105), (2, 0.0094), (4, 0.00038), (4, 0.003))  # times `--points`; mean pressure over E*
+SMALLEST, LOADS = 512, (0.001, 0.01, 0.05, 0.2)  # of `free`: points along a side, mean pressures over E*
+FREE_ERROR, TIGHT = 1e-5, 1e-8  # of its pressures, and the tolerance of what they are compared with
 ASPHER = """\
 import aspher
 coarsest = len(heights)
@@ -55,12 +59,12 @@ for line in sys.stdin:
 """
 
 
-class Free(Cold):
-    """The same surface in a box with nothing around, on tiles where contact is dilute."""
+class Dilute(Cold):
+    """The same surface in a box with nothing around, or in one that repeats itself, on tiles where that costs less."""
 
-    def __init__(self, points: int, load: float) -> None:
+    def __init__(self, points: int, load: float, free: bool = True, on_tiles: bool = True) -> None:
         super().__init__(points, load=load)
-        self.body = HalfSpace(self.size, free=True)
+        self.body, self._uses_tiles = HalfSpace(self.size, free=free), on_tiles
         self.operators = Operators(self.body.operator(self.fft), self.body.inverse(self.fft))
 
     def solve_anew(self, tolerance: float) -> None:
@@ -74,7 +78,7 @@ class Free(Cold):
 
     def solver(self, tolerance: float, single: bool = False, slab: Slab | None = None) -> Solver:
         own = self.slab if slab is None else slab
-        solver = ContactSolver(Workspace(own, tolerance), self.height, tolerance, 500, free=True)
+        solver = ContactSolver(Workspace(own, tolerance), self.height, tolerance, 500, free=self.body.free)
         if slab is None:
             return solver, self.operators
         fft = FFT(slab, measured=False)
@@ -82,33 +86,71 @@ class Free(Cold):
 
     def on_tiles(self, tiles: Tiles, tolerance: float) -> SolverOnTiles:
         work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, self.slab.tally), tolerance)
-        solver = ContactSolver(work, self.height, tolerance, 500, LARGER_CELLS, free=True)
+        solver = ContactSolver(work, self.height, tolerance, 500, LARGER_CELLS, self.body.free)
         return solver, *self.body.on_tiles(tiles, self.slab.tally)
 
     def solve(self, solver: Solver) -> Map:
         start, (own, operators) = np.zeros_like(self.heights), solver
         coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
-        contact = cold_start.prepare(own, self.problem(operators), start, coarse, self.on_tiles)
+        on_tiles = OnTiles(self.on_tiles, not self.body.free) if self._uses_tiles else None
+        contact = cold_start.prepare(own, self.problem(operators), start, coarse, on_tiles)
         return np.asarray((self.go_on(solver, start) if contact is None else contact).p)
+
+    def calls(self, solver: Solver) -> int:
+        """Operator calls of a solve."""
+        before = self.slab.tally["operator"]
+        self.solve(solver)
+        return self.slab.tally["operator"] - before
 
 
 def dilute(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
-    """Two grids of two and four times as many points along a side, at two loads each."""
+    """Two grids of two and four times as many points along a side, at two loads each, free and periodic."""
     for times, load in CASES:
         yield from _case(times * points, load, min(rounds, 5), asked.peers)
+    for times, load in CASES:
+        yield from _periodic_case(times * points, load, min(rounds, 5))
+
+
+def _periodic_case(points: int, load: float, rounds: int) -> Iterator[Line]:
+    """The same box as it repeats itself, solved on tiles and on all points in turns."""
+    everywhere = Dilute(points, load, free=False, on_tiles=False)
+    surfaces = {"on all points": everywhere, "on tiles": Dilute(points, load, free=False)}
+    reference = everywhere.solve(everywhere.solver(EXACT))
+    name = f"periodic {points} x {points}, {np.mean(reference > 0.0):.2%}"
+    solves: dict[str, Callable[[], object]] = {}
+    for where, surface in surfaces.items():
+        surface.reference = reference
+        solver, error = surface.loosest(ERROR)
+        yield Line(f"{name}: {where}: operator calls", surface.calls(solver))
+        yield Line(f"{name}: {where}: pressure error", error)
+        solves[where] = partial(surface.solve, solver)
+    for line in compare(interleave(solves, rounds), "on all points"):
+        yield replace(line, what=f"{name}: {line.what}")
+
+
+def free(points: int, *_: object) -> Iterator[Line]:
+    """Operator calls on 512 x 512 points and on ever finer grids, at loads from dilute contacts on."""
+    side = min(SMALLEST, points)
+    while side <= points:
+        for load in LOADS:
+            surface = Dilute(side, load)
+            surface.reference = surface.solve(surface.solver(TIGHT))
+            solver, error = surface.loosest(FREE_ERROR)
+            name = f"{side} x {side}, {np.mean(surface.reference > 0.0):.2%}"
+            yield Line(f"{name}: operator calls", surface.calls(solver))
+            yield Line(f"{name}: pressure error", error)
+        side *= 2
 
 
 def _case(points: int, load: float, rounds: int, peers: Path | None) -> Iterator[Line]:
-    surface = Free(points, load)
+    surface = Dilute(points, load)
     surface.reference = surface.solve(surface.solver(EXACT))
     name = f"{points} x {points}, {np.mean(surface.reference > 0.0):.2%}"
     with tempfile.TemporaryDirectory() as where:
         given = {"heights": surface.heights, "reference": surface.reference / MODULUS, "load": load, "wanted": ERROR}
         other = None if peers is None else _Other(installed(peers, "aspher"), given, Path(where, "given.npz"))
         solver, error = surface.loosest(ERROR if other is None else min(other.error, ERROR))
-        calls = surface.slab.tally["operator"]
-        surface.solve(solver)
-        calls = surface.slab.tally["operator"] - calls
+        calls = surface.calls(solver)
         ours: dict[str, Callable[[], object]] = {"a cold solve": partial(surface.solve, solver)}
         ours["all made for it"] = partial(surface.solve_anew, solver[0].tolerance)
         seconds, theirs = {name: list[float]() for name in ours}, list[float]()

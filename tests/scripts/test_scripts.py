@@ -29,7 +29,8 @@ SMALL = {
         ["--points", "64", "--rounds", "1", "--json", "bench.json", "--picture", "bench.png"],
         r"(?s)double: operator calls +\d\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
         r"curve: the most of them +\d{2,3}[. ].*12 branches over.*info.*allowed 0.001: branches with a map +5 .*"
-        r"adhesion +operator calls +\d+ .*dilute +256 x 256.*layers +cold, nu 0.3, bonded.*flow along x and along y.*"
+        r"adhesion +operator calls +\d+ .*dilute +256 x 256.*free +64 x 64.*"
+        r"layers +cold, nu 0.3, bonded.*flow along x and along y.*"
         r"rough, elastic, middle: over those without +[12]\.\d.*each branch.*solve: speed of 2 ranks",
     ),
     "chosen_mesh": Small(["--only", "5", "--seed", "100"], r"(?m)^1 made: 0 with faults; 3 accuracies"),

@@ -91,7 +91,9 @@ class _Descent:
         """The tiles of a level that may touch, if they are few."""
         if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
             return None
-        return tiles.choose(*self._blocks, self._below, level.slab, level.heights)
+        if self._on_tiles is None or not self._on_tiles.work_on(level.slab):
+            return None
+        return tiles.choose(*self._blocks, self._below, level.slab, level.heights, self._on_tiles.periodic)
 
     def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> tiles.OnTheseTiles:
         """Solve on tiles of a level from p."""
