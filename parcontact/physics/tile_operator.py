@@ -9,7 +9,8 @@ The first part vanishes beyond `REACH s`: it is a cyclic convolution between til
 their side. The second one varies over s: loads of points are given to the nodes of a regular grid, at distances of
 `s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A. Brandt
 and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell. What the
-two lengths leave out is below 1e-6 of the displacement.
+two lengths leave out is below 1e-6 of the displacement; in a periodic box 2e-6, as far as its kernel, cut off at the
+Nyquist wavenumbers, reaches along x and y.
 """
 
 import math
