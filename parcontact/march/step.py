@@ -15,23 +15,21 @@ import numpy as np
 from ..effects.effect import Instant, values_of
 from ..history.chosen import MadeStep
 from ..history.timeline import Step
-from ..parallel.slab import Array
 from ..physics.body import Trial, surface_of
 from ..physics.energy import EnergyMemory, Pressed
 from ..scene import Scene, solver_on, solver_on_tiles
-from ..solve.contact import Contact
+from ..solve.contact import Contact, ContactSolver
 from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
 from ..storage.row import Row
 from . import failure, sticking, sticking_energies
 from .errors import Estimate, Solved, estimate_errors
 from .failure import DetachedError, StepError
-from .rounding import rounding_after
+from .rounding import rounding_after, rounds_too_much
 from .starts import Past, cells_moved, make_start
 from .state import State, energies_of
 
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
-FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 
 
 def make_step(scene: Scene, state: State, step: Step) -> State:
@@ -188,15 +186,17 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     control = _control(scene, step, trial)
     if state.sticking is not None:
         return _solve_stuck(scene, state, step, trial, control)
-    solver, operators = scene.in_double if state.rounding > 0.0 else (scene.solver, scene.operators)
+    tolerance = state.tolerance.of(scene, step)
+    double = state.rounding > 0.0 or rounds_too_much(scene, control, tolerance)
+    solver, operators = scene.in_double if double else (scene.solver, scene.operators)
     problem = Problem(*operators, trial.effective, scene.constraint(trial.alpha), control)
     moved_start, contact = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare), None
     if state.alpha == 0.0:  # nothing has been solved before
-        on = partial(solver_on, scene.setup)
+        on = partial(solver_on, scene.setup, operator_type=np.float64 if double else None)
         contact = cold_start.prepare(solver, problem, state.spare, on, solver_on_tiles(scene.setup))
-    contact, remark = contact or solver.solve(problem, state.spare, tolerance=state.tolerance.of(scene, step)), ""
+    contact, remark = contact or solver.solve(problem, state.spare, tolerance=tolerance), ""
     if contact.failure:
-        contact, remark = _retry(scene, state, step, problem, contact)
+        contact, remark = _retry(scene, state, step, solver, problem, contact)
     if step.passed:
         remark = "; ".join(filter(None, (remark, _passed(scene, step))))
     measures = scene.probe.measure(
@@ -247,28 +247,15 @@ def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:
     grid = scene.choices.grid
     if step.control == "approach":
         d = (step.load + scene.setup.surface.datum) / scene.units.height
-        _refuse_beyond_full_contact(scene, step, d, trial.effective)
+        failure.refuse_beyond_full_contact(scene, step, d, trial.effective)
         return Approach(d)
     mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
     return MeanPressure(mean / (trial.alpha * scene.units.pressure))
 
 
-def _refuse_beyond_full_contact(scene: Scene, step: Step, d: float, effective: Array) -> None:
-    """Raise StepError where a periodic half space cannot follow an approach: its mean surface would be below its
-    undeformed level. Where the rigid surface yields it can."""
-    if not scene.setup.half_space.moves_in_the_mean and scene.choices.hardness is None:
-        mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
-        datum = scene.setup.surface.datum
-        rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height
-        if d + mean > rounding:
-            most = -mean * scene.units.height - datum
-            raise StepError(
-                f"step {step.number}: an approach of {step.load:g} m is beyond full contact, which a periodic body "
-                f"reaches at {most:g} m; prescribe a pressure instead"
-            )
-
-
-def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Contact) -> tuple[Contact, str]:
+def _retry(
+    scene: Scene, state: State, step: Step, solver: ContactSolver, problem: Problem, failed: Contact
+) -> tuple[Contact, str]:
     """Retry a solve that failed, unless the job takes it as it is: then only in double precision.
 
     Returns the contact, and what to say of it; collective. Raises StepError when nothing helps.
@@ -278,7 +265,6 @@ def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Con
     if would_do and in_double is None:
         return failed, ""
     on, most = partial(solver_on, scene.setup), 1 if would_do else None
-    solver = scene.solver if state.rounding == 0.0 else scene.in_double[0]
     contact, tried = retry.retry_solve(solver, problem, failed, on, in_double, most)
     if contact.failure:
         if would_do and _accepts(scene, contact):

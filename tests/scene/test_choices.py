@@ -149,7 +149,7 @@ def test_preconditioner_of_loose_solves(changes: Json, on: bool) -> None:
 def test_single_operator(monkeypatch: pytest.MonkeyPatch) -> None:
     """On, only the surface and the forces are transformed in double precision, as often as with other tolerances; these
     solves, which are all given up, would be tried again with an operator in double precision."""
-    monkeypatch.setattr(step, "_retry", lambda scene, state, step, problem, failed: (failed, ""))
+    monkeypatch.setattr(step, "_retry", lambda scene, state, step, solver, problem, failed: (failed, ""))
     off, on, _ = ROWS["operator in single precision"]
     double, single = whole(job(**off)), whole(job(**on))
     assert double["fft"] == single["fft"]
