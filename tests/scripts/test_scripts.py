@@ -45,7 +45,8 @@ SMALL = {
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "many_ranks": Small(
-        ["--ranks", "2", "--points", "64"], r"(?m)^  2 ranks: apart [\d.e-]+; a step .* exchanges of transforms$"
+        ["--ranks", "2", "--points", "64"],
+        r"(?m)^  2 ranks: apart [\d.e-]+; a step .* exchanges of transforms\n1024 ranks on .* kB$",
     ),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
