@@ -61,7 +61,8 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
         blocks = part.transform(grid.points, np.float32, shared=True)[1]
         found["single transforms and preconditioner"] = blocks + part.preconditioner(single, 4)
     else:
-        found["preconditioner"] = part.preconditioner(whole, 8)
+        never = whole if chosen.adhesion is not None and chosen.isolated.on else 0  # of its symbol: it is not applied
+        found["preconditioner"] = part.preconditioner(whole, 8) - never
     body, tolerance = part.half_space, job.numerics.tolerance
     grids = grids_for(grid.dx, grid.dy, body.reach)
     solver = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept, body.long_waves)
