@@ -21,7 +21,7 @@ from .solver import GapSolver
 
 MAX_PASSES = 100  # accuracy: of a free body; one to three do as a rule, and many where it is about to snap
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
-MANY, SMALL_SHARE = 12, 0.3  # tuning: passes after which it is no more than that: solves go round between two states
+MANY, SMALL_SHARE = 12, 0.3  # tuning: passes after which it is at most that, and falls: solves go round between states
 
 
 @dataclass
@@ -65,7 +65,7 @@ class StickingSolver:
             change -= found.d
             found, worst = self._judge(control, found, out, change)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
-            share = min(share, SMALL_SHARE) if passes > MANY else share
+            share = min(share, SMALL_SHARE * MANY / passes) if passes > MANY else share
             last = change
             lag += share * change
             if found.failure or found.detached or worst <= tolerance:
