@@ -29,9 +29,7 @@ from ..scene import choices
 from ..scene.rigid_surface import highest_waves
 from ..solve.adhesive.solver import GapSolver
 from ..solve.contact import ContactSolver
-from ..solve.nonsymmetric import striped
 from ..solve.nonsymmetric.steady import SteadySolver
-from ..solve.nonsymmetric.striped import StripedSolver
 from ..solve.preconditioner.extension import grids_for
 from ..steady_sliding.sliding import tolerance_of
 
@@ -93,9 +91,7 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
         return 0
     part, points, even = _Part(job, ranks, rank), job.grid.points, not job.initial.velocity[1]
     spectrum, blocks = part.transform(points)
-    along_axis = striped.applies(job.initial.velocity, points)
-    held_by = StripedSolver.footprint if along_axis else SteadySolver.footprint
-    held = held_by(*points, tolerance_of(job.numerics.tolerance), ranks, part.number, sets)
+    held = SteadySolver.footprint(*points, tolerance_of(job.numerics.tolerance), ranks, part.number, sets)
     held += 2 * 8 * part.cells(points)  # the heights and the start
     held += spectrum + blocks + part.surface_waves
     held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)

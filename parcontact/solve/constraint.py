@@ -85,7 +85,8 @@ class NonNegative:
 
     def choose(self, x: Array, u: Array, h: Array, d: float, kappa: float, working: Set) -> tuple[float, ...]:
         """Mark the next set of a method whose x is admissible only in the end: points with `x > kappa g`. Returns the
-        sums of x > 0, of -x < 0, of |x g|, the number of these points, and max(-g)."""
+        sums of x > 0, of -x < 0, of |x g|, the number of these points, how many others there are than before, and
+        max(-g)."""
         found: tuple[float, ...] = choose(x, u, h, d, kappa, working)
         return found
 
@@ -170,13 +171,16 @@ def clip(p):
 
 @loop
 def choose(x, u, h, d, kappa, working):
-    """Mark points with `x > kappa g`; sums of x > 0, of -x < 0, of |x g|, of marked points; and max(-g)."""
-    positive, negative, wrong, count, deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
+    """Mark points with `x > kappa g`; sums of x > 0, of -x < 0, of |x g|, of marked points and of those that
+    are others than before; and max(-g)."""
+    positive, negative, wrong, count, changed, deepest = 0.0, 0.0, 0.0, 0.0, 0.0, -np.inf
     for j in range(x.shape[0]):
-        row_positive, row_negative, row_wrong, row_count, row_deepest = 0.0, 0.0, 0.0, 0.0, -np.inf
+        row_positive, row_negative, row_wrong = 0.0, 0.0, 0.0
+        row_count, row_changed, row_deepest = 0.0, 0.0, -np.inf
         for i in range(x.shape[1]):
             gap = u[j, i] - h[j, i] - d
             inside = x[j, i] > kappa * gap
+            row_changed += 1.0 if inside != working[j, i] else 0.0
             working[j, i] = inside
             row_positive += max(x[j, i], 0.0)
             row_negative += max(-x[j, i], 0.0)
@@ -187,5 +191,6 @@ def choose(x, u, h, d, kappa, working):
         negative += row_negative
         wrong += row_wrong
         count += row_count
+        changed += row_changed
         deepest = max(deepest, row_deepest)
-    return positive, negative, wrong, count, deepest
+    return positive, negative, wrong, count, changed, deepest

@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -18,21 +17,19 @@ from ..physics.convolution import Convolution
 from ..physics.flash import Flash
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
-from ..physics.prony import complex_modulus
 from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
-from ..solve.nonsymmetric import proximal, striped
+from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
-from ..solve.nonsymmetric.striped import StripedSolver
 from .heating import Feedback, warm
 from .losses import branch_powers
 from .point import Point
+from .stiffness import loses_most, soft_stripes
 
 COARSE_TOLERANCE = 0.02  # tuning: of the certificate on all grids but the finest
 LOOSE, SHARE = 1e-3, 0.6  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
-LOSSY = 2.5  # tuning: loss tangent under the shortest wave, above which contacts are solved by proximal points first
 NEAR = 1.1  # tuning: a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 
@@ -105,10 +102,8 @@ class SteadySliding:
     def _solve(self, velocity: Vector, pressure: float) -> Point:
         """Solve at the temperature that was taken."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
-        lossy = self._loses_far_more_than_it_stores(velocity)
-        along_axis = striped.applies(velocity, self.setup.grid.points)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
-        for start, solver in self._starts(factor * speed, pressure, along_axis, lossy):
+        for start, solver in self._starts(velocity, pressure):
             contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start, solver)
             calls += more
             if contact.converged:
@@ -187,18 +182,18 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(
-        self, speed: float, pressure: float, along_axis: bool, lossy: bool
-    ) -> Iterator[tuple[Array | None, Make]]:
+    def _starts(self, velocity: Vector, pressure: float) -> Iterator[tuple[Array | None, Make]]:
         """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
-        each, what makes the solver: as a rule the usual one, then without stripes the `narrow` one, which it always is
-        on a line of points, and at last the one of proximal points, which comes first where a body is `lossy`.
+        each, what makes the solver: as a rule the usual one, and at last the one of proximal points, which comes first
+        where the body loses nearly all work.
 
         The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
         logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
         appear and vanish.
         """
-        if lossy and along_axis:
+        speed = self.setup.choices.time_factor * math.hypot(*velocity)
+        lossy = loses_most(self.setup, velocity)
+        if lossy:
             yield None, self._proximal
         if self.contact is None:
             yield None, self._solver
@@ -206,18 +201,8 @@ class SteadySliding:
             yield from ((self.contact.p, self._solver), (None, self._solver))
         else:
             yield from ((None, self._solver), (self.contact.p, self._solver))
-        if 1 not in self.setup.grid.points and not along_axis:
-            yield None, partial(self._solver, narrow=True)
-        yield None, self._proximal
-
-    def _loses_far_more_than_it_stores(self, velocity: Vector) -> bool:
-        """Return whether the body does, under the shortest wave of the surface."""
-        setup, known = self.setup, self._known
-        if known.cells_per_wave is None:
-            return False
-        wave = known.cells_per_wave * max(known.cell) / setup.units.length
-        modulus = complex_modulus(2.0 * math.pi * math.hypot(*setup.in_units(velocity)) / wave, *setup.prony)
-        return bool(modulus.imag > LOSSY * modulus.real)
+        if not lossy:
+            yield None, self._proximal
 
     def _descend(
         self, velocity: Vector, mean: float, start: Array | None, solver: Make
@@ -244,28 +229,25 @@ class SteadySliding:
         lost = operator.loss(p, self.setup.size, _direction(velocity))
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
-    def _solver(self, level: Level, velocity: Vector, narrow: bool = False) -> tuple[SteadySolver, Convolution]:
+    def _solver(self, level: Level, velocity: Vector) -> tuple[SteadySolver, Convolution]:
         operator, inverse = self._operators(level, velocity)
-        return self._solver_for(level, velocity, operator, inverse, narrow), operator
+        return self._solver_for(level, velocity, operator, inverse), operator
 
     def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
         operator, inverse = self._operators(level, velocity)
         kind = self.setup.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
-        solver = self._solver_for(level, velocity, nearer, nearer_inverse, narrow=True)
+        solver = self._solver_for(level, velocity, nearer, nearer_inverse)
         pull = operator.mapped(proximal.pull, np.float64)
         return Proximal(solver, operator, pull), operator
 
     def _solver_for(
-        self, level: Level, velocity: Vector, operator: Convolution, preconditioner: Convolution, narrow: bool
+        self, level: Level, velocity: Vector, operator: Convolution, preconditioner: Convolution
     ) -> SteadySolver:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
         tolerance = max(tolerance_of(numerics.tolerance), 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
-        limit = 20 * numerics.max_iterations
-        given = level.slab, operator, preconditioner, height, tolerance, limit
-        if striped.applies(velocity, self.setup.grid.points):
-            return StripedSolver(int(velocity[0] != 0.0), *given)
-        return SteadySolver(*given, narrow=narrow)
+        limit, along = 20 * numerics.max_iterations, soft_stripes(self.setup, velocity)
+        return SteadySolver(level.slab, operator, preconditioner, height, tolerance, limit, along=along)
 
     def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""

@@ -52,7 +52,7 @@ def test_points_left_out_are_taken_in_again(shared_path: Path, comm: MPI.Intraco
     velocity = (2.7 * LINE / CREEP_TIME, 0.0)
     states.solve(velocity, pressure)
     level, mean = states.levels[0], pressure / states.setup.units.pressure
-    solver, _ = states._solver(level, velocity, False)
+    solver, _ = states._solver(level, velocity)
     assert states.contact is not None
     solution = states.contact.p.copy()
     random = np.random.default_rng(1)
@@ -76,7 +76,7 @@ def test_what_is_taken_in(shared_path: Path, comm: MPI.Intracomm) -> None:
     states.solve(velocity, pressure)
     level, contact = states.levels[0], states.contact
     assert contact is not None
-    solver, _ = states._solver(level, velocity, False)
+    solver, _ = states._solver(level, velocity)
     solver._u[...] = contact.u
     gap = contact.u - level.heights - contact.d
     distance = 0.1 * solver.height

@@ -59,7 +59,8 @@ def test_line(shared_path: Path, comm: MPI.Intracomm, speed: float) -> None:
 def test_proximal_points_come_first_where_losses_are_large(
     shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Under the shortest wave, 0.125 mm, the loss tangent is 12.6 at this speed, and 0.63 at a hundredth of it."""
+    """At a fifth of `PEAK` the loss tangent of the shortest waves is 14, and |G| of the longest 1.9 G_inf; at a
+    hundredth no loss tangent is above 2.5."""
     states, made = sliding(shared_path, ROUGH, comm), list[bool]()
     usual = SteadySliding._solver
 
@@ -68,7 +69,7 @@ def test_proximal_points_come_first_where_losses_are_large(
         return usual(*given, **more)
 
     monkeypatch.setattr(SteadySliding, "_solver", noted)
-    states.solve((PEAK, 0.0), 0.1 * 0.05 * MODULUS * float(np.sqrt(RATIO)))
+    states.solve((0.2 * PEAK, 0.0), 0.1 * 0.05 * MODULUS * float(np.sqrt(RATIO)))
     assert not made
     sliding(shared_path, ROUGH, comm).solve((1e-2 * PEAK, 0.0), 0.1 * 0.05 * MODULUS)
     assert made

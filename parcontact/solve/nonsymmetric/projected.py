@@ -27,20 +27,18 @@ WIDE, NARROW = (Grids(5), 0.5), (Grids(4), 1.0)  # tuning: grids and floor of `E
 # may make sets of points come and go; so may pairs of long cells
 
 
-def extension_on(nx: int, ny: int, narrow: bool = False) -> tuple[Grids, float]:
+def extension_on(nx: int, ny: int) -> tuple[Grids, float]:
     """The grids and the floor of `ExtendedPreconditioner` on so many points."""
-    return NARROW if narrow or 1 in (nx, ny) else WIDE
+    return NARROW if 1 in (nx, ny) else WIDE
 
 
 class Projected:
     """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`."""
 
-    def __init__(
-        self, slab: Slab, operator: Operator, preconditioner: Operator, constraint: Constraint, narrow: bool = False
-    ) -> None:
+    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, constraint: Constraint) -> None:
         self.slab, self.operator, self.preconditioner, self.constraint = slab, operator, preconditioner, constraint
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
-        grids, floor = extension_on(slab.nx, slab.ny, narrow)
+        grids, floor = extension_on(slab.nx, slab.ny)
         self.extended = ExtendedPreconditioner(slab, floor, grids)
         self.local_load = LocalLoad(slab)
 

@@ -5,17 +5,18 @@ constant velocity, not symmetric: there is no energy to minimize. Projected step
 cheap, three applications of A or K each, and reach most solutions. Where they no longer help, an active set with an
 inexact linear solve goes on:
 
-1. on the set c, with x = 0 elsewhere, a few generalized conjugate residuals towards `A x - h = d` under the load;
+1. on the set c, with x = 0 elsewhere, generalized conjugate residuals towards `A x - h = d` under the load, where the
+   body is soft along stripes with the preconditioner of `stripes`;
 2. the new set: points with `x > kappa g`, that is x > 0 where the gap is closed, and g < 0 where there is no pressure;
 3. when x and its gap look solved, the admissible pressure `p = max(x, 0)`, scaled to the load, is certified with a new
    application of A.
 
 In both only the certificate of an admissible pressure counts: an iteration that cycles may look finished. A start from
-coarser grids makes it cheap; from far away it may cycle, and then it says so.
+coarser grids makes it cheap; with stripes, sets shrink on the coarsest from full contact. From far away it may cycle,
+and then it says so.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,11 +33,14 @@ from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
 from .gcr import Directions, gaps_on
 from .projected import DIRECTIONS, Projected, extension_on
-from .stripes import OnSet, Plain
+from .stripes import OnSet, Plain, Stripes
 
-MAX_STEPS_TO_HALVE = 20  # tuning: projected steps in which the certificate must halve
-FAR, FEW = 0.3, 4  # tuning: while the certificate is guessed above FAR, the set is so wrong that FEW linear steps do
-WAYS = 2 * ((3, 0.005), (1, 0.05))  # tuning: rounds of linear steps on a set, and what they reduce its residual to
+MAX_STEPS_TO_HALVE, STRIPED_STEPS_TO_HALVE = 20, 8  # tuning: projected steps in which the certificate must halve; the
+# latter where the body is soft along stripes
+REDUCTION, LEAST_REDUCTION = 0.05, 1e-3  # tuning: what linear steps on a set reduce its residual to, at first and at
+# least
+SETTLING = 0.7  # tuning: sets settle while each has at most so many times the new points of the last one
+ROUNDS = 3  # tuning: of linear steps on a set
 MAX_DIRECTIONS = 10  # tuning: of the linear steps on a set
 LOST = 1.0 / float(np.finfo(np.float64).eps)  # accuracy: a guess with which no digit of the load is left
 LOOSE = 1.5e-3  # accuracy: tolerance with which directions beyond the projected steps' are in single precision: with a
@@ -73,8 +77,8 @@ class SteadySolver:
     the tolerance is loose.
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
-    certificate; `max_steps` of the linear solves in all; `directions` kept in each; whether residuals are carried on in
-    a `narrow` neighbourhood of the set only, as they always are on a line of points.
+    certificate; `max_steps` of the linear solves in all; `directions` kept in each; the axis `along` which the surface
+    slides where the body is far softer along stripes (`stripes`), else None.
     """
 
     def __init__(
@@ -86,14 +90,17 @@ class SteadySolver:
         tolerance: float,
         max_steps: int,
         directions: int = MAX_DIRECTIONS,
-        narrow: bool = False,
+        along: int | None = None,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self.constraint = NonNegative()
-        self._projected = Projected(slab, operator, preconditioner, self.constraint, narrow)
+        self._projected = Projected(slab, operator, preconditioner, self.constraint)
         kept = precision_of_directions(tolerance, LOOSE)
-        on_sets = self._on_sets(preconditioner)
+        self._striped = along is not None
+        on_sets: OnSet = Plain(preconditioner)
+        if along is not None:
+            on_sets = Stripes(slab, preconditioner, self._projected.extended, along)
         self._linear = Directions(slab, operator, on_sets, directions, kept, self._projected.pairs)
         self._u = slab.zeros()
         self._length = height  # of the last certificate
@@ -118,10 +125,6 @@ class SteadySolver:
             start.fill(0.0)
             return SteadyContact(start, self._u, math.nan, nothing, 0, 0, 0, "no point is left that carries load")
 
-    def _on_sets(self, preconditioner: Operator) -> OnSet:
-        """Return the preconditioner of linear solves on a set."""
-        return Plain(preconditioner)
-
     def judge(self, operator: Operator, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, such as a solution, for another operator, whose
         image of it is then `u`. Collective."""
@@ -129,25 +132,26 @@ class SteadySolver:
         return self._certify(p, h, mean)
 
     def _solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
-        if not self.slab.sum(kernels.total(start))[0] > 0.0:
+        cold = not self.slab.sum(kernels.total(start))[0] > 0.0
+        if cold:
             start.fill(mean)
-        d, certificate, projections = self._project(start, h, mean, (True, False), MAX_STEPS_TO_HALVE)
+        d, certificate, projections = self._project(start, h, mean)
         if certificate.worst <= self.tolerance:
             return SteadyContact(start, self._u, d, certificate, projections, 0, 0, "")
+        if cold and self._striped:
+            start.fill(mean)
+            self._working.fill(True)
         return self._change_sets(start, h, mean, projections)
 
-    def _project(
-        self, p: Array, h: Array, mean: float, ways: Sequence[bool], steps_to_halve: int
-    ) -> tuple[float, Certificate, int]:
-        """Projected steps as long as they halve the certificate in so many, in one way and then in the next: the load
-        is restored near by, or not."""
+    def _project(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate, int]:
+        """Projected steps as long as they help: in one way and, but where the active set is as good, in the other."""
         self._admit(p, mean)
         d, certificate = self._certify(p, h, mean)
-        steps = 0
-        for near_by in ways:
+        steps, limit = 0, STRIPED_STEPS_TO_HALVE if self._striped else MAX_STEPS_TO_HALVE
+        for near_by in (True,) if self._striped else (True, False):
             best, since = certificate.worst, 0
             self._projected.begin(near_by)
-            while certificate.worst > self.tolerance and since < steps_to_halve:
+            while certificate.worst > self.tolerance and since < limit:
                 self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
                 d, certificate = self._certify(p, h, mean)
                 steps += 1
@@ -156,46 +160,60 @@ class SteadySolver:
         return d, certificate, steps
 
     def _change_sets(self, x: Array, h: Array, mean: float, projections: int) -> SteadyContact:
-        """The active set, from the set of the pressure x.
+        """The active set, from the marked one, under the pressure x.
 
-        What a linear solve leaves of its residual makes wrong points of the next set, so the first way is to solve
-        well. Sets may stall still, as single points are left out that should be in contact and make the linear solves
-        slow. Then all points as near as the solution seems to be wrong are taken in, and the other way goes on.
+        What a linear solve leaves of its residual makes wrong points of the next set. So where the sets do not settle,
+        linear solves go further. Sets may stall still, as single points are left out that should be in contact and make
+        the linear solves slow. Then all points as near as the solution seems to be wrong are taken in, once. The set of
+        a certified pressure that is no solution is no better than the one marked: that one goes on.
         """
-        u, slab, working, linear = self._u, self.slab, self._working, self._linear
-        kappa = KAPPA * self._stiffness()
-        guess, best, since, sets, steps = np.inf, np.inf, 0, 0, 0
-        (rounds, reduction), *others = WAYS
+        marked = self._projected.t[0]  # is free between linear steps
+        kappa, reduction = KAPPA * self._stiffness(), REDUCTION
+        best, since, sets, steps, before, taken_in = np.inf, 0, 0, 0, np.inf, False
         while True:
-            np.copyto(x, 0.0, where=~working)
-            total, members = slab.sum(kernels.total(x), float(np.count_nonzero(working)))
-            np.add(x, (mean * slab.points - total) / members, out=x, where=working)
-            self.operator.apply(x, u)
-            limit = FEW if guess > FAR else linear.count
-            for _ in range(1 if guess > FAR else rounds):
-                made = linear.improve(x, u, h, working, limit, reduction)
-                steps += max(1, made)
-                if made < limit:
-                    break
+            self._load(x, mean)
+            steps += self._solve_on_set(x, h, reduction)
             sets += 1
-            guess = self._next_set(x, h, kappa)
-            if guess <= self.tolerance:
-                self._admit(x, mean)
-                d, certificate = self._certify(x, h, mean)
-                if certificate.worst <= self.tolerance:
-                    return SteadyContact(x, u, d, certificate, projections, sets, steps, "")
-                guess = certificate.worst
+            guess, changed = self._next_set(x, h, kappa)
+            if changed > SETTLING * before:
+                reduction = max(0.3 * reduction, LEAST_REDUCTION)
+            before = changed
             since = 0 if guess < best else since + 1
             best = min(best, guess)
-            if since >= MAX_STALLED_SETS and others:
-                (rounds, reduction), *others = others
+            if since >= MAX_STALLED_SETS and not taken_in:
                 self._take_in(h, best * self._length)
-                best, since = np.inf, 0
-            if not guess < LOST or since >= MAX_STALLED_SETS or steps >= self.max_steps:
+                best, since, taken_in = np.inf, 0, True
+            stopped = not guess < LOST or since >= MAX_STALLED_SETS or steps >= self.max_steps
+            if stopped or guess <= self.tolerance:
+                marked[...] = self._working
                 self._admit(x, mean)
                 d, certificate = self._certify(x, h, mean)
                 failure = self._failure(certificate, since, steps)
-                return SteadyContact(x, u, d, certificate, projections, sets, steps, failure)
+                if stopped or not failure:
+                    return SteadyContact(x, self._u, d, certificate, projections, sets, steps, failure)
+                np.not_equal(marked, 0.0, out=self._working)
+
+    def _load(self, x: Array, mean: float) -> None:
+        """Make x 0 outside the set, and its sum that of the load: by the same on all points of the set, or in
+        proportion where waves as long as the box are far softer than others; and u its image."""
+        slab, working = self.slab, self._working
+        np.copyto(x, 0.0, where=~working)
+        total, members = slab.sum(kernels.total(x), float(np.count_nonzero(working)))
+        if self._striped:
+            self.constraint.give_load(slab, x, total, mean * slab.points)
+        else:
+            np.add(x, (mean * slab.points - total) / members, out=x, where=working)
+        self.operator.apply(x, self._u)
+
+    def _solve_on_set(self, x: Array, h: Array, reduction: float) -> int:
+        """Linear steps on the set, and how many."""
+        linear, steps = self._linear, 0
+        for _ in range(ROUNDS):
+            made = linear.improve(x, self._u, h, self._working, linear.count, reduction)
+            steps += max(1, made)
+            if made < linear.count:
+                break
+        return steps
 
     def _stiffness(self) -> float:
         """Pressure on one point over the displacement it causes there; collective."""
@@ -218,14 +236,14 @@ class SteadySolver:
         )
         return f"{reason}: the residual is {certificate.worst:.3g} where {self.tolerance:.3g} was asked for"
 
-    def _next_set(self, x: Array, h: Array, kappa: float) -> float:
-        """Mark the next set; returns how far from a solution x seems to be."""
+    def _next_set(self, x: Array, h: Array, kappa: float) -> tuple[float, float]:
+        """Mark the next set; returns how far from a solution x seems to be, and how many points came or went."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
         *sums, deepest = self.constraint.choose(x, self._u, h, gaps / count, kappa, self._working)
-        positive, negative, wrong, members, deepest = self.slab.reduce(sums, [deepest])
+        positive, negative, wrong, members, changed, deepest = self.slab.reduce(sums, [deepest])
         if members == 0.0 or positive <= 0.0:
-            return np.inf
-        return max(wrong / positive / self._length, deepest / self._length, negative / positive)
+            return np.inf, changed
+        return max(wrong / positive / self._length, deepest / self._length, negative / positive), changed
 
     def _take_in(self, h: Array, gap: float) -> None:
         """Add the points to the set that are at most this far from the surface."""
