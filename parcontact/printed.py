@@ -9,10 +9,10 @@ MOST_DIGITS = 6  # of a number with an error
 def prefixed(unit: str, largest: float) -> tuple[str, float]:
     """Return the unit with the prefix that suits the largest value, and its size in the unit without one.
 
-    Squares, m², go up by a million; they keep the larger unit down to a thousandth of it. No unit and degrees have no
-    prefix, and there are no kiloseconds.
+    Squares, m², go up by a million; they keep the larger unit down to a thousandth of it. No unit, degrees and
+    cubes have no prefix, and there are no kiloseconds.
     """
-    if unit in ("", "°C") or not largest:
+    if unit in ("", "°C", "m³") or not largest:
         return unit, 1.0
     square = unit == "m²"
     order = math.log10(abs(largest)) + 1e-9

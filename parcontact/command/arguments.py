@@ -106,7 +106,8 @@ def _surface(add: Add) -> None:
 def _plot(add: Add) -> None:
     add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run or curve")
     add("--format", choices=("png", "pdf", "svg"), default="", help="default: that of --out, else png")
-    text = "which panels, in this order: friction,area,approach,gap,pressure,load,energy,steady,maps (default: all)"
+    names = "friction,area,approach,gap,pressure,load,energy,leakage,steady,maps"
+    text = f"which panels, in this order: {names} (default: all)"
     add("--panels", metavar="NAME,...", type=values.names, default=(), help=text)
     text = "what is along the x axis (default: as the job suggests)"
     add("--over", choices=("time", "distance", "velocity", "load", "approach"), default="", help=text)
@@ -127,6 +128,8 @@ def _leak(add: Add) -> None:
     add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run that has saved its gaps")
     text = "only the gap after this step (a whole number), or nearest to this time, as 2.5 [s] (default: all)"
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)
+    text = "what is along the x axis (default: pressure, or time if the pressure stays)"
+    add("--over", choices=("pressure", "time"), default="", help=text)
 
 
 def _report(add: Add) -> None:

@@ -222,7 +222,7 @@ def leak(options: argparse.Namespace) -> int:
     from ..report.leak import write
 
     for directory in options.directories:
-        print(*write(directory, options.at or "", world), sep="\n", end="\n" if world.rank == 0 else "")
+        print(*write(directory, options.at or "", options.over, world), sep="\n", end="\n" if world.rank == 0 else "")
     return DONE
 
 

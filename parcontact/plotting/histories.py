@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..parallel.slab import Array
 from ..storage import tables
 from ..storage.row import UNITS
-from . import style, units
+from . import conductivity, style, units
 from .charts import Axis, Chart, Series
 from .run import Run
 
@@ -24,6 +24,7 @@ ENERGIES = {
     "surfaces": "surface_energy",
     "snaps": "snap_loss",
 }
+FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # of a run that has calculated its leakage
 VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
@@ -117,6 +118,11 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
             found = Chart(key, along.axis, axis, along.series(lines), bottom=key != "approach")
             peak = key == "friction"
             yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
+    if "flow_x" in columns and max(np.nanmax(columns[name], initial=0.0) for name in FLOWS) > 0.0:
+        rows = slice(None) if along.rows is None else along.rows
+        flows = {told: columns[name][rows] for name, told in FLOWS.items()}
+        narrowest = dict.fromkeys(flows, columns["constriction"][rows])
+        yield conductivity.chart(along.axis, along.values, flows, narrowest)
 
 
 def describe_solve(run: Run) -> str:

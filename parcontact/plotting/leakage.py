@@ -1,6 +1,7 @@
 """A picture of leakage: where the fluid flows through the gap, and how much over load or time."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
 from ..leakage.flow import Flow, Map
-from . import style, units
+from ..storage.row import UNITS
+from . import charts, conductivity, style, units
 from .style import Panel
 
 DECADES = 3  # of the flow that are told apart by colour
+SAME = 1e-6  # rounding: relative: pressures this close are one
+KINDS = ("flow", "constriction")  # of the columns of a direction
 LONG = 100.0  # ratio of times, beyond which their axis is logarithmic
 
 
@@ -24,6 +28,7 @@ def draw(
     fluxes: Sequence[Map],
     instant: str,
     rows: Sequence[Any],
+    over: str = "",
 ) -> Path:
     """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants."""
 
@@ -34,30 +39,30 @@ def draw(
 
         return panel
 
-    def over(axes: Axes) -> None:
-        columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
-        over_time = np.unique(columns["pressure"]).size < np.unique(columns["time"]).size
-        name, unit = ("time", "s") if over_time else ("pressure", "Pa")
-        for number, direction in enumerate("xy"):
-            conductivity = np.where(columns[f"flow_{direction}"] > 0.0, columns[f"flow_{direction}"], np.nan)
-            closed = np.count_nonzero(np.isnan(conductivity))
-            label = f"along {direction}" + f", closed at {closed} of {len(rows)} instants" * bool(closed)
-            axes.plot(columns[name], conductivity, marker=".", label=label, **style.line(number))
-        axes.set_yscale("log")
-        units.label(axes.xaxis, name, unit)
-        axes.set_ylabel("K [m³]")
-        axes.set_title("conductivity of the gap")
-        times = columns[name][columns[name] > 0.0]
-        if over_time and times.size and times.max() > LONG * times.min():
-            axes.set_xscale("log")
-        axes.legend()
-
     with style.drawing():
         circled = ", constriction circled" * any(flow.percolates for flow in flows)
         title = f"flow through the gap, {instant}\ncontact black{circled}"
-        curve = [over] if len(rows) > 1 and any(row.constriction > 0.0 for row in rows) else []
+        curve = [partial(charts.draw, chart_of(rows, over))] if any(row.constriction > 0.0 for row in rows[1:]) else []
         maps = [flow_map(axis, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
         return style.save(style.figure_of(title, [maps, curve] if curve else [maps]), path)
+
+
+def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
+    """Return the chart of K `over` pressure or time: without a choice over time if a pressure comes more than once.
+
+    Over pressure the last one of instants that follow each other at one pressure stands for all of them.
+    """
+    columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
+    pressure, time = columns["pressure"], columns["time"]
+    same = SAME * float(np.nanmax(np.abs(pressure), initial=0.0))
+    different = np.abs(np.diff(pressure)) > same
+    over = over or ("pressure" if different.all() or not np.ptp(time) else "time")
+    kept = np.append(different, True) if over == "pressure" else np.full(len(rows), True)
+    at = columns[over][kept]
+    flows, narrowest = ({f"along {axis}": columns[f"{name}_{axis}"][kept] for axis in "xy"} for name in KINDS)
+    later = at[at > 0.0]
+    log_x = over == "time" and later.size > 0 and bool(later.max() > LONG * later.min())
+    return conductivity.chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x)
 
 
 def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux: Map) -> None:

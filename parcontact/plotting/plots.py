@@ -24,7 +24,7 @@ from . import charts, histories, maps, steady, style, sweep, units
 from .charts import Chart
 from .run import Run, label_frames
 
-PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "steady", "maps")
+PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "leakage", "steady", "maps")
 MEASURES = "measures.csv"
 FRAMES = 200  # of a movie at most: instants in between are left out
 SECONDS = 8.0  # for which a movie plays, unless its frames are too few

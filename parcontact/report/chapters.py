@@ -19,7 +19,7 @@ KINDS = {  # by the table that each of them has
     "study.csv": ("study", results.describe_study),
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
-MORE_TABLES = ("theory.csv", "steady_waves.csv", "steady_theory.csv", "sweep_mean.csv")
+MORE_TABLES = ("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "sweep_mean.csv")
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that other sections show
 
 
@@ -37,7 +37,7 @@ def describe_directory(directory: Path) -> Chapter:
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
         sections += [asked, material.section(job), road.section(job)]
         if there[0] in ("measures.csv", "steady.csv"):
-            sections += origin.costs(directory / there[0], found, job.numerics.asked.both)
+            sections += origin.costs(directory / there[0], found, job)
         cited = origin.list_citations(job)
         sections.append(Section("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]

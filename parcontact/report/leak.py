@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 from typing import NamedTuple
 
 import h5py
@@ -12,12 +13,12 @@ from .. import scene
 from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
-from ..leakage.flow import Flow, Leak, Map, leak, solve_flow
+from ..leakage.flow import Flow, Leak, Map, leak, mesh_error, solve_flow
 from ..parallel.groups import Groups
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
-from ..plotting import leakage
+from ..plotting import conductivity, leakage
 from ..plotting.run import Fields, Run
 from ..printed import per_cent, quantity
 from ..storage import files, hdf5, tables
@@ -30,7 +31,8 @@ class Instant(NamedTuple):
     """One row of leak.csv.
 
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
-    touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path.
+    touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path of the direction
+    that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.mesh_error`).
     """
 
     time: float
@@ -43,6 +45,17 @@ class Instant(NamedTuple):
     constriction: float
     share_x: float
     share_y: float
+    constriction_x: float
+    constriction_y: float
+    error_x: float
+    error_y: float
+
+
+class Solved(NamedTuple):
+    """The flow at an instant, without its maps, and the error that the mesh makes along x and along y."""
+
+    leak: Leak
+    errors: tuple[float, float]
 
 
 class Gaps:
@@ -90,10 +103,9 @@ class Gaps:
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
-    def solve(self, index: int, comm: MPI.Intracomm) -> tuple[Leak, list[Map]]:
-        """Return the flow at a saved instant, without its maps of pressure, and on root for both directions where it
-        is; collective."""
-        gaps, flows, shown = list[Map](), list[Flow](), list[Map]()
+    def solve(self, index: int, comm: MPI.Intracomm) -> tuple[Solved, list[Map]]:
+        """Return the flow at a saved instant, and on root for both directions where it is; collective."""
+        gaps, flows, errors, shown = list[Map](), list[Flow](), list[float](), list[Map]()
         on_root(comm, lambda: gaps.append(self.read(index)))
         gap = gaps[0] if gaps else None
         for axis in ("x", "y"):
@@ -101,10 +113,12 @@ class Gaps:
             if gap is not None:
                 shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
-        return Leak(*flows), shown
+            errors.append(mesh_error(gap, flow, self.size, axis, self.periodic, comm))
+        return Solved(Leak(*flows), (errors[0], errors[1])), shown
 
-    def row(self, index: int, found: Leak, bare: Leak | None) -> Instant:
+    def row(self, index: int, solved: Solved, bare: Leak | None) -> Instant:
         """Return the row of a saved instant."""
+        found = solved.leak
         rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
         row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in Instant._fields[1:3]}
         return Instant(
@@ -118,12 +132,15 @@ class Gaps:
             found.constriction,
             found.flow_x / bare.flow_x if bare and bare.flow_x else np.nan,
             found.flow_y / bare.flow_y if bare and bare.flow_y else np.nan,
+            found.along_x.constriction,
+            found.along_y.constriction,
+            *solved.errors,
         )
 
 
-def write(directory: Path, at: str, comm: MPI.Intracomm) -> Iterator[str]:
+def write(directory: Path, at: str, over: str, comm: MPI.Intracomm) -> Iterator[str]:
     """Solve for the flow of the saved instants and write leak.csv and leak.png; of one instant leak.STEP.csv and
-    leak.STEP.png. Collective: groups of ranks take an instant each.
+    leak.STEP.png, with K `over` pressure or time, "" for a choice. Collective: groups of ranks take an instant each.
 
     Yields, on root, what to say. Raises InputError for a directory without gaps.
     """
@@ -139,25 +156,25 @@ def write(directory: Path, at: str, comm: MPI.Intracomm) -> Iterator[str]:
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
     files.write(table, "\n".join(lines) + "\n")
     instant = Run(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
-    leakage.draw(
-        picture, gaps.size, gaps.read(drawn), (leaks[drawn].along_x, leaks[drawn].along_y), maps, instant, rows
-    )
+    flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
+    leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
-    yield from (_describe_closure(rows, axis) for axis in "xy")
+    yield from (text for axis in "xy" for text in _describe(rows, axis))
+    yield from _describe_missing(gaps, at)
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
     yield f"picture: {picture}"
 
 
-def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Leak], int, list[Map]]:
+def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Solved], int, list[Map]]:
     """Return, on root, the flow at all instants, the one to draw and its maps: the last that has a flow in both
     directions, or else in one; collective."""
-    mine, drawn, maps, problem = dict[int, Leak](), (-1, -1), list[Map](), ""
+    mine, drawn, maps, problem = dict[int, Solved](), (-1, -1), list[Map](), ""
     groups = Groups(comm, min(len(gaps.shown), int(comm.size * min(1.0, MOST_CELLS / gaps.cells))))
     try:
         for index in gaps.shown[groups.number :: groups.count]:
             mine[index], found = gaps.solve(index, groups.comm)
-            directions = mine[index].along_x.percolates + mine[index].along_y.percolates
+            directions = mine[index].leak.along_x.percolates + mine[index].leak.along_y.percolates
             if (directions, index) > drawn:
                 drawn, maps = (directions, index), found
     except (InputError, *hdf5.FAILURES) as error:
@@ -176,6 +193,31 @@ def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
         return leak(gaps.bare(), gaps.size, gaps.periodic), ""
     except (InputError, OSError) as error:
         return None, " ".join(str(error).split())
+
+
+def _describe(rows: Sequence[Instant], axis: str) -> Iterator[str]:
+    """Say of an axis when contact closes the gap, how far K depends on the mesh, and where it has no meaning."""
+    yield _describe_closure(rows, axis)
+    errors = [error for row in rows if (error := getattr(row, f"error_{axis}")) == error]
+    if errors:
+        much = per_cent(median(errors))
+        if len(errors) > 1:
+            much += f" in the median of the instants, and by {per_cent(max(errors))} at most"
+        yield f"along {axis} K of every second point of the gap differs by {much}"
+    thin = [row for row in rows if conductivity.is_thin(getattr(row, f"constriction_{axis}"))]
+    if thin:
+        where = f"{len(thin)} of {len(rows)} instants, first at t = {quantity(thin[0].time, 's')}"
+        yield f"along {axis} the constriction is below 10 nm at {where}: K means little, as no fluid is a continuum"
+
+
+def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
+    """Name the stages at whose end no gap is saved, of a run all of whose instants are shown."""
+    run = Run(gaps.directory)
+    saved = set(gaps.fields.steps[gaps.shown].tolist())
+    ends = {index: int(run.columns["step"][rows[-1]]) for index, rows in run.rows_of_stages.items()}
+    names = [run.job.history[index].name for index, step in ends.items() if step not in saved]
+    if names and not at:
+        yield f"no gap is saved at the end of {', '.join(names)}: output: {{every: 1}} saves those of all steps"
 
 
 def _describe_closure(rows: Sequence[Instant], axis: str) -> str:

@@ -21,10 +21,10 @@ FRICTION = ERRORS[0]
 NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
 
 
-def costs(table: Path, found: log.Log, asked: tuple[float, float]) -> Iterator[Section]:
-    """Yield the errors of a run or a curve, given by its table, then wall time, operator calls and what was counted."""
+def costs(table: Path, found: log.Log, job: Job) -> Iterator[Section]:
+    """Yield the errors of a run or a curve of a job, given by its table, then wall time, operator calls and counts."""
     columns = read_table(table)
-    yield describe_errors(columns, found.estimates, asked, table.name == "steady.csv")
+    yield describe_errors(columns, found.estimates, job, table.name == "steady.csv")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [
         ("steps or points", str(len(columns["seconds"]))),
@@ -40,19 +40,19 @@ def costs(table: Path, found: log.Log, asked: tuple[float, float]) -> Iterator[S
 def describe_errors(
     columns: Mapping[str, Sequence[float]],
     estimates: Sequence[log.Estimate],
-    asked: tuple[float, float],
+    job: Job,
     of_curve: bool,
 ) -> Section:
     """Return nothing for a table without errors, else those of the points of a friction curve, or of the means over a
     run and of its steps. The log has the parts: of a curve those of the worst point, if that misses the accuracy."""
     known = {what: [float(one) for one in columns.get(name, ()) if one == one] for name, what in NAMES.items()}
     if not of_curve:
-        known[NAMES[FRICTION]] = _in_motion(columns)
+        known[NAMES[FRICTION]] = _in_motion(columns) if job.directions else []
     known = {what: values for what, values in known.items() if values}
     if not known:
         return Section("Error budget")
     found = {one.name: one for one in estimates if one.of_curve == of_curve}
-    said, accuracies = [], dict(zip(NAMES.values(), asked, strict=True))
+    said, accuracies = [], dict(zip(NAMES.values(), job.numerics.asked.both, strict=True))
     for name, values in known.items() if of_curve else ((name, [one.total / 100]) for name, one in found.items()):
         if not of_curve:
             said.append(f"{found[name].sentence}.")

@@ -43,7 +43,7 @@ def describe_run(directory: Path) -> Section:
     rows = [
         (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
         for name, values in known.items()
-        if values
+        if values and (run.job.directions or not name.startswith("friction"))
     ]
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     told = [

@@ -4,6 +4,7 @@ Two forms are read. Both name what their columns are; nothing is guessed.
 
 * Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between them):
   `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K), `tan_del`.
+  E(t) and G(t) are relaxation moduli, too.
 * One header row in which units stand in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, any white space or comma between; or
   words with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, a comma, semicolon or tab between.
   A modulus without the word shear is Young's.
@@ -39,6 +40,7 @@ WORDS = {  # in small letters, as instruments write them
     **{"frequency": "f", "f_set": "f", "angular frequency": "omega", "w": "omega", "ω": "omega", "time": "t"},
     **{"temperature": "T", "temp": "T", "storage modulus": "E_stor", "loss modulus": "E_loss"},
     **{"shear storage modulus": "G_stor", "shear loss modulus": "G_loss", "relaxation modulus": "E_relax"},
+    **{"e(t)": "E_relax", "g(t)": "G_relax"},
     **{"shear relaxation modulus": "G_relax", "tan delta": "tan_del", "tan(delta)": "tan_del", "tan_delta": "tan_del"},
     **{"tan d": "tan_del", "tan δ": "tan_del", "tanδ": "tan_del", "loss factor": "tan_del"},
 }
@@ -202,7 +204,7 @@ class _Table:
                 return modulus
         raise InputError(
             f"{self.path} has the columns {', '.join(self.values)}; it needs f or omega with E_stor and E_loss (or "
-            "G_stor and G_loss), or t with E_relax (or G_relax)"
+            "G_stor and G_loss), or t with E_relax, also spelt E(t) (or G_relax, G(t))"
         )
 
     def _column(self, name: str, units: dict[str, float]) -> Array:

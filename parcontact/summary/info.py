@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..job import Job
 from ..job.resolved import RESOLVED, shown_job
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
@@ -157,13 +158,20 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     if ended and claim is not None and claim.detached:
         yield f"  {claim.detached}"
     yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
-    last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in LAST_ROW.items() if name in columns]
+    resolved = table.with_name(RESOLVED)
+    job = shown_job(resolved) if resolved.exists() else None
+    names = {name: unit for name, unit in LAST_ROW.items() if name in columns and (name != "friction" or _slides(job))}
+    last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in names.items()]
     yield f"  last row: {', '.join(last)}"
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
-    if (resolved := table.with_name(RESOLVED)).exists():
-        job = shown_job(resolved)
+    if job is not None:
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
         yield from (f"  {text}" for text in describe_pull_off(columns, job.grid.lx * job.grid.ly))
+
+
+def _slides(job: Job | None) -> bool:
+    """Return whether something slides in a job: else friction is noise. Of a job that is not there it may."""
+    return job is None or bool(job.directions)
 
 
 def describe_pull_off(columns: Mapping[str, list[Any]], area: float) -> Iterator[str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from parcontact.errors import InputError
-from parcontact.leakage.flow import Map, leak, solve_flow
+from parcontact.leakage.flow import Map, leak, mesh_error, solve_flow
 
 
 def wave(points: int, depth: float) -> Map:
@@ -24,6 +24,23 @@ def test_flow_across_the_crests_of_a_wave() -> None:
     """K = h0^3 (1 - eps^2)^2.5 / (1 + eps^2 / 2): 1 over the mean of 1/g^3; the error falls faster than any power."""
     exact = 0.75**2.5 / 1.125
     assert solve_flow(wave(64, 0.5), (1.0, 1.0), "x").conductivity == pytest.approx(exact, rel=1e-12)
+
+
+def test_error_by_the_mesh() -> None:
+    """Gaps in a row resist one after the other: K = n/sum(1/g^3), of the even ones and of the odd ones alike. Side by
+    side K is the mean of g^3. Where contact closes no error is known."""
+    gaps = np.random.default_rng(1).uniform(0.5, 1.5, 32)
+    gap = np.broadcast_to(gaps, (8, 32))
+    whole, even, odd = (len(each) / float(np.sum(each**-3.0)) for each in (gaps, gaps[::2], gaps[1::2]))
+    found = mesh_error(gap, solve_flow(gap, (2.0, 1.0)), (2.0, 1.0))
+    assert found == pytest.approx(max(abs(even / whole - 1.0), abs(odd / whole - 1.0)), rel=1e-12)
+    assert found > 1e-3
+    row = gap[:1]
+    assert mesh_error(row, solve_flow(row, (2.0, 1.0)), (2.0, 1.0)) == pytest.approx(found, rel=1e-12)
+    whole, even, odd = (float(np.mean(each**3.0)) for each in (gaps, gaps[::2], gaps[1::2]))
+    beside = mesh_error(gap, solve_flow(gap, (2.0, 1.0), "y"), (2.0, 1.0), "y")
+    assert beside == pytest.approx(max(abs(even / whole - 1.0), abs(odd / whole - 1.0)), rel=1e-12)
+    assert np.isnan(mesh_error(0.0 * gap, solve_flow(0.0 * gap, (2.0, 1.0)), (2.0, 1.0)))
 
 
 def checkerboard(points: int, second: float) -> Map:

@@ -168,6 +168,15 @@ def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
         assert price.mesh_error(seen, name) == pytest.approx(parts.mesh, rel=1e-6)
 
 
+def test_friction_has_no_price_where_nothing_slides() -> None:
+    """Waves that are pressed have tangential forces by rounding and by the mesh, which are noise."""
+    planned = job(history=[{"pressure": 1e4, "duration": 1e-3, "time_step": 2.5e-4}])
+    seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
+    assert seen.total("area weight") > 0.0
+    assert seen.total("friction weight") == 0.0
+    assert next(price.table(costs_of(planned, seen, 1e30))) == "cost of an accuracy of the contact area"
+
+
 def test_the_table() -> None:
     """As a user reads it: one line for the job, one for each accuracy."""
     seen = costs(job(), time=1e-3, mesh=8.8e-3)

@@ -11,11 +11,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from drawing import ELASTIC, LOADS, SLIDE, STRIP, WAVE, ZENER, ran
+from drawing import ELASTIC, LOADS, MAPS, SLIDE, STRIP, WAVE, ZENER, ran
 from mpi4py import MPI
 from PIL import Image
 
-from parcontact import job
+from parcontact import __main__, job
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 from parcontact.report import log, origin, page
@@ -154,7 +154,9 @@ def test_the_errors_of_a_run(tmp_path: Path, total: str, told: str) -> None:
     (tmp_path / "run.log").write_text("".join(lines))
     columns = {"error_friction": [16.0, 0.02, 0.03, np.nan], "error_area": [np.nan] * 4}  # the first one at rest
     columns["distance"] = [0.0, 1.0, 2.0, 3.0]
-    section = origin.describe_errors(columns, log.read(tmp_path).estimates, (0.01, 0.01), of_curve=False)
+    (tmp_path / "job.yaml").write_text(WAVE + ZENER + SLIDE + "numerics: {accuracy: 0.01}\n")
+    slide = job.load(tmp_path / "job.yaml")
+    section = origin.describe_errors(columns, log.read(tmp_path).estimates, slide, of_curve=False)
     assert section.sentences == [
         f"{said.format(total)}.",
         f"The accuracy of 1 % that was asked for friction (numerics.accuracy) {told}",
@@ -163,6 +165,18 @@ def test_the_errors_of_a_run(tmp_path: Path, total: str, told: str) -> None:
     assert parts.head == ("estimated error of", "in all", "solver", "time", "folded", "mesh")
     assert parts.rows == [("friction", f"{total} %", "0.25 %", "1 %", "0 %", "4e-05 %")]
     assert ends.rows == [("friction", "3 %", "3 %")]
+
+
+def test_a_seal(tmp_path: Path) -> None:
+    """Where nothing slides no error of friction is told; the table of leakage is in the data."""
+    out = ran(tmp_path, WAVE + ELASTIC + LOADS + MAPS)
+    resting, columns = job.load(out / "job.resolved.yaml"), {"error_friction": [16.0, 8.0], "error_area": [0.1, 0.2]}
+    section = origin.describe_errors({**columns, "distance": [0.0, 0.0]}, [], resting, of_curve=False)
+    assert [row[0] for row in section.tables[0].rows] == ["contact area"]
+    assert __main__.main(["leak", str(out)]) == 0
+    found = Page(page.write([out]).read_text())
+    check(found)
+    assert found.downloads["leak.csv"] == (out / "leak.csv").read_bytes()
 
 
 def test_two_curves_together(tmp_path: Path) -> None:

@@ -48,9 +48,10 @@ def test_all_forms_mean_the_same(tmp_path: Path, form: str) -> None:
     assert_allclose(one.loss, 1e6 * loss / 3, rtol=1e-14)
 
 
-def test_relaxation(tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", ["t[s] G_relax[kPa] T[K]", "t[s] G(t)[kPa] T[K]", "t G(t) T\ns kPa K"])
+def test_relaxation(tmp_path: Path, head: str) -> None:
     path = tmp_path / "rubber.csv"
-    path.write_text("t[s] G_relax[kPa] T[K]\n1.0 5 293.15\n0.1 9 293.15\n10 4 293.15\n")
+    path.write_text(f"{head}\n1.0 5 293.15\n0.1 9 293.15\n10 4 293.15\n")
     found = tables.read(path)
     (one,) = found.sets
     assert found.kind == "time"

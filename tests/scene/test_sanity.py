@@ -96,6 +96,22 @@ def test_strains_are_judged_after_relaxation() -> None:
     assert [text.split(":")[0] for text in said({"pressure": 1e7}, hold(1.0), hold(9.0))] == ["history.2.pressure"]
 
 
+def test_rubber_under_several_loads_at_one_instant() -> None:
+    """It does not relax: not so of elastic bodies, of one load, before a stage that lasts, or of a steady start."""
+    loads = [PRESS, {"pressure": 2e4}]
+
+    def said(history: list[Json], **changes: Any) -> list[str]:
+        return [text for text in job_of(WAVE, history, **changes).warnings if "last no time" in text]
+
+    (text,) = said(loads, material=ZENER)
+    assert "its 2 stages last no time" in text
+    assert "of 2e+06 Pa; give them a duration [s] to let it relax to 1e+06 Pa" in text
+    assert not said(loads)
+    assert not said(loads[:1], material=ZENER)
+    assert not said([*loads, {**PRESS, "duration": 1.0, "time_step": 0.1}], material=ZENER)
+    assert not said(loads, material=ZENER, initial={"state": "steady", "velocity": 0.1, "pressure": 1e4})
+
+
 @pytest.mark.parametrize(("slope", "told"), [(0.4, False), (0.6, True), (590.0, True)])
 def test_slopes_of_more_than_some_tenths(tmp_path: Path, slope: float, told: bool) -> None:
     """Of a job and of a file."""

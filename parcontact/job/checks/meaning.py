@@ -39,6 +39,7 @@ def warnings(job: Sections) -> Iterator[str]:
     yield from _slopes(job.grid, job.surface)
     yield from _moduli(material)
     yield from _pressures(job, material)
+    yield from _instants(job, material)
     yield from _band(job, material)
     yield from _imprints(job, material)
     if job.grid.boundary == "free":
@@ -133,6 +134,17 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
 
 
 # -- relaxation -------------------------------------------------------------------------------------------------------
+
+
+def _instants(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+    """Judge stages of a rubber that follow each other at one instant, and are all."""
+    timeless = len(job.history) > 1 and not any(stage.seconds for stage in job.history)
+    if timeless and material.instant_modulus > material.long_modulus and job.initial.state == "virgin":
+        yield (
+            f"history: its {len(job.history)} stages last no time, and the rubber is at its stiffest in all of them, "
+            f"with a shear modulus of {material.instant_modulus:.3g} Pa; give them a duration [s] to let it relax to "
+            f"{material.long_modulus:.3g} Pa"
+        )
 
 
 def _band(job: Sections, material: Elastic | Zener) -> Iterator[str]:

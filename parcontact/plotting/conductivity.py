@@ -1,0 +1,35 @@
+"""The chart of the conductivity of a gap: how much leaks over pressure or time, where contact closes, and where the
+constriction is too narrow for a fluid to be a continuum."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..parallel.slab import Array
+from . import style
+from .charts import Axis, Chart, Series
+
+CONTINUUM = 1e-8  # physics: gap [m] that some thirty molecules of water fill; in a narrower one no viscosity is known
+THIN = "constriction\nunder 10 nm"
+THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker": "o", "mfc": "none", "ms": 8}
+
+
+def is_thin(constriction: Any) -> Any:
+    """Return whether a fluid flows through a constriction [m], or through each of them, but not as a continuum."""
+    return (constriction > 0.0) & (constriction < CONTINUUM)
+
+
+def chart(
+    over: Axis, at: Array, flows: Mapping[str, Array], constrictions: Mapping[str, Array], log_x: bool = False
+) -> Chart:
+    """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
+    [m]; K is 0 where contact closes, and NaN where it is not known."""
+    lines, thin = list[Series](), list[Series]()
+    for number, (name, flow) in enumerate(flows.items()):
+        known = np.isfinite(flow)
+        lines.append(Series(name, at[known], flow[known], style.line(number) | {"marker": "."}))
+        narrow = known & is_thin(constrictions[name])
+        if narrow.any():
+            thin.append(Series(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
+    return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")
