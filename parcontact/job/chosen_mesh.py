@@ -1,8 +1,8 @@
 """Words that stand for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
 
 `auto` is the mesh of fewest points on which the errors are those of `numerics.accuracy`. It follows from the shortest
-wave of the surface, from the directions of sliding (`checks.cells`) and from a guess of the share in contact
-(`contact_share`). The mesh may make MESH_SHARE of the error of a march, whose time steps make the rest, and
+wave of the surface, from the directions of sliding (`checks.cells`) and from a guess of what touches
+(`contact_guess`). The mesh may make MESH_SHARE of the error of a march, whose time steps make the rest, and
 STEADY_SHARE of that of a friction curve.
 """
 
@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError
 
 from ..errors import InputError
 from .checks import cells
-from .contact_share import smallest_share
+from .contact_guess import guess
 from .model import Job, prepared
 from .sections.calculation import Accuracy, Grid, Numerics
 from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
@@ -75,15 +75,15 @@ def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -
     directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
     asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
-    contact = smallest_share(scenery, wave, box.lx * box.ly)
-    points = cells.choose(wave, box.size, directions, own, contact)
+    touching = guess(scenery, wave, box.lx * box.ly)
+    points = cells.choose(wave, box.size, directions, own, touching)
     dx, dy = (length / n for length, n in zip(box.size, points, strict=True))
     slides = " and ".join(f"({x:.3g}, {y:.3g})" for x, y in directions)
     return list(points), (
         f"mesh: {points[0]} x {points[1]} points, chosen by numerics.accuracy (friction {100 * asked.friction:g} %, "
         f"area {100 * asked.area:g} %): the shortest wave, {wave:.4g} m, has {wave / dx:.3g} cells along x and "
         f"{wave / dy:.3g} along y; {f'the surface slides along {slides}' if slides else 'nothing slides'}, "
-        f"with about {100 * contact:.2g} % in contact"
+        f"with about {100 * touching.share:.2g} % in contact"
     )
 
 

@@ -39,7 +39,7 @@ def test_more_accuracy_takes_more_points_where_it_pays(tmp_path: Path) -> None:
     coarse = points_of(tmp_path)
     finer = points_of(tmp_path, "numerics.accuracy.friction=0.01")
     for_area = points_of(tmp_path, "numerics.accuracy.area=0.01")
-    assert finer[0] > coarse[0] > coarse[1]
+    assert finer[0] > coarse[0] >= coarse[1]
     assert finer[0] / finer[1] > 2.0
     assert for_area[1] >= 2 * coarse[1]
     assert points_of(tmp_path, "numerics.accuracy=0.01") >= for_area

@@ -3,15 +3,16 @@
 Friction and the contact area come from slopes along the sliding: the mesh makes their errors along it, and little
 across. With c cells per shortest wave along the sliding and c' across it the relative errors are at most about
 
-    max(0.1/A, 1)^0.4 (1 - A)^2 hypot(along (4/c)^p, across (4/c')^q),
+    max(0.1/A, 1)^0.4 (1 - A)^1.5 exp(phi - 0.25) hypot(along (4/c)^p, across (4/c')^q),
 
 with numbers of their own for friction and area, where a share A is in contact: what is wrong is wrong at edges, and
-light contact is of small spots. They were found by experiment, with A as it is guessed before (`job.contact_share`):
-34 steady states of rough surfaces of 1 to 100 % contact on 40 meshes of 2.7 to 24 cells per shortest wave, so that nine
-of ten keep what is asked for. From mesh to mesh the errors of one surface scatter by a factor of 2.4 (one standard
-deviation), so that no law is sharp. `scripts/chosen_mesh.py` tells how the meshes that follow do on others. Along a
-direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing slides, either direction counts as the one
-along the sliding.
+light contact is of small spots. The phase phi of the modulus, in right angles, is that at the frequency of edges: the
+pressure of a body that loses energy there rises more steeply at one edge of a spot than at the other. They were found
+by experiment, with A and phi as they are guessed before (`job.contact_guess`): 80 steady states of rough surfaces of 1
+to 100 % contact on 40 to 70 meshes of 2.7 to 48 cells per shortest wave, so that nine of ten keep what is asked for.
+From mesh to mesh the errors of one surface scatter by a factor of 2.4 (one standard deviation), so that no law is
+sharp. `scripts/chosen_mesh.py` tells how the meshes that follow do on others. Along a direction (x, y) the cells of a
+grid are hypot(x dx, y dy). Where nothing slides, either direction counts as the one along the sliding.
 """
 
 from __future__ import annotations
@@ -27,8 +28,7 @@ from ..sections.stages import Initial, Stage, Steady
 Vector = tuple[float, float]
 
 LIGHT, SMALL_SPOTS = 0.1, 0.4  # accuracy: the share in contact below which spots are small, and the power of it
-OPEN = 2  # accuracy: power of the share that is open
-TYPICAL = 0.2  # accuracy: share in contact, where none is known
+OPEN = 1.5  # accuracy: power of the share that is open
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: with which more of them are advised for less
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across
@@ -48,10 +48,9 @@ class Law(NamedTuple):
     across: float
     order_across: float
 
-    def error(self, c: float, across: float, share: float) -> float:
-        """Return the relative error with so many cells along the sliding and across it, a share being in contact."""
-        parts = self.along * (4.0 / c) ** self.order_along, self.across * (4.0 / across) ** self.order_across
-        return (1.0 - share) ** OPEN * max(LIGHT / share, 1.0) ** SMALL_SPOTS * math.hypot(*parts)
+    def error(self, c: float, across: float) -> float:
+        """Return the relative error with so many cells along the sliding and across it, for a `Guess` of factor 1."""
+        return math.hypot(self.along * (4.0 / c) ** self.order_along, self.across * (4.0 / across) ** self.order_across)
 
     def cells_across(self, error: float) -> float:
         """Return how many cells across the sliding make this error."""
@@ -59,7 +58,25 @@ class Law(NamedTuple):
 
 
 FRICTION = Law(0.035, 1.9, 0.003, 2.5)  # accuracy
-AREA = Law(0.065, 1.2, 0.01, 2.0)  # accuracy: of the corrected area
+AREA = Law(0.055, 1.25, 0.018, 1.0)  # accuracy: of the corrected area
+
+
+class Guess(NamedTuple):
+    """What touches, before anything is solved: the share in contact, and the phase of the body's modulus at the
+    frequency of edges, in right angles."""
+
+    share: float
+    phase: float
+
+    @property
+    def factor(self) -> float:
+        """Return by how much errors are larger than where little is open, spots are large and the phase is usual."""
+        open_share, light = 1.0 - self.share, max(LIGHT / self.share, 1.0)
+        return open_share**OPEN * light**SMALL_SPOTS * math.exp(self.phase - USUAL_PHASE)
+
+
+USUAL_PHASE = 0.25  # accuracy
+TYPICAL = Guess(0.2, USUAL_PHASE)  # accuracy: where none is known
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:
@@ -92,7 +109,7 @@ def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[fl
     that slides along these directions (unit vectors); without any as many as along the sliding."""
     if not directions or any(abs(way[axis]) > ASIDE for way in directions):
         return cells_per_wave(asked.friction), cells_for_area(asked.area)
-    return cells_across(asked.friction), AREA.cells_across(asked.area)
+    return cells_across(asked.friction), AREA.cells_across(asked.area / TYPICAL.factor)
 
 
 def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Steady | None) -> list[Vector]:
@@ -124,16 +141,17 @@ def fast_length(least: float) -> int:
 
 
 def choose(
-    wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, share: float = TYPICAL
+    wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guess: Guess = TYPICAL
 ) -> tuple[int, int]:
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,
-    where it slides along these directions (unit vectors), or nowhere, and that share of it is in contact. Of meshes
-    with as many points it is the one with the fewest along a side."""
+    where it slides along these directions (unit vectors), or nowhere, and touches as is guessed. Of meshes with as many
+    points it is the one with the fewest along a side."""
+    within = asked.friction / guess.factor, asked.area / guess.factor
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     best = along_x[-1], along_y[-1]
     for ny in along_y:
         cells = lambda nx, ny=ny: (wave * nx / size[0], wave * ny / size[1])  # noqa: E731
-        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, asked, share))
+        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, within))
         if place < len(along_x):
             cx, cy = cells(along_x[place])
             if max(cx, cy) <= LONGEST * min(cx, cy):
@@ -149,14 +167,14 @@ def _fast_lengths(most: float) -> list[int]:
     return found
 
 
-def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, share: float) -> bool:
-    """Return whether cells per wave along x and y keep the errors asked for."""
+def _fits(cx: float, cy: float, directions: Sequence[Vector], within: tuple[float, float]) -> bool:
+    """Return whether cells per wave along x and y keep errors of friction and area within these."""
     if min(cx, cy) < LEAST_CELLS:
         return False
     for x, y in directions or ((1.0, 0.0), (0.0, 1.0)):
         c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-        if AREA.error(c, across, share) > asked.area:
+        if AREA.error(c, across) > within[1]:
             return False
-        if directions and FRICTION.error(c, across, share) > asked.friction:
+        if directions and FRICTION.error(c, across) > within[0]:
             return False
     return True

@@ -1,4 +1,4 @@
-"""The guess of the share in contact, against closed forms of spectra and of Persson's theory."""
+"""The guess of what touches, against closed forms of spectra, of Persson's theory and of moduli."""
 
 import math
 from typing import Any
@@ -6,14 +6,15 @@ from typing import Any
 import pytest
 
 from parcontact.job import Job
-from parcontact.job.contact_share import LEAST, MOST, UNKNOWN, slope_of, smallest_share
+from parcontact.job.checks.cells import Guess
+from parcontact.job.contact_guess import EDGES, LEAST, MOST, UNKNOWN, guess, slope_of
 from parcontact.job.sections.geometry import Rough
 
 WAVES: dict[str, Any] = {"hurst": 0.5, "long_wavelength": 1e-3, "short_wavelength": 1e-5}
 LOW, HIGH = 2.0 * math.pi / 1e-3, 2.0 * math.pi / 1e-5
 
 
-def share(**sections: Any) -> float:
+def guessed(**sections: Any) -> Guess:
     data = {
         "grid": {"points": 256, "size": 1e-3},
         "surface": {"shape": "rough", **WAVES, "rms_slope": 0.1},
@@ -22,7 +23,11 @@ def share(**sections: Any) -> float:
         **sections,
     }
     job = Job.model_validate({key: value for key, value in data.items() if value is not None})
-    return smallest_share(job, 1e-5, 1e-6)
+    return guess(job, 1e-5, 1e-6)
+
+
+def share(**sections: Any) -> float:
+    return guessed(**sections).share
 
 
 def test_rms_slope_of_a_self_affine_surface() -> None:
@@ -55,6 +60,23 @@ def test_a_body_is_stiff_for_waves_that_pass_fast() -> None:
     assert fast == pytest.approx(math.erf(math.sqrt(2.0) * 1e4 / (20e6 * 0.1)), rel=1e-6)
     curve = {"velocities": [1e-9, 1e4], "pressures": [1e4]}
     assert share(material=body, history=None, steady=curve) == pytest.approx(fast, rel=1e-12)
+
+
+def test_phase_at_edges() -> None:
+    """The largest of all loads, in right angles: of one branch atan(g x/(1 + (1 + g) x^2)), with x the frequency times
+    its time and g its modulus over that at rest; of an elastic body, or one at rest, none."""
+    edges = EDGES * 2.0 * math.pi / 1e-5  # [rad/m]
+    body = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "relaxation_time": 1e-3}]}
+    velocities = [1e-9, 3e-7, 1e-5]
+
+    def expected(velocity: float) -> float:
+        x = edges * velocity * 1e-3
+        return math.atan(4.0 * x / (1.0 + 5.0 * x**2)) / (0.5 * math.pi)
+
+    curve = {"velocities": velocities, "pressures": [1e4]}
+    found = guessed(material=body, history=None, steady=curve).phase
+    assert found == pytest.approx(max(map(expected, velocities)), rel=1e-12)
+    assert guessed().phase == guessed(material=body).phase == 0.0
 
 
 def test_what_is_not_known() -> None:
