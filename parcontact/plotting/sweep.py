@@ -52,7 +52,8 @@ def charts(directory: Path) -> list[Chart]:
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, title, columns in panels:
-        wanted = [(name, part, own, column) for part, own in _split(rows, others) for name, column in columns.items()]
+        split = _split_curves(rows, key) if panels is CURVE_PANELS else _split(rows, others)
+        wanted = [(name, part, own, column) for part, own in split for name, column in columns.items()]
         series = [line for k, one in enumerate(wanted) for line in _make_lines(*one, key, style.line(k)["color"])]
         if series:
             dots = next((k for k, one in enumerate(series) if one.look.get("marker") == "."), None)
@@ -91,6 +92,28 @@ def _split(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
     unit = UNITS.get(others[0].split(".")[-1], "")
     for value in values:
         yield f", {units.text(value, unit)}", [row for row in rows if row[others[0]] == value]
+
+
+def _split_curves(rows: Rows, key: str) -> Iterator[tuple[str, Rows]]:
+    """Yield the points of each line and its name: those that agree in all but `key` and what chooses a sample."""
+    names = list(rows[0])
+    keys = [
+        name for name in names[names.index("case") + 1 : names.index("state")] if name.split(".")[-1] not in SAMPLES
+    ]
+    apart = [
+        name for name in (*sweep_table.PLACES, *keys) if name != key and len({repr(row[name]) for row in rows}) > 1
+    ]
+    lines: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        lines.setdefault("".join(f", {_named(name, row[name])}" for name in apart), []).append(row)
+    yield from lines.items()
+
+
+def _named(key: str, value: Any) -> str:
+    """Return a value with its unit, after the name of its key unless that is a pressure or a temperature."""
+    word = key.split(".")[-1]
+    text = units.text(value, UNITS.get(word, "")) if isinstance(value, float) else str(value)
+    return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
 
 
 def _make_lines(name: str, part: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:

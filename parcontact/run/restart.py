@@ -21,7 +21,7 @@ from ..storage.directory import ADVICE, Directory
 from ..storage.marker import Claim
 
 NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
-SAME = ("grid", "surface", "material", "body", "initial", *NUMERICS)  # sections and keys that must not change
+SAME = (*marker.SCENE, *marker.EFFECTS, "initial", *NUMERICS)  # sections and keys that must not change
 SAME_STEP = 1e-9  # accuracy: relative: steps of two histories this close are the same
 
 

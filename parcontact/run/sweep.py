@@ -159,6 +159,9 @@ def refuse_foreign(cases: Sequence[Case]) -> None:
     except (OSError, ValueError) as error:
         raise InputError(f"the output directory {directory} cannot be used: {error}") from error
     refuse_other_jobs(directory, claims, plain_job(first.job))
+    for case in cases:
+        there = case.job.output.directory
+        refuse_other_jobs(there, marker.read(there), plain_job(case.job))
     if not claims and not {CASES, sweep_table.TABLE} & set(entries):
         refuse_files(directory, entries)
 

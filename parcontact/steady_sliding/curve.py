@@ -28,7 +28,7 @@ from .sliding import SteadySliding
 from .table import CurveTable
 
 DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
-SAME = (*marker.SCENE, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
+SAME = (*marker.SCENE, *marker.EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ FORMAT = 1
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
 SCENE = ("grid", "surface", "material", "body")  # sections in which all that shares a directory must agree
 SHOWN = 4  # differences of two jobs in a message
-SECTIONS = (*SCENE, "initial", "numerics", "steady")  # what a marker keeps of a job
+EFFECTS = ("thermal", "interface", "adhesion.work", "adhesion.range", "adhesion.law")  # keys of steps that were made
+SECTIONS = (*SCENE, "thermal", "interface", "adhesion", "initial", "numerics", "steady")  # what a marker keeps of a job
 
 
 @dataclass(frozen=True)

@@ -53,9 +53,12 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
 
 
 def results(directory: Path) -> Path:
-    """Return the table with the results of a sweep: of the points of its friction curves, or else of its cases."""
-    curves = directory / CURVES
-    return curves if curves.is_file() else directory / TABLE
+    """Return the table with the results of a sweep: of its cases, or of the points of its friction curves where the
+    cases have none."""
+    curves, table = directory / CURVES, directory / TABLE
+    if not curves.is_file() or (table.is_file() and any(row["residual"] == row["residual"] for row in read(table))):
+        return table
+    return curves
 
 
 def read(path: Path) -> list[dict[str, Any]]:
@@ -107,7 +110,7 @@ def _row(case: Case) -> dict[str, Any]:
 def _points(case: Case) -> Iterator[dict[str, Any]]:
     """Yield the rows of a friction curve as far as it has come."""
     table = case.job.output.directory / "steady.csv"
-    if not case.job.history and table.is_file():
+    if table.is_file():
         columns: dict[str, list[float]] = tables.read(table)
         head = {"case": case.number, **case.settings, "state": state(case)}
         numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]

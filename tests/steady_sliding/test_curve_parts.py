@@ -132,6 +132,30 @@ def test_curve_of_a_sweep_has_only_begun_while_points_lack(
     assert states("steady.temperatures=[20.0]") == ["begun", "begun"]
 
 
+def test_points_of_another_effect_are_not_gone_on_with(main: Main, tmp_path: Path) -> None:
+    """An interface changes friction of all points, as another material does."""
+    words = (*CURVE, "--set", "interface={shear_stress: 1.0e5}")
+    assert main(*words) == (DONE, "")
+    before = (tmp_path / "out" / "steady.csv").read_bytes()
+    code, said = main(*CURVE, "--set", "interface={shear_stress: 2.0e5}")
+    assert code == BAD_INPUT
+    assert "another job: interface.shear_stress was 100000.0, is 200000.0" in said
+    assert (tmp_path / "out" / "steady.csv").read_bytes() == before
+
+
+def test_sweep_of_another_job_leaves_all_as_it_is(main: Main, tmp_path: Path) -> None:
+    """Its cases are in the way: nothing is written, not even the tables of the sweep."""
+    asked = {"steady": {"velocities": [0.1], "pressures": [2e5]}}
+    for name, amplitudes in (("one", [5e-7, 4e-7]), ("other", [5e-7, 3e-7])):
+        swept = [{"surface.amplitude": amplitudes}]
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump({**JOB, **asked, "sweep": swept}))
+    assert main("steady", "one.yaml", "--out", "there") == (DONE, "")
+    before = {path: path.read_bytes() for path in (tmp_path / "there").rglob("*.csv")}
+    code, said = main("steady", "other.yaml", "--out", "there")
+    assert (code, "cases/001 holds a friction curve of another job: surface.0.amplitude" in said) == (BAD_INPUT, True)
+    assert {path: path.read_bytes() for path in (tmp_path / "there").rglob("*.csv")} == before
+
+
 def test_curve_and_a_directory_named_stop(main: Main, tmp_path: Path) -> None:
     """It stops a curve like any stop file; a sentence says that it cannot be removed."""
     (tmp_path / "out" / "stop").mkdir(parents=True)

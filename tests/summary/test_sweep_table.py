@@ -95,6 +95,28 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
     assert mean.y.tolist() == pytest.approx([0.3, 0.15], rel=1e-12)
 
 
+def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two pressures and two moduli make four lines over the velocity, each the mean over two seeds."""
+    monkeypatch.chdir(tmp_path)
+    curve = "steady: {velocities: [0.1, 1.0], pressures: [1.0e+4, 2.0e+4]}\n"
+    swept = "sweep: [{material.modulus_inf: [2.0e+5, 3.0e+5]}, {surface.seed: [1, 2]}]\n"
+    Path("job.yaml").write_text(JOB[: JOB.index("history:")] + curve + swept)
+    cases = load_cases(Path("job.yaml"))
+    for case in cases:
+        case.job.output.directory.mkdir(parents=True)
+        rows = [f"{v},{p},{case.number + p / 1e5 + v},0.5" for p in (1e4, 2e4) for v in (0.1, 1.0)]
+        text = "\n".join(["velocity,pressure,friction,contact_area", *rows, ""])
+        (case.job.output.directory / "steady.csv").write_text(text)
+    sweep_table.write(Path("out/job"), cases)
+    lines = [line for line in pictures.charts(Path("out/job"))[0].series if line.look.get("linestyle") == "-"]
+    found = {line.name: line.y.tolist() for line in lines}
+    assert found == {
+        f"steady sliding, {p:.0f} kPa, modulus inf {m:.0f} kPa": pytest.approx([mean + p / 100 + v for v in (0.1, 1.0)])
+        for m, mean in ((200, 0.5), (300, 2.5))
+        for p in (10, 20)
+    }
+
+
 def test_errors_of_the_highest_and_the_mean_friction(cases: tuple[Case, ...]) -> None:
     """The highest friction, 0.3, has the error of its own step, and the mean of 0.3 and 0.2 that of both. No step is
     shorter than a cell, so there is no ripple."""
