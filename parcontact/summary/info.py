@@ -139,7 +139,7 @@ def describe_directory(directory: Path) -> tuple[str, bool]:
 def _title(directory: Path) -> str:
     """Return the title of the job, from the first of its copies that there is."""
     cases = sorted(path.name for path in directory.glob("cases/*"))
-    of_a_case = [f"cases/{name}/job.resolved.yaml" for name in cases[:1]]
+    of_a_case = [f"cases/{cases[0]}/{kind}.resolved.yaml" for kind in ("job", "steady")] if cases else []
     for name in ("job.resolved.yaml", "steady.resolved.yaml", "study.resolved.yaml", *of_a_case):
         if (directory / name).is_file():
             found = re.search(r"^title: (.+)$", (directory / name).read_text(errors="replace"), re.MULTILINE)
