@@ -19,8 +19,10 @@ KINDS = {  # by the table that each of them has
     "study.csv": ("study", results.describe_study),
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
-MORE_TABLES = ("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv")
-MORE_TABLES += ("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv")
+MORE_TABLES = (
+    *("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv"),
+    *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
+)
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that other sections show
 
 
