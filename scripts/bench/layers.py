@@ -9,7 +9,7 @@ from runs import Json, begun, marched
 from .table import Line
 
 SIZE, LONGEST, CELLS = 1e-3, 2.5e-4, 8  # of the box, its longest wave [m], and cells of the shortest wave
-THICKNESSES = (3, 4, 6, 9, 12, 18, 26, 40, 128, 512)  # cells of 128
+THICKNESSES = (2, 2.5, 3, 4, 6, 9, 12, 18, 26, 40, 128, 512)  # cells of 128
 SLID, PRESSED = 40, 10  # steps of a cell, and before them
 AREAS = {"cold": 0.2, "slide": 0.07}
 SOLVED = {"cold": 1e-5, "slide": 1e-3}  # tolerances

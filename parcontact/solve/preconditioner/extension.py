@@ -27,15 +27,17 @@ from .levels import count_cells, levels_of
 
 FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
 LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none
+FADING = 2.7  # tuning: power of the reach of a layer with which the floor of cells longer than that grows
 Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 
 
 class Grids(NamedTuple):
     """Grids of larger cells: how many at most, None for all that there are, of which the first are of so many `pairs`
-    along x."""
+    along x; the floor of the `last` one over that of the others."""
 
     most: int | None = None
     pairs: int = 0
+    last: float = 1.0
 
 
 ALL = Grids()
@@ -46,12 +48,16 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
 
     Where points are nearer along x than along y, pairs along x are made first, until cells are about square: a step of
     a slide takes as many iterations as on squares then, and up to a half more without. Points further apart than the
-    `reach` do not act on each other: no square cell is longer than about that, if it is not the first.
+    `reach` do not act on each other: no square cell is longer than about that. There are two sizes of these at least;
+    if the larger one is longer than the reach, it counts for less, as its floor is higher.
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
     pairs = max(round(math.log2(dy / dx)), 0)
-    return Grids(None if reach == math.inf else pairs + max(round(math.log2(reach / max(dx, dy))), 1), pairs)
+    if reach == math.inf:
+        return Grids(None, pairs)
+    sizes = max(math.log2(reach / max(dx, dy)), -10.0)
+    return Grids(pairs + max(round(sizes), 2), pairs, max(2.0 ** (FADING * (1.5 - sizes)), 1.0))
 
 
 class ExtendedPreconditioner:
@@ -62,19 +68,22 @@ class ExtendedPreconditioner:
 
     def __init__(self, slab: Slab, floor: float = FLOOR, larger: Grids = ALL) -> None:
         """With another floor, or other grids of `larger` cells than all."""
-        most, pairs = larger
+        most, pairs, last = larger
         self._levels = levels_of(slab, pairs)[:most]
         grids = [level.coarse for level in self._levels]
         self._floors = [
             (np.float32(floor) * lengths(slab.ny, max(level - pairs, 0))[grid.rows], lengths(slab.nx, level))
             for level, grid in enumerate(grids, 1)
         ]
+        if self._floors and last > 1.0:
+            down, across = self._floors[-1]
+            self._floors[-1] = np.float32(last) * down, across
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     @staticmethod
     def footprint(nx: int, ny: int, ranks: int, rank: int, larger: Grids = ALL) -> int:
         """Bytes that it holds on a rank."""
-        return 2 * 4 * count_cells(nx, ny, ranks, rank, *larger)
+        return 2 * 4 * count_cells(nx, ny, ranks, rank, larger.most, larger.pairs)
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
