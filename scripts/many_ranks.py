@@ -127,7 +127,7 @@ def model(points: int, transforms: Transforms, ranks: int, rank: int) -> tuple[i
 
 
 def dealt_grids(ranks: int) -> int:
-    """How many grids of cells are dealt out to so many ranks: those with more cells than a FEW of a rank's points."""
+    """Return how many grids of cells are dealt out to ranks: those with more cells than a FEW of a rank's points."""
     return math.ceil(math.log(FEW * ranks, 4))
 
 
@@ -138,7 +138,7 @@ def rows_beside(found: Json) -> int:
 
 
 def tell(found: Json) -> str:
-    """What follows for TOLD ranks from what fewer have found: counts of the model, and rows by their length."""
+    """Tell what follows for TOLD ranks from what fewer have found: counts of the model, and rows by their length."""
     (ranks, points), iterations, few = TOLD, found["iterations"], found["counts"]
     sent, legs = (count / iterations for count in model(points, found["transforms"], ranks, 0))
     exchanged = ROWS * dealt_grids(ranks) + rows_beside(found) / iterations

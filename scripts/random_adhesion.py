@@ -222,7 +222,7 @@ def on_ranks(seed: int, number: int, made: Map) -> Iterator[str]:
 
 
 def restarted(job: dict[str, Any], steps: int, counts: Counter[str]) -> Iterator[str]:
-    """What differs after a restart in the middle of so many steps."""
+    """Return what differs after a restart in the middle of so many steps."""
     whole, rows = pc.Simulation(job, comm=MPI.COMM_SELF), list[tuple[float, ...]]()
     with tempfile.TemporaryDirectory() as where:
         file = Path(where, "middle.h5")

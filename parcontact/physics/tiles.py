@@ -88,7 +88,7 @@ class TileConvolution:
         self._forward.execute()
 
     def at(self, row: int, columns: NDArray[np.intp]) -> Iterator[Array]:
-        """What the map that was transformed causes at any tiles of a row of them, each valid until the next one."""
+        """Yield what the transformed map causes at any tiles of a row of them, each valid until the next one."""
         own, rows = self._sums[:1], np.array([row])
         for place in range(len(columns)):
             self._add_up(rows, columns[place : place + 1], own)

@@ -45,7 +45,7 @@ def charts(directory: Path) -> list[Chart]:
     if table.name == sweep_table.CURVES:
         panels = CURVE_PANELS
         places = {name: {row[name] for row in rows if row[name] == row[name]} for name in sweep_table.PLACES}
-        keys = [name for name, values in places.items() if len(values) > 1] + _find_keys(rows)
+        keys = [name for name, values in places.items() if len(values) > 1] + keys
     if not keys:
         return []
     key, *others = keys

@@ -42,7 +42,7 @@ SolverOnTiles = tuple[ContactSolver, TileOperator, TileConvolution]  # with the 
 
 @dataclass(frozen=True)
 class OnTiles:
-    """What makes a solver on tiles, to a tolerance, of a body that may be periodic."""
+    """A maker of solvers on tiles, to a tolerance, of a body that may be periodic."""
 
     make: Callable[[Tiles, float], SolverOnTiles]
     periodic: bool

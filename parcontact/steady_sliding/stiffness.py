@@ -1,4 +1,4 @@
-"""What a body is to the waves of a grid that a surface slides along, which decides how its steady state is solved.
+"""Stiffness of a body under the waves of a surface that slides, which decides how its steady state is solved.
 
 Waves that do not vary along the sliding see the long-term modulus G_inf, the others `G(w)` at the frequency w with
 which they pass a point.

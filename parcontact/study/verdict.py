@@ -85,12 +85,8 @@ def _cover(limit: Limit, finer: Sequence[float]) -> Limit:
     """Let a limit without an order be as uncertain as it differs from cases that are as fine as the last one."""
     if not math.isnan(limit.order):
         return limit
-    apart = [abs(value - limit.value) for value in finer if value != limit.value]
-    return (
-        replace(limit, uncertainty=max(*apart, 0.0 if math.isnan(limit.uncertainty) else limit.uncertainty))
-        if apart
-        else limit
-    )
+    apart = max((abs(value - limit.value) for value in finer), default=0.0)
+    return replace(limit, uncertainty=apart) if apart > 0.0 and not apart <= limit.uncertainty else limit
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:

@@ -22,8 +22,8 @@ def test_fast_lengths(count: int) -> None:
 
 
 def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, float]:
-    """Those of friction and of the area by the laws of the module, in a slide along a unit vector at 5 % of contact of
-    a body without losses at edges."""
+    """Return the errors of friction and area by the laws of the module, in a slide along a unit vector at 5 % of
+    contact of a body without losses at edges."""
     (nx, ny), (x, y) = points, way
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
     c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)

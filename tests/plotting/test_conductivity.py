@@ -9,7 +9,7 @@ from parcontact.report.leak import Instant
 
 
 def drawn(chart: charts.Chart) -> dict[str, np.ndarray]:
-    """What each line shows over the horizontal axis, by its label; `limits` are those of this axis."""
+    """Return what each line shows over the horizontal axis, by its label; `limits` are those of this axis."""
     axes = Figure().subplots()
     charts.draw(chart, axes)
     lines = {str(line.get_label()).replace("\n", " "): np.array(line.get_xdata()) for line in axes.get_lines()}

@@ -98,7 +98,7 @@ def test_missing_points_may_be_refused(road: Path) -> None:
 
 
 def test_another_part_of_the_map(road: Path) -> None:
-    """Of a map that has no trend and is not resampled, the points around the centre are the box, exactly."""
+    """The box has exactly the points around the centre, of a map that has no trend and is not resampled."""
     plain, half = ", periodic: none, detrend: mean", POINTS // 2
     heights = np.load(road / "truth.npy")
     np.save(road / "road.npy", heights * 1e6)

@@ -1,25 +1,13 @@
 """Tables of a sweep, from what its cases have left in their directories."""
 
-import csv
 from pathlib import Path
 
 import pytest
+from sweeping import JOB, table
 
 from parcontact.job import Case, load_cases
 from parcontact.plotting import sweep as pictures
 from parcontact.summary import sweep_table
-
-JOB = """\
-grid: {points: 34, size: 1.0e-3}
-surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 2.4e-4, rms_slope: 0.01, seed: 1}
-material: {model: zener, modulus_inf: 0.275e+6, branches: [{modulus: 2.475e+6, relaxation_time: 1.0e-3}]}
-history:
-  - {pressure: 1.0e+5, duration: 1.0e-3, time_step: 5.0e-4}
-  - {pressure: 1.0e+5, velocity: 0.1, distance: 5.0e-4, cells_per_step: 1}
-sweep:
-  - {history.1.velocity: [0.01, 0.1]}
-  - {surface.seed: [1, 2, 3]}
-"""
 
 
 @pytest.fixture
@@ -27,11 +15,6 @@ def cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Case, ...]:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "job.yaml").write_text(JOB)
     return load_cases("job.yaml")
-
-
-def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> list[dict[str, str]]:
-    with (directory / name).open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:

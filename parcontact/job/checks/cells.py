@@ -62,7 +62,7 @@ AREA = Law(0.055, 1.25, 0.018, 1.0)  # accuracy: of the corrected area
 
 
 class Guess(NamedTuple):
-    """What touches, before anything is solved: the share in contact, and the phase of the body's modulus at the
+    """A guess made before anything is solved: the share in contact, and the phase of the body's modulus at the
     frequency of edges, in right angles."""
 
     share: float

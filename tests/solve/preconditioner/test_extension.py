@@ -118,3 +118,18 @@ def test_pairs_along_x_until_cells_are_square() -> None:
     assert grids_for(4.0, 1.0, reach=32.0) == (3, 0, 1.0)
     assert grids_for(1.0, 1.0, reach=1.0) == (2, 0, pytest.approx(2.0 ** (1.5 * FADING)))  # cells of two count for less
     assert grids_for(1.0, 17.0).most == grids_for(17.0, 1.0).most == 0
+
+
+@pytest.mark.parametrize(("last", "equal"), [(1.0, False), (1e9, True)])
+def test_largest_cells_of_a_high_floor_count_for_nothing(last: float, equal: bool) -> None:
+    """To single precision: they tell and ask nothing then, as if they were not there."""
+    random, slab = np.random.default_rng(2), Slab(MPI.COMM_SELF, 16, 16)
+    c = random.random((16, 16)) < 0.2
+    r = np.where(c, random.normal(size=(16, 16)), 0.0)
+    given_to_k = []
+    for larger in (Grids(2, 0, last), Grids(1)):
+        inverse, z = Doubling(), r.copy()
+        ExtendedPreconditioner(slab, larger=larger).apply(inverse, c, z)
+        given_to_k.append(inverse.given)
+    apart = np.abs(given_to_k[0] - given_to_k[1]).max()
+    assert (apart <= SINGLE * np.abs(r).max()) == equal
