@@ -60,11 +60,11 @@ class Sweep:
         A case that fails does not stop the others: the code is 1 in the end. One that another program runs is skipped,
         like those that have finished; if it is the only one, InUseError is raised. One that stops early with a
         checkpoint stops the sweep, with its code, and the cases beside it, but no other program: the same command goes
-        on with them. So do the file `stop`, which stops other programs too, and the end of the wall time. The file
-        stays: others may not have seen it yet, and it stops no later one.
+        on with them. So do signals, the file `stop`, which stops other programs too, and the end of the wall time. The
+        file stays: others may not have seen it yet, and it stops no later one.
         """
-        code = self._take(_deal(chosen, self.groups))
-        with Signals().noted():  # one that ends the ranks that wait here would end the others with them
+        with Signals().noted() as signals:  # also by ranks that wait: one that ends would end the others with it
+            code = self._take(_deal(chosen, self.groups), signals)
             found = self.groups.from_all((code, self.doubts.kinds))
         codes = [one for one, _ in found]
         if self.groups.root:
@@ -73,18 +73,20 @@ class Sweep:
                 print_line(f"warning: {text}", sys.stderr)
             if STOPPED_EARLY not in codes and not self.quiet:
                 print_line(f"results of all cases: {sweep_table.results(_directory(self.cases))}")
+            elif self.groups.count > 1 and not self.quiet:
+                print_line("stopped early; run again to go on")
         return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
 
-    def _take(self, own: Sequence[Case]) -> int:
+    def _take(self, own: Sequence[Case], signals: Signals) -> int:
         """Do the cases of the group; returns the exit code. If it stops early, so do the others."""
         code, side_by_side = DONE, self.groups.count > 1
         for case in own:
             slab = Slab(self.groups.comm, *case.job.grid.points)
             speaks = slab.root and not self.quiet
-            if reason := slab.agree(self._reason_to_stop() if slab.root else ""):
+            if reason := self._reason_to_stop(slab, signals):
                 if speaks:
                     print_line(f"stopped before case {case.number}: {reason}; run again to go on")
-                return STOPPED_EARLY
+                return self._stop_others(slab)
             if speaks:
                 print_line(f"{case} (of {len(self.cases)})")
             ended = self._attempt(case, slab, alone=not side_by_side and len(own) == 1)
@@ -93,16 +95,22 @@ class Sweep:
             if speaks and side_by_side:
                 print_line(f"case {case.number}: {ENDS[ended]}")
             if ended == STOPPED_EARLY:
-                if slab.root and side_by_side:
-                    self.stop.ask_own()
-                return STOPPED_EARLY
+                return self._stop_others(slab)
             code = max(code, ended)
         return code
 
-    def _reason_to_stop(self) -> str:
-        if self.limit is not None and time.monotonic() + watch.RESERVE_SECONDS > self.limit:
-            return watch.REASONS[watch.WALL]
-        return watch.REASONS[watch.FILE] if self.stop.asks else ""
+    def _reason_to_stop(self, slab: Slab, signals: Signals) -> str:
+        """Return why no further case is begun, or ''; any rank may have been sent a signal; collective."""
+        if slab.reduce((), [float(signals.stop)])[0]:
+            return watch.REASONS[watch.SIGNAL]
+        used_up = self.limit is not None and time.monotonic() + watch.RESERVE_SECONDS > self.limit
+        why = watch.WALL if used_up else watch.FILE if self.stop.asks else watch.GO
+        return watch.REASONS.get(slab.agree(why), "")
+
+    def _stop_others(self, slab: Slab) -> int:
+        if slab.root and self.groups.count > 1:
+            self.stop.ask_own()
+        return STOPPED_EARLY
 
     def _attempt(self, case: Case, slab: Slab, alone: bool) -> int:
         """Return the code with which a case ends; raises InUseError if another program runs it and it is `alone`."""
