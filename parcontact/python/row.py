@@ -26,7 +26,7 @@ class Row(Mapping[str, float]):
     @classmethod
     def of_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
         """A row as a line of measures.csv has it, of as many branches as there is room for."""
-        cells = [float(cell or "nan") for cell in line.split(",")]
+        cells = [int(cell) if cell.isdecimal() else float(cell or "nan") for cell in line.split(",")]
         branches = len(cells) - len(recorded.columns(0, added))
         return cls(dict(zip(recorded.columns(branches, added), cells, strict=True)))
 

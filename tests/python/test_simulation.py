@@ -148,6 +148,7 @@ def test_save_and_restore(comm: MPI.Intracomm, shared_path: Path) -> None:
     for name in ("pressure", "displacement", "gap", "height"):
         assert np.array_equal(again.field(name), run.field(name))
     assert dict(again.row).items() >= numbers(run.row).items() == whole[5].items()
+    assert [*map(type, again.row.values())] == [*map(type, run.row.values())]
     rest = [numbers(row) for row in again.steps()]
     assert rest == whole[6:]
     assert not again.job.origin.names_directory
