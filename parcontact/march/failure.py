@@ -17,6 +17,7 @@ from ..solve.contact import Contact
 ROUNDINGS = 4.0  # accuracy: times the rounding of the largest length, below which no certificate is sure to be
 FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 FINITE = "look for heights, loads or moduli that are not finite or too far apart"
+UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
 MANY_CELLS = 1.5  # tuning: by which a surface moves in a long step
 
 
@@ -27,9 +28,14 @@ class StepError(RunError):
 class DetachedError(Exception):
     """The surfaces have come off in a step that ends at `time` [s] under a `load`; the run is as it was before it."""
 
-    def __init__(self, time: float, load: float, sentence: str) -> None:
-        super().__init__(sentence)
+    def __init__(self, time: float, load: float) -> None:
+        super().__init__(time, load)
         self.time, self.load = time, load
+
+
+def nothing_holds(control: str, load: float) -> str:
+    """Return what is said where surfaces come off under a prescribed load."""
+    return f"nothing holds the surfaces under a {control} of {load:g}{UNITS[control]} any more"
 
 
 def where(scene: Scene, step: Step) -> str:

@@ -12,29 +12,38 @@ from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
-from .failure import DetachedError
+from .failure import DetachedError, nothing_holds
 from .rest import next_step
 from .state import State, entries, first_state, restored, save
 from .step import make_step
+from .sticking import NEVER
 
 
 class March:
     """A scene at an instant; it advances step by step.
 
-    `compare`, if there is one, returns a row with errors that are known better than from the step alone. `detached`
-    says, in a sentence, that surfaces which stick have come off under their load: there is no further step then.
+    `compare`, if there is one, returns a row with errors that are known better than from the step alone.
     """
 
     def __init__(self, scene: Scene, state: State | None = None) -> None:
         self.scene = scene
         self.compare: Callable[[Row], Row] = lambda row: row
-        self.detached = ""
         self.state = self._weighed(first_state(scene) if state is None else state)
 
     @property
     def row(self) -> Row:
         """The record of the last step."""
         return self.state.row
+
+    @property
+    def detached(self) -> str:
+        """Say that surfaces which stick have come off under their load: there is no further step then; '' otherwise."""
+        memory, row = self.state.sticking, self.row
+        if memory is None or memory.detached == NEVER:
+            return ""
+        time, load = memory.detached
+        lost = nothing_holds(self.timeline(time).span(row.step + 1).stage.control, load)
+        return f"detached at t = {time:g} s: {lost}; {row.measures.pressure:g} Pa at t = {row.time:g} s was held"
 
     def timeline(self, until: float = 0.0) -> Timeline:
         """Return all steps of the history, as `Timeline.of` has them, with those that have been chosen so far."""
@@ -56,8 +65,6 @@ class March:
             self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
         except DetachedError as end:
             assert self.state.sticking is not None
-            held = f"{self.row.measures.pressure:g} Pa at t = {self.row.time:g} s was held"
-            self.detached = f"detached at t = {end.time:g} s: {end}; {held}"
             memory = replace(self.state.sticking, detached=(end.time, end.load))
             self.state = replace(self.state, sticking=memory)
         return self.row

@@ -184,8 +184,11 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
     for name, effect in scene.followers.items():
         effect.restore(part_of(name, saved))
     row = Row(contents.step, contents.time, float(saved["clock/distance"]))
-    if state.sticking is not None:
-        row = replace(row, measures=sticking.restored_measures(part_of("sticking", saved)))
+    stuck = state.sticking
+    if stuck is not None:
+        of_stuck = part_of("sticking", saved)
+        row = replace(row, measures=sticking.restored_measures(of_stuck))
+        stuck = sticking.restored(stuck, of_stuck, sticking.came_off(contents, scene.job))
     found = State(
         row,
         _restored_pasts(state.pasts, saved),
@@ -197,7 +200,7 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         Observations.restored(saved),
         ErrorSums.restored(saved),
         None if state.chosen is None else ChosenSteps.of(scene.job, saved),
-        None if state.sticking is None else sticking.restored(state.sticking, part_of("sticking", saved)),
+        stuck,
         StepTolerance.restored(saved),
         rounding.restored(saved),
     )

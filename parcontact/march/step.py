@@ -29,8 +29,6 @@ from .rounding import rounding_after, rounds_too_much
 from .starts import Past, cells_moved, make_start
 from .state import State, energies_of
 
-UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
-
 
 def make_step(scene: Scene, state: State, step: Step) -> State:
     """Return the state after a step, or after a shorter one if its judge asks for that; collective.
@@ -215,10 +213,9 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
     path = _path(scene, state, trial, control)
     stuck, remark = sticking.solve(scene, state.sticking, step, trial, path, state.spare), ""
     if stuck.detached:
-        sentence = f"nothing holds the surfaces under a {step.control} of {step.load:g}{UNITS[step.control]} any more"
         if not scene.goes_on_open:
-            raise DetachedError(step.time, step.load, sentence)
-        stuck = sticking.open_up(scene, stuck, trial)
+            raise DetachedError(step.time, step.load)
+        stuck, sentence = sticking.open_up(scene, stuck, trial), failure.nothing_holds(step.control, step.load)
         remark = f"{failure.where(scene, step)}: {sentence}" if state.row.measures.contact_area > 0.0 else ""
     contact = stuck.contact
     if contact.failure and not _accepts(scene, contact):

@@ -9,9 +9,11 @@ from dataclasses import astuple, dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from ..effects.adhesion import cell_of, modulus_of
 from ..history.timeline import Step
+from ..job import Job, Stage
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
@@ -23,6 +25,7 @@ from ..solve.adhesive import kernels
 from ..solve.certificate import Certificate
 from ..solve.contact import Contact
 from ..solve.problem import Approach, MeanPressure
+from ..storage.checkpoint import Contents
 from .starts import cells_moved
 from .sticking_energies import NO_ENERGIES, PathWork, StickingEnergies
 
@@ -266,7 +269,17 @@ def restored_measures(saved: Saved) -> Measures:
     return Measures(**{**numbers, "at_edge": bool(numbers["at_edge"])})
 
 
-def restored(memory: StickingMemory, saved: Saved) -> StickingMemory:
+def came_off(contents: Contents, job: Job) -> tuple[float, float]:
+    """Return when the surfaces of a checkpoint came off [s], and under which load; NEVER where they did not, or where
+    the job goes on then or has another history ahead."""
+    section, saved = job.section("adhesion"), contents.numbers.get("sticking/detached")
+    if section is None or section.detached == "open" or saved is None:
+        return NEVER
+    history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
+    return (float(saved[0]), float(saved[1])) if history == job.history else NEVER
+
+
+def restored(memory: StickingMemory, saved: Saved, detached: tuple[float, float]) -> StickingMemory:
     """Return the memory of a checkpoint, whose maps have been read into those of this one."""
     x, y, x_before, y_before = saved["positions"].tolist()
     known = [bool(each) for each in saved["known"]]
@@ -274,4 +287,4 @@ def restored(memory: StickingMemory, saved: Saved) -> StickingMemory:
     pasts = PastGap(now.gap, (x, y), known[0]), PastGap(before.gap, (x_before, y_before), known[1])
     modulus, maps = float(saved["modulus"]), (memory.spare, memory.held, memory.lag)
     energies, snaps = StickingEnergies(*saved["energies"].tolist()), int(saved["snaps"])
-    return StickingMemory(pasts, *maps, modulus, energies, snaps=snaps)
+    return StickingMemory(pasts, *maps, modulus, energies, detached, snaps)

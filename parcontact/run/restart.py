@@ -84,14 +84,6 @@ def finished_before(
     return on_root(slab.comm, look)
 
 
-def detached_at(contents: Contents, job: Job) -> float | None:
-    """Return when the surfaces of a run came off, with which the job ends [s]; None where they did not."""
-    section, saved = job.section("adhesion"), contents.numbers.get("sticking/detached")
-    if section is None or section.detached == "open" or saved is None or saved[0] < 0.0:
-        return None
-    return float(saved[0])
-
-
 def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Contents | str:
     """Return a checkpoint from which a job can go on, without its maps, or why it cannot; collective.
 

@@ -11,6 +11,7 @@ from ..history.timeline import Timeline
 from ..job import Job, Rough, RoughSpectrum
 from ..job.sections import listing
 from ..march.loop import March
+from ..march.sticking import NEVER, came_off
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import choices, sanity
@@ -101,8 +102,8 @@ def _find_origin(
     if origin and origin.contents.step >= len(timeline):
         when = f"at t = {origin.contents.time:g} s"
         reason = f"finished before, {when} (--restart never: run it afresh; --until T: go on)"
-    elif origin and (came_off := restart.detached_at(origin.contents, job)) is not None:
-        reason = f"detached before, at t = {came_off:g} s (--restart never: run it afresh)"
+    elif origin and (off := came_off(origin.contents, job)) != NEVER:
+        reason = f"detached before, at t = {off[0]:g} s (--restart never: run it afresh)"
     elif origin and until is not None and reached(origin.contents.time, until):
         reason = f"is at t = {origin.contents.time:g} s already, and --until {until:g} is not later"
     return origin, warnings, reason

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from restarting import ELASTIC, ROUGH, SPHERE, ZENER, Bench, cut, rows, same
 
+from parcontact import Simulation
 from parcontact.leakage.flow import leak
 from parcontact.summary import info
 
@@ -104,6 +105,23 @@ def test_detached(bench: Bench) -> None:
     assert "detached at t = " in info.describe_directory(out)[0]
     assert bench.run(data, out) == 0
     assert len(rows(out)) - 1 == last
+
+
+@pytest.mark.mpi(2)
+def test_detached_state_from_python(bench: Bench) -> None:
+    """After a second run, and after a restore, the run is over for the same reason; it goes on with another load."""
+    data, out = sticking(bench, "off"), str(bench.where / "out")
+    first, second = (Simulation(data, {"output.directory": out}, bench.comm) for _ in range(2))
+    rows = [run.run() for run in (first, second)]
+    last = max(bench.where.glob("out/checkpoint/step-*.h5"))
+    back = Simulation.restore(last, comm=bench.comm)
+    assert "any more" in first.detached
+    assert [run.detached for run in (second, back)] == [first.detached] * 2
+    assert (second.finished, back.finished, list(back.steps())) == (True, True, [])
+    assert repr(rows[1]) == repr(back.row)
+    held = {**OFF, "force": {"from": 0.0, "to": -5.0 * back.row.time}, "duration": back.row.time}
+    other = Simulation.restore(last, {"history": [held, {"name": "rest", "approach": 0.0}]}, bench.comm)
+    assert (other.detached, other.finished, other.run().step) == ("", False, rows[0].step + 1)
 
 
 def test_open_after_detachment() -> None:
