@@ -136,6 +136,22 @@ def test_open_after_detachment() -> None:
     assert ["any more" in row.remark for row in found].count(True) == 1  # when they come off, not while they are apart
 
 
+def test_a_wave_that_fills_its_free_box_comes_off() -> None:
+    """Near a snap the passes of a free body go round between two states, unless they are made on a stiffer one. The
+    contact ends in long steps where it does in short ones, to a long step."""
+    job = {"grid": {"points": 32, "size": 4.5e-5, "boundary": "free"}, "material": ELASTIC}
+    job |= {"surface": {"shape": "wave", "amplitude": 1.8e-7, "waves": [1, 0]}}
+    ends = []
+    for count in (10, 30):
+        pull = {"approach": {"from": -3e-7, "to": -3.6e-7}, "duration": 1.0, "time_step": 1.0 / count}
+        history = [{"approach": -3e-7}, pull]
+        _, found = marched({**job, "adhesion": {"work": 0.0043, "range": 9e-8}, "history": history})
+        areas = column(found, "contact_area")
+        assert areas[1] > 0.1
+        ends.append(column(found, "approach")[1:][areas[1:] == 0.0][0])
+    assert abs(ends[0] - ends[1]) < 6.1e-9
+
+
 def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A job without the section makes no solver of gaps, no operators for it and no memory of gaps, and calls nothing
     of them; it holds what its plan tells, to the byte, which has no map of theirs."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from ...parallel.slab import Array, Slab
 from ..certificate import Certificate
 from ..iterate import LEAST_SHARE
-from ..problem import Approach, MeanPressure, Operator
+from ..problem import Control, Operator
 from . import kernels
 from .law import Law
 
@@ -45,7 +45,7 @@ class GapSolution:
 @dataclass
 class Iterate:
     """A gap in numbers: its mean and its lowest value, the uniform part m of the pressure, the approach; under which
-    load or mean gap.
+    load or mean gap. `mean` and `least_mean` are those of the operators, or a share of them.
 
     The last step went `share` of its way, which moves the mean gap by `moved`, and m by `change`; it was that of Newton
     if it was `stable`. The next one is first tried with the length `step`.
@@ -54,9 +54,11 @@ class Iterate:
     law: Law
     heights: Array
     mean_height: float
-    control: Approach | MeanPressure
+    control: Control
     given: float | None
     mean_gap: float
+    mean: float
+    least_mean: float
     m: float = 0.0
     d: float = 0.0
     lowest: float = 0.0

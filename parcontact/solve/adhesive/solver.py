@@ -38,7 +38,7 @@ import numpy as np
 
 from ...parallel.slab import Array, Slab
 from .. import kernels as maps
-from ..problem import Approach, MeanPressure
+from ..problem import Approach, Control, MeanPressure
 from . import kernels
 from .iterate import GapOperators, GapSolution, Iterate, certify
 from .law import Law
@@ -71,10 +71,11 @@ class GapSolver:
         return (7 * 8 + 1) * cells
 
     def solve(
-        self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array, tolerance: float
+        self, law: Law, heights: Array, control: Control, gap: Array, tolerance: float, compliance: float = 1.0
     ) -> GapSolution:
-        """Solve from the `gap`, in whose place the solution will be; collective."""
-        it = self._begin(law, heights, control, gap)
+        """Solve from the `gap`, in whose place the solution will be; mean values move by the share `compliance` of what
+        the operators say; collective."""
+        it = self._begin(law, heights, control, gap, compliance)
         g, other = gap, self._gap
         best, scale, iteration, stuck = (math.inf, 0), 0.0, 0, False
         while True:
@@ -101,7 +102,7 @@ class GapSolver:
 
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
-    def _begin(self, law: Law, heights: Array, control: Approach | MeanPressure, gap: Array) -> Iterate:
+    def _begin(self, law: Law, heights: Array, control: Control, gap: Array, compliance: float) -> Iterate:
         """Give the start its mean where that is given, find its pressure, and forget the last direction."""
         self._t.fill(0.0)
         sums = self.slab.sum(maps.total(heights), maps.total(gap))
@@ -117,13 +118,14 @@ class GapSolver:
         np.add(gap, heights, out=self._q)
         self.operators.inverse.apply(self._q, self._q)
         kernels.attract(*law, gap, self._sigma)
-        return Iterate(law, heights, mean_h, control, given, mean_g)
+        means = compliance * self.operators.mean, compliance * self.operators.least_mean
+        return Iterate(law, heights, mean_h, control, given, mean_g, *means)
 
     def _uniform(self, it: Iterate, mean_gap: float) -> float:
         """The uniform part m of the pressure, where it is not a multiplier."""
         if isinstance(it.control, MeanPressure):
             return it.control.value
-        return (mean_gap + it.mean_height + it.control.value) / self.operators.mean
+        return (mean_gap + it.mean_height + it.control.value) / it.mean
 
     def _find_residual(self, it: Iterate, g: Array) -> tuple[float, bool]:
         """Let the pressure follow the last step, and find the working set and c on it, in the map of the way; the size
@@ -140,7 +142,7 @@ class GapSolver:
             it.m -= total / members
             kernels.centre(self._working, total / members, self._way)
         it.change = it.m - before
-        it.d = self.operators.mean * it.m - it.mean_gap - it.mean_height
+        it.d = it.mean * it.m - it.mean_gap - it.mean_height
         it.lowest = -least
         if not isinstance(it.control, MeanPressure) or it.lowest <= 0.0:
             return members, False
@@ -233,7 +235,7 @@ class GapSolver:
         *sums, fastest = kernels.curvature(kind, reach, g, self._q, it.m, self._sigma, self._way, self._image)
         slope, stiff, soft, total, fastest = self.slab.reduce(sums, [fastest])
         it.moved = total / self.slab.points
-        own = self.slab.points * it.moved**2 / self.operators.least_mean
+        own = self.slab.points * it.moved**2 / it.least_mean
         true, major = stiff - soft + (0.0 if isinstance(it.control, MeanPressure) else own), stiff + own
         it.stable = true > LEAST_CURVATURE * major
         wanted = slope / (true if it.stable else major) if major > 0.0 else 0.0

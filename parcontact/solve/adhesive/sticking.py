@@ -4,6 +4,10 @@ The solver of gaps needs the inverse of its operator. That of a free body has no
 body that repeats itself takes its place, by the shortest way between two points (`HalfSpace.gap_operators`), and what
 it lacks is lagged: `h - (A - B) p` of the last pass are the heights of the next. Within half a box both are the same,
 so that one pass or two do as a rule.
+
+A contact that fills its box is softer on B than on A. Near a snap a pass may then jump over an equilibrium, and the
+passes go round between two states. Under an approach they begin again with half of the compliance of B for mean values:
+a stiffer body takes shorter ways, and passes settle wherever an equilibrium is stable.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +16,7 @@ import numpy as np
 
 from ...parallel.slab import Array
 from ..contact import Contact
-from ..problem import Approach, MeanPressure, Operator
+from ..problem import Approach, Control, MeanPressure, Operator
 from ..workspace import Workspace
 from . import kernels
 from .iterate import SHARPER, GapSolution
@@ -20,8 +24,9 @@ from .law import Law
 from .solver import GapSolver
 
 MAX_PASSES = 100  # accuracy: of a free body; one to three do as a rule, and many where it is about to snap
+MANY = 12  # tuning: passes after which a solve under an approach begins again, on a stiffer body
+STIFFER = 0.5  # tuning: share of the compliance of B for mean values
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
-MANY, SMALL_SHARE = 12, 0.3  # tuning: passes after which it is at most that, and falls: solves go round between states
 
 
 @dataclass
@@ -37,7 +42,7 @@ class StickingSolver:
         self,
         law: Law,
         heights: Array,
-        control: Approach | MeanPressure,
+        control: Control,
         gap: Array,
         lag: Array | None,
         out: Array,
@@ -56,28 +61,58 @@ class StickingSolver:
             np.add(gap, heights, out=u)
             u += found.d
             return self._contact(found, out, found.iterations), found.detached
-        iterations, passes, share, last = 0, 0, 1.0, lag
-        while True:
-            found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
-            iterations, passes = iterations + found.iterations, passes + 1
+        if isinstance(control, MeanPressure):
+            found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance)
+            return self._contact(found, out, iterations), found.detached
+        start = gap.copy(), lag.copy()
+        found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance, most=MANY)
+        if found.failure:
+            gap[...], lag[...] = start
+            lag += (1.0 - STIFFER) * self._mean_way(heights - lag, control, gap)
+            found, more = self._settle(law, heights, control, gap, lag, out, tolerance, STIFFER)
+            lag -= (1.0 / STIFFER - 1.0) * self._mean_way(heights - lag, control, gap)
+            iterations += more
+        return self._contact(found, out, iterations), found.detached
+
+    def _mean_way(self, heights: Array, control: Approach, gap: Array) -> float:
+        """By how much the uniform part of the pressure moves a body with such heights; collective."""
+        slab = self.workspace.slab
+        return slab.sum(float((gap + heights).sum()))[0] / slab.points + control.value
+
+    def _settle(
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        lag: Array,
+        out: Array,
+        tolerance: float,
+        compliance: float = 1.0,
+        most: int = MAX_PASSES,
+    ) -> tuple[GapSolution, int]:
+        """Repeat the solve of a free body until what is lagged changes no more, in so many passes at most; returns the
+        solution and the iterations of all passes; collective."""
+        assert self.free is not None
+        iterations, share, last = 0, 1.0, lag
+        for passes in range(1, most + 1):
+            found = self.gaps.solve(law, heights - lag, control, gap, tolerance, compliance)
+            iterations += found.iterations
             out[...] = found.p
             change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
             change -= found.d
             found, worst = self._judge(control, found, out, change)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
-            share = min(share, SMALL_SHARE * MANY / passes) if passes > MANY else share
             last = change
             lag += share * change
             if found.failure or found.detached or worst <= tolerance:
-                break
-            if passes == MAX_PASSES:
-                asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
-                found = replace(found, failure=f"did not settle in {passes} passes of a free body: changes are {asked}")
-                break
-        return self._contact(found, out, iterations), found.detached
+                return found, iterations
+        asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
+        failure = f"did not settle in {most} passes of a free body: changes are {asked}"
+        return replace(found, failure=failure), iterations
 
     def _judge(
-        self, control: Approach | MeanPressure, found: GapSolution, p: Array, change: Array
+        self, control: Control, found: GapSolution, p: Array, change: Array
     ) -> tuple[GapSolution, float]:
         """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
         approach; returns this number too; collective."""
