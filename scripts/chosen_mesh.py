@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Whether meshes that `points: auto` chooses keep what numerics.accuracy asks for, and whether cheaper ones would.
 
-    .venv/bin/python scripts/chosen_mesh.py [--scenes 10] [--seed 0] [--area 1.0]
+    .venv/bin/python scripts/chosen_mesh.py [--scenes 10] [--seed 0] [--area 1.0] [--dozens 1]
 
-Each scene is a steady state of a random rough surface with 12 of its shortest waves along a side: Hurst exponents of
-0.5 to 1, slopes of 0.01 to 0.2, 1 to 80 % of contact, bodies of one branch and of twelve. Accuracies are 5, 1 and 0.3 %
-of friction, and `--area` times as much of the area. True errors are those against 80 cells per shortest wave along the
-sliding and 40 across it, of the area extrapolated from half as many and these.
+Each scene is a steady state of a random rough surface with `--dozens` of its shortest waves along a side: Hurst
+exponents of 0.5 to 1, slopes of 0.01 to 0.2, 1 to 80 % of contact, bodies of one branch or of twelve. Accuracies are
+5, 1 and 0.3 % of friction, and `--area` times as much of the area. True errors are those against 80 cells per shortest
+wave along the sliding and 40 across it, of the area extrapolated from half as many and these.
 
 A chosen mesh is compared with the cheapest of those with cells up to 4 : 1 and LENGTHS along each side. Errors scatter
 and change signs from mesh to mesh, so that one may be right by luck. A person who looks for a mesh by hand finds out by
@@ -17,6 +17,7 @@ Ends with 0 if at most a tenth of the accuracies is missed, and chosen meshes ha
 cheapest ones in the median.
 """
 
+import argparse
 import math
 import statistics
 import sys
@@ -35,31 +36,35 @@ import parcontact as pc
 from parcontact.job import load
 
 ACCURACIES = (0.05, 0.01, 0.003)
-SIZE, WAVES = 1e-3, 12
+SIZE, DOZEN = 1e-3, 12
 FINEST = 80, 40  # cells per shortest wave of the reference, along the sliding and across it
 MOST = 1.5  # times the points of the cheapest mesh
-LENGTHS = (32, 48, 64, 80, 96, 128, 160, 192, 240, 288, 384, 480)
+LENGTHS = (32, 48, 64, 80, 96, 128, 160, 192, 240, 288, 384, 480)  # for a dozen of shortest waves
 AREA_ORDER = 1.3
+AREA, DOZENS = "the accuracy of the area over that of friction", "of shortest waves along a side of the box"
 
 Mesh = tuple[int, int]
 Keeps = Callable[[Mesh], bool]
+Ratios = dict[str, list[float]]
+Finer = Callable[[Mesh, list[Mesh]], list[Mesh]]
 
 
-def scene(seed: int, number: int) -> dict[str, Any]:
+def scene(seed: int, number: int, dozens: int) -> dict[str, Any]:
     """A job without points and accuracy."""
+    wave = SIZE / (DOZEN * dozens)
     dice = Random(f"mesh {seed} {number}")
     slope, speed = 10.0 ** dice.uniform(-2.0, -0.7), 10.0 ** dice.uniform(-1.5, 1.0)
     rough = {"shape": "rough", "hurst": round(dice.uniform(0.5, 1.0), 2), "rms_slope": slope, "seed": number}
-    tau = SIZE / 12 / speed * 10.0 ** dice.uniform(-1.0, 1.0) / (2.0 * math.pi)
+    tau = wave / speed * 10.0 ** dice.uniform(-1.0, 1.0) / (2.0 * math.pi)
     one = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 10.0 ** dice.uniform(5.5, 7.5)}]}
     one["branches"][0]["relaxation_time"] = tau  # type: ignore[index]
     body = one if dice.random() < 0.5 else {"include": "synthetic_tyre"}
     area = 10.0 ** dice.uniform(-2.0, -0.1)
-    stiffness = abs(complex(pc.material(body).complex_modulus(2.0 * math.pi * speed / (SIZE / 12))))
+    stiffness = abs(complex(pc.material(body).complex_modulus(2.0 * math.pi * speed / (wave))))
     pressure = stiffness * slope * (2.0 * area + 8.0 * max(area - 0.5, 0.0))
     return {
         "grid": {"size": SIZE},
-        "surface": {**rough, "long_wavelength": SIZE / 3, "short_wavelength": SIZE / WAVES},
+        "surface": {**rough, "long_wavelength": SIZE / 3, "short_wavelength": wave},
         "material": body,
         "steady": {"velocities": [speed], "pressures": [pressure]},
     }
@@ -72,11 +77,13 @@ def steady(job: dict[str, Any], mesh: Mesh) -> tuple[float, float]:
     return float(found.friction[0]), float(found.contact_area_corrected[0])
 
 
-def trial(seed: int, times: float, counts: Counter[str], ratios: dict[str, list[float]], number: int) -> Iterator[str]:
+def trial(
+    asked: argparse.Namespace, counts: Counter[str], ratios: dict[str, list[float]], number: int
+) -> Iterator[str]:
     """Yield what is missed; add the points over those of the cheapest mesh by either definition."""
-    job = scene(seed, number)
+    job, meshes = scene(asked.seed, number, asked.dozens), meshes_of(asked.dozens)
     solved = cache(partial(steady, job))
-    along, across = (WAVES * cells for cells in FINEST)
+    along, across = (DOZEN * asked.dozens * cells for cells in FINEST)
     finest, half = solved((along, across)), solved((along // 2, across // 2))
     true = finest[0], finest[1] + (finest[1] - half[1]) / (2.0**AREA_ORDER - 1.0)
     print(f"{number}: friction {true[0]:.5f}, area {true[1]:.4f}", flush=True)
@@ -86,16 +93,16 @@ def trial(seed: int, times: float, counts: Counter[str], ratios: dict[str, list[
         return abs(friction / true[0] - 1.0), abs(area / true[1] - 1.0)
 
     for accuracy in ACCURACIES:
-        asked = {"friction": accuracy, "area": min(times * accuracy, 0.9)}
-        limits = tuple(asked.values())
+        wanted = {"friction": accuracy, "area": min(asked.area * accuracy, 0.9)}
+        limits = tuple(wanted.values())
         keeps: Keeps = cache(lambda mesh, limits=limits: all(map(le, errors(mesh), limits)))
-        chosen = load({**job, "grid": {"points": "auto", "size": SIZE}, "numerics": {"accuracy": asked}}).grid.points
+        chosen = load({**job, "grid": {"points": "auto", "size": SIZE}, "numerics": {"accuracy": wanted}}).grid.points
         found = " and ".join(f"{100 * error:.2f} %" for error in errors(chosen))
         counts["accuracies"] += 1
         text = f"{100 * accuracy:g} %: {chosen[0]} x {chosen[1]}"
         told = []
         for name, finer in FINER.items():
-            best = cheapest(keeps, finer, math.prod(chosen))
+            best = cheapest(keeps, meshes, finer, math.prod(chosen))
             ratios[name].append(math.prod(chosen) / math.prod(best or chosen))
             told.append(f"{f'{best[0]} x {best[1]}' if best else 'none cheaper'} {name}")
         print(f"  {text}, errors {found}; cheapest: {', '.join(told)}", flush=True)
@@ -104,33 +111,39 @@ def trial(seed: int, times: float, counts: Counter[str], ratios: dict[str, list[
             yield f"{text} points miss it by {found}"
 
 
-def cheapest(keeps: Keeps, finer: Callable[[Mesh], list[Mesh]], most: int) -> Mesh | None:
+def meshes_of(dozens: int) -> list[Mesh]:
+    """Return all meshes for so many dozens of shortest waves, those of the fewest points first."""
+    lengths = [dozens * length for length in LENGTHS]
+    return sorted(((nx, ny) for nx, ny in product(lengths, lengths) if ny <= nx <= 4 * ny), key=math.prod)
+
+
+def cheapest(keeps: Keeps, meshes: list[Mesh], finer: Finer, most: int) -> Mesh | None:
     """Return the mesh with the fewest points that keeps the accuracy with those that are `finer`; None of `most` points
     and more."""
-    return next((mesh for mesh in MESHES if math.prod(mesh) < most and all(map(keeps, (mesh, *finer(mesh))))), None)
+    return next((one for one in meshes if math.prod(one) < most and all(map(keeps, (one, *finer(one, meshes))))), None)
 
 
-def all_finer(mesh: Mesh) -> list[Mesh]:
+def all_finer(mesh: Mesh, meshes: list[Mesh]) -> list[Mesh]:
     """Return all meshes that are as fine or finer along each side, the coarsest first."""
-    return [other for other in MESHES if other[0] >= mesh[0] and other[1] >= mesh[1]]
+    return [other for other in meshes if other[0] >= mesh[0] and other[1] >= mesh[1]]
 
 
-def next_finer(mesh: Mesh) -> list[Mesh]:
+def next_finer(mesh: Mesh, meshes: list[Mesh]) -> list[Mesh]:
     """Return the meshes that are finer by one length along one side."""
-    x, y = (LENGTHS[min(LENGTHS.index(n) + 1, len(LENGTHS) - 1)] for n in mesh)
+    others = all_finer(mesh, meshes)
+    x, y = (min({other[side] for other in others} - {mesh[side]}, default=mesh[side]) for side in (0, 1))
     return [(x, mesh[1]), (mesh[0], y)]
 
 
-MESHES = sorted(((nx, ny) for nx, ny in product(LENGTHS, LENGTHS) if ny <= nx <= 4 * ny), key=math.prod)
-FINER = {"of all finer": all_finer, "of the next finer": next_finer}
+FINER: dict[str, Finer] = {"of all finer": all_finer, "of the next finer": next_finer}
 
 
 def main() -> int:
-    options = campaign.parser(__doc__, 10, "scenes", area=(1.0, "the accuracy of the area over that of friction"))
+    options = campaign.parser(__doc__, 10, "scenes", area=(1.0, AREA), dozens=(1, DOZENS))
     asked, counts = options.parse_args(), Counter[str]()
-    ratios: dict[str, list[float]] = {name: [] for name in FINER}
+    ratios: Ratios = {name: [] for name in FINER}
     warnings.simplefilter("ignore")
-    campaign.go(asked, partial(trial, asked.seed, asked.area, counts, ratios), counts)
+    campaign.go(asked, partial(trial, asked, counts, ratios), counts)
     medians = {name: statistics.median(found) for name, found in ratios.items()}
     for name, found in ratios.items():
         more = sum(ratio > MOST for ratio in found)
