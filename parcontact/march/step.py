@@ -232,11 +232,11 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
 def _path(scene: Scene, state: State, trial: Trial, control: MeanPressure | Approach) -> sticking.Path:
     """Return the way of what is prescribed since the last step, in the run's units."""
     pressure = state.row.measures.pressure / (trial.alpha * scene.units.pressure)
-    approach = state.approach
-    if isinstance(control, Approach) and state.alpha == 0.0:  # nothing has come nearer than this yet
-        approach = min(approach, control.value)
-    before = pressure if isinstance(control, MeanPressure) else approach
-    return sticking.Path(before, control, approach, pressure)
+    if isinstance(control, MeanPressure):
+        together = control.value >= 0.0 and state.row.measures.contact_area == 0.0
+        return sticking.Path(0.0 if together else pressure, control, state.approach, pressure, together)
+    approach = state.approach if state.alpha else min(state.approach, control.value)  # nothing came nearer than this
+    return sticking.Path(approach, control, approach, pressure)
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:

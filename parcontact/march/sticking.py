@@ -24,7 +24,7 @@ from ..scene import Scene
 from ..solve.adhesive import kernels
 from ..solve.certificate import Certificate
 from ..solve.contact import Contact
-from ..solve.problem import Approach, MeanPressure
+from ..solve.problem import Approach, Control
 from ..storage.checkpoint import Contents
 from .starts import cells_moved
 from .sticking_energies import NO_ENERGIES, PathWork, StickingEnergies
@@ -104,14 +104,15 @@ def at_rest(scene: Scene) -> StickingMemory:
 @dataclass(frozen=True)
 class Path:
     """The way of the prescribed load from the last step to this one; approach and mean pressure of the last one; in the
-    units of the solver."""
+    units of the solver. A load that presses surfaces which are apart first brings them `together`."""
 
     before: float
-    control: Approach | MeanPressure
+    control: Control
     approach: float
     pressure: float
+    together: bool = False
 
-    def at(self, share: float) -> Approach | MeanPressure:
+    def at(self, share: float) -> Control:
         """Return what is prescribed at a share of the way; exact at its end."""
         if share == 1.0:
             return self.control
@@ -186,15 +187,20 @@ def front_of(scene: Scene, flips: float, before: Measures, now: Measures) -> flo
 
 def open_up(scene: Scene, stuck: StuckContact, trial: Trial) -> StuckContact:
     """Return the contact with the surfaces apart: where nothing holds a load, and the run goes on; collective."""
-    contact, law, gap = stuck.contact, scene.law(trial.alpha), stuck.memory.pasts[0].gap
+    contact, law, memory = stuck.contact, scene.law(trial.alpha), stuck.memory
+    (now, before), lag = memory.pasts, memory.lag
     assert law is not None
     contact.p.fill(0.0)
     contact.u.fill(0.0)
     highest = scene.slab.reduce((), [float(trial.effective.max(initial=-np.inf))])[0]
     d = -highest - OPEN * law.range
-    np.subtract(-d, trial.effective, out=gap)
+    np.subtract(-d, trial.effective, out=now.gap)
+    if lag is not None:
+        lag.fill(0.0)
+    memory = replace(memory, pasts=(now, before._replace(known=False)))
     contact = replace(contact, d=d, failure="", certificate=Certificate(0.0, 0.0, 0.0))
-    return stuck._replace(contact=contact, touching=gap == 0.0, columns=_columns(scene, trial, contact.p))
+    touching, columns = now.gap == 0.0, _columns(scene, trial, contact.p)
+    return stuck._replace(contact=contact, memory=memory, touching=touching, columns=columns)
 
 
 def _start(
@@ -222,9 +228,11 @@ def _start(
     loops.travel(now.gap, older, 1.0 + growth, growth, along_x, 0.0, np.inf, out)
     if along_y:
         out[...] = rows.roll(slab, out, along_y, scene.solver.workspace.pressure)
+    if path.together:
+        out += slab.reduce((), [-float(out.min(initial=np.inf))])[0]
 
 
-def _of_undeformed(scene: Scene, effective: Array, control: Approach | MeanPressure, out: Array) -> None:
+def _of_undeformed(scene: Scene, effective: Array, control: Control, out: Array) -> None:
     """Put the gap under a body that nothing has deformed into a map: at the approach, or where the surface touches;
     collective."""
     slab = scene.slab

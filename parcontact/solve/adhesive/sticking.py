@@ -111,9 +111,7 @@ class StickingSolver:
         failure = f"did not settle in {most} passes of a free body: changes are {asked}"
         return replace(found, failure=failure), iterations
 
-    def _judge(
-        self, control: Control, found: GapSolution, p: Array, change: Array
-    ) -> tuple[GapSolution, float]:
+    def _judge(self, control: Control, found: GapSolution, p: Array, change: Array) -> tuple[GapSolution, float]:
         """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
         approach; returns this number too; collective."""
         certificate, slab = found.certificate, self.workspace.slab
