@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
@@ -14,7 +15,7 @@ from ..job.sections.geometry import Sphere, Wave
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
-from ..physics.adhesion import AdhesionLaw, smallest_range
+from ..physics.adhesion import AdhesionLaw, ramp_of, smallest_range
 from .effect import Decision, Effect, Instant
 
 MOST_CELLS = 2.0  # physics: process zones in a cell; with more, nothing can be said about rates
@@ -54,7 +55,8 @@ def law_of(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw |
     reach = section.range
     if not isinstance(reach, float):
         reach = smallest_range(section.work, modulus_of(material), cell_of(grid), CELLS)
-    return AdhesionLaw(section.work, reach, section.law)
+    law = AdhesionLaw(section.work, reach, section.law)
+    return replace(law, ramp=ramp_of(law, modulus_of(material), cell_of(grid))) if law.kind == "dugdale" else law
 
 
 def cell_of(grid: Grid) -> float:

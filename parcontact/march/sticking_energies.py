@@ -67,7 +67,7 @@ def after_step(
     law = scene.law(trial.alpha)
     assert scene.energy is not None
     assert law is not None
-    (sum_gamma,) = scene.slab.sum(kernels.surface_energy(*law, gap))
+    (sum_gamma,) = scene.slab.sum(kernels.surface_energy(law, gap))
     surfaces = sum_gamma * trial.alpha * scene.energy.unit
     gained = body + surfaces - past.surfaces
     dragged, doubt = _drag(before, measures, slid)

@@ -5,6 +5,10 @@ With the work of adhesion w [J/m^2], the range rho [m] and the gap g,
     exponential  sigma(g) = (w/rho) exp(-g/rho),          gamma(g) = w exp(-g/rho),
     dugdale      sigma(g) = w/rho for g < rho, else 0,    gamma(g) = w max(1 - g/rho, 0).
 
+A node that crosses the end of Dugdale's law would snap, which makes an error in proportion to the side h of the cells.
+So the law that is solved ends over a ramp in the gap, centred at rho: it is the mean of the law over a cell at the end
+of the process zone, where the gap rises by some 2 rho h/l in a cell.
+
 The traction at the edge of a contact rises over the process zone `l = E* rho^2/w`, with E* = 2 G/(1 - nu). The numbers
 of Tabor and Johnson say of which kind an adhesive contact is,
 
@@ -23,11 +27,12 @@ KINDS = ("exponential", "dugdale")
 
 @dataclass(frozen=True)
 class AdhesionLaw:
-    """A law of adhesion: work [J/m^2], range [m], kind."""
+    """A law of adhesion: work [J/m^2], range [m], kind; of Dugdale's law the ramp [m]."""
 
     work: float
     range: float
     kind: Literal["exponential", "dugdale"] = "exponential"
+    ramp: float = 0.0
 
     @property
     def strength(self) -> float:
@@ -45,6 +50,11 @@ class AdhesionLaw:
     def johnson(self, modulus: float, length: float, amplitude: float) -> float:
         """Return Johnson's parameter for E* [Pa], the length of a wave [m] and its amplitude [m]."""
         return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / amplitude
+
+
+def ramp_of(law: AdhesionLaw, modulus: float, cell: float) -> float:
+    """Return the ramp of Dugdale's law [m], 2 rho h/l and at most 2 rho, for E* [Pa] and the side of a cell [m]."""
+    return 2.0 * law.range * cell / max(law.process_zone(modulus), cell)
 
 
 def smallest_range(work: float, modulus: float, cell: float, cells: float) -> float:

@@ -169,8 +169,8 @@ class Scene:
         law = self.choices.adhesion
         if law is None:
             return None
-        kind = DUGDALE if law.kind == "dugdale" else EXPONENTIAL
-        return Law(kind, law.strength / (alpha * self.units.pressure), law.range / self.units.height)
+        kind, unit = DUGDALE if law.kind == "dugdale" else EXPONENTIAL, self.units.height
+        return Law(kind, law.strength / (alpha * self.units.pressure), law.range / unit, law.ramp / unit)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:

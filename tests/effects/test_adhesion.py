@@ -72,3 +72,12 @@ def test_what_check_tells() -> None:
     _, wave = job(surface={"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]}).facts
     alpha = math.sqrt(2 * 0.05 * 2e-4 / (math.pi**2 * E)) / 1e-6
     assert f"Johnson's parameter {alpha:.3g}: full contact without load" in wave
+
+
+@pytest.mark.parametrize(("reach", "cells"), [(4e-7, 2 * 6.25e-6 / 12.8e-6), (1e-7, 2.0)])
+def test_the_ramp_of_dugdales_law(reach: float, cells: float) -> None:
+    """`2 h/l` of the range; on cells longer than a process zone from a gap of 0 on, so that no work is lost."""
+    dugdale = job(adhesion={"work": 0.05, "range": reach, "law": "dugdale"})
+    law = law_of(dugdale.section("adhesion"), dugdale.grid, dugdale.material)
+    assert law is not None
+    assert law.ramp == pytest.approx(cells * reach, rel=1e-12)

@@ -59,19 +59,16 @@ def test_load_over_approach_tends_to_jkr(size: float) -> None:
 
 @pytest.mark.parametrize(
     ("parameter", "points", "box", "way"),
-    [(0.2, 48, 6, (1.0, -5.0)), (0.5, 64, 4, (0.3, -1.5)), (1.0, 96, 3, (0.3, -1.5))],
+    [(0.2, 96, 6, (1.0, -5.0)), (0.5, 128, 4, (0.3, -1.5)), (1.0, 192, 3, (0.3, -1.5)), (5.0, 184, 1.92, (0.0, -1.6))],
 )
 def test_pull_off_with_dugdales_law(parameter: float, points: int, box: float, way: tuple[float, float]) -> None:
-    """Maugis' theory. Where the attraction ends a node has two places to be, which makes an error of the order of the
-    cells: it is extrapolated from two meshes, and 1 % is left. For the parameter 5 that error is 0.5 h/l, which
-    takes finer meshes."""
+    """Maugis' theory to 1 % on cells of at most half a process zone. On the last mesh, of this size, the place of the
+    sphere between the nodes moves the pull-off by some 0.5 %. A law without a ramp is 20 % off there."""
     stress = parameter / 2 * np.cbrt(np.pi * WORK * (4 / 3 * MODULUS) ** 2 / RADIUS)
-    forces = []
-    for count in (points, 2 * points):
-        path = {"approach": way[0] * LENGTH}, ramp(way[0] * LENGTH, way[1] * LENGTH, 36)
-        forces.append(pull_off(sphere(count, box, LENGTH * stress / WORK, *path, law="dugdale")))
-    exact = adhesion.maugis_pull_off(parameter) * np.pi * WORK * RADIUS
-    assert_allclose(2 * forces[1] - forces[0], exact, rtol=0.01)
+    path = {"approach": way[0] * LENGTH}, ramp(way[0] * LENGTH, way[1] * LENGTH, 24)
+    job = sphere(points, box, LENGTH * stress / WORK, *path, law="dugdale")
+    assert cells_per_zone(job) > 2.0
+    assert_allclose(pull_off(job), adhesion.maugis_pull_off(parameter) * np.pi * WORK * RADIUS, rtol=0.01)
 
 
 # -- lines -----------------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Fused loops over this rank's rows for contacts that stick; each returns partial sums for one Allreduce.
 
-The law of adhesion is three numbers `kind, s, rho` (`law`); q is the pressure K (g + h), to which a mean is added.
+The attraction is that of a `Law`; q is the pressure K (g + h), to which a mean is added.
 """
 
 import numpy as np
@@ -12,11 +12,11 @@ SHORT = 1e-3  # accuracy: of a way over the range, whose energy is then right to
 
 
 @loop
-def attract(kind, s, rho, g, sigma):
+def attract(law, g, sigma):
     """`sigma <- sigma(g)`."""
     for j in range(g.shape[0]):
         for i in range(g.shape[1]):
-            sigma[j, i] = attraction(kind, s, rho, g[j, i])
+            sigma[j, i] = attraction(law, g[j, i])
 
 
 @loop
@@ -146,7 +146,7 @@ def rescale(g, factor, way):
 
 
 @loop
-def curvature(kind, rho, g, q, mean, sigma, way, image):
+def curvature(law, g, q, mean, sigma, way, image):
     """Sums over a way w of `-c w`, of `w K w`, whose second factor is the image, of `w^2 (-d sigma/dg)` and of w; and
     the largest -w/g."""
     slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
@@ -157,7 +157,7 @@ def curvature(kind, rho, g, q, mean, sigma, way, image):
             w = way[j, i]
             row_slope -= (q[j, i] + mean + sigma[j, i]) * w
             row_stiff += w * image[j, i]
-            row_soft += w * w * softening(kind, rho, sigma[j, i])
+            row_soft += w * w * softening(law, sigma[j, i])
             row_total += w
             fastest[i] = max(fastest[i], -w / g[j, i] if w < 0.0 else 0.0)
         slope += row_slope
@@ -168,7 +168,7 @@ def curvature(kind, rho, g, q, mean, sigma, way, image):
 
 
 @loop
-def move(kind, s, rho, g, q, mean, sigma, step, way, image, g_new, sigma_new):
+def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
     """`g_new = g + step way`, and its attraction. Returns the sums of `d (q + mean + step image/2) + gamma(g) -
     gamma(g_new)`, with `d = g_new - g`, and of its magnitude. Energies of short ways are those of the mean attraction,
     which rounds less."""
@@ -178,9 +178,9 @@ def move(kind, s, rho, g, q, mean, sigma, step, way, image, g_new, sigma_new):
         for i in range(g.shape[1]):
             now, d, pull = g[j, i], step * way[j, i], sigma[j, i]
             new = now + d if now + d > 0.0 else 0.0
-            pull_new = attraction(kind, s, rho, new)
-            surface = energy(kind, rho, now, pull) - energy(kind, rho, new, pull_new)
-            if kind == EXPONENTIAL and abs(d) < SHORT * rho:
+            pull_new = attraction(law, new)
+            surface = energy(law, now, pull) - energy(law, new, pull_new)
+            if law.kind == EXPONENTIAL and abs(d) < SHORT * law.range:
                 surface = 0.5 * d * (pull + pull_new)
             push = q[j, i] + mean + 0.5 * step * image[j, i]
             g_new[j, i] = new
@@ -231,13 +231,13 @@ def count_flips(g_old, g):
 
 
 @loop
-def surface_energy(kind, s, rho, g):
+def surface_energy(law, g):
     """Sum of `-gamma(g)`."""
     total = 0.0
     for j in range(g.shape[0]):
         row = 0.0
         for i in range(g.shape[1]):
-            row -= energy(kind, rho, g[j, i], attraction(kind, s, rho, g[j, i]))
+            row -= energy(law, g[j, i], attraction(law, g[j, i]))
         total += row
     return total
 

@@ -1,10 +1,12 @@
 """Laws of adhesion: the attraction sigma of two points over their gap, its energy gamma and its slope.
 
-A law is three numbers: its `kind` (EXPONENTIAL or DUGDALE), its strength s and its range rho,
+A law is four numbers: its `kind` (EXPONENTIAL or DUGDALE), its strength s, its range rho and its ramp r,
 
     exponential  sigma(g) = s exp(-g/rho),            gamma(g) = s rho exp(-g/rho),
-    dugdale      sigma(g) = s where g < rho, else 0,  gamma(g) = s max(rho - g, 0).
+    dugdale      sigma(g) = s ((rho - g)/r + 1/2), at least 0 and at most s, and -d gamma/dg = sigma.
 
+The ramp, up to 2 rho, is the width over which a constant attraction ends: in a cell where the gap rises by r, it is the
+mean of the law without ramp. Its energy is the same, gamma(0) = s rho.
 The exponential is the dearest part of a loop. So it is calculated once for each gap, and energy and slope from it.
 """
 
@@ -23,11 +25,12 @@ POWERS = 2.0 ** -np.arange(FARTHEST / LOG_TWO + 2.0)
 
 
 class Law(NamedTuple):
-    """A law in the units of a solve."""
+    """A law in the units of a solve; only the kind DUGDALE has a ramp."""
 
     kind: int
     strength: float
     range: float
+    ramp: float = 0.0
 
 
 @loop
@@ -43,20 +46,25 @@ def decay(x):
 
 
 @loop
-def attraction(kind, s, rho, g):
+def attraction(law, g):
     """sigma at a gap."""
-    if kind == EXPONENTIAL:
-        return s * decay(g / rho)
-    return s if g < rho else 0.0
+    if law.kind == EXPONENTIAL:
+        return law.strength * decay(g / law.range)
+    return law.strength * min(max((law.range - g) / law.ramp + 0.5, 0.0), 1.0)
 
 
 @loop
-def energy(kind, rho, g, sigma):
+def energy(law, g, sigma):
     """The energy gamma per area that it takes to open a gap from g on, where the attraction is sigma."""
-    return rho * sigma if kind == EXPONENTIAL else (rho - g) * sigma
+    if law.kind == EXPONENTIAL:
+        return law.range * sigma
+    end = law.range + 0.5 * law.ramp
+    return sigma * (law.range - g if sigma == law.strength else 0.5 * (end - g))
 
 
 @loop
-def softening(kind, rho, sigma):
+def softening(law, sigma):
     """`-d sigma/dg`, where the attraction is sigma."""
-    return sigma / rho if kind == EXPONENTIAL else 0.0
+    if law.kind == EXPONENTIAL:
+        return sigma / law.range
+    return law.strength / law.ramp if 0.0 < sigma < law.strength else 0.0

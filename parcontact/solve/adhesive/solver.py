@@ -117,7 +117,7 @@ class GapSolver:
             mean_g = given
         np.add(gap, heights, out=self._q)
         self.operators.inverse.apply(self._q, self._q)
-        kernels.attract(*law, gap, self._sigma)
+        kernels.attract(law, gap, self._sigma)
         means = compliance * self.operators.mean, compliance * self.operators.least_mean
         return Iterate(law, heights, mean_h, control, given, mean_g, *means)
 
@@ -201,7 +201,7 @@ class GapSolver:
         share = self._share(it, g)
         for _ in range(MAX_TRIES if share > 0.0 else 0):
             to = share, self._way, self._image, out, self._other_sigma
-            rise, size = self.slab.sum(*kernels.move(*it.law, g, self._q, it.m, self._sigma, *to))
+            rise, size = self.slab.sum(*kernels.move(it.law, g, self._q, it.m, self._sigma, *to))
             mean = it.mean_gap
             if it.given is None:
                 mean += share * it.moved
@@ -231,8 +231,7 @@ class GapSolver:
         """The share of the way that is the step of Newton, or the majorized one, and the most that gaps allow;
         collective."""
         self.operators.inverse.apply(self._way, self._image)
-        kind, _, reach = it.law
-        *sums, fastest = kernels.curvature(kind, reach, g, self._q, it.m, self._sigma, self._way, self._image)
+        *sums, fastest = kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
         slope, stiff, soft, total, fastest = self.slab.reduce(sums, [fastest])
         it.moved = total / self.slab.points
         own = self.slab.points * it.moved**2 / it.least_mean

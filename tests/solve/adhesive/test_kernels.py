@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from parcontact.solve.adhesive import kernels, law
 
-KINDS = [law.EXPONENTIAL, law.DUGDALE]
 S, RHO = 2.0, 0.3
+LAWS = [law.Law(law.EXPONENTIAL, S, RHO), law.Law(law.DUGDALE, S, RHO, 0.4), law.Law(law.DUGDALE, S, RHO, 2 * RHO)]
 SHAPES = [(5, 7), (1, 1), (0, 4)]
 
 
@@ -17,12 +17,19 @@ def maps(shape: tuple[int, int]) -> tuple[np.ndarray, ...]:
     return np.maximum(gap, 0.0), *others
 
 
-def attraction(kind: int, gap: np.ndarray) -> np.ndarray:
-    return S * np.exp(-gap / RHO) if kind == law.EXPONENTIAL else np.where(gap < RHO, S, 0.0)
+def attraction(one: law.Law, gap: np.ndarray) -> np.ndarray:
+    if one.kind == law.EXPONENTIAL:
+        return S * np.exp(-gap / RHO)
+    return np.interp(gap, RHO + 0.5 * one.ramp * np.array([-1.0, 1.0]), [S, 0.0])
 
 
-def gamma(kind: int, gap: np.ndarray) -> np.ndarray:
-    return S * RHO * np.exp(-gap / RHO) if kind == law.EXPONENTIAL else S * np.maximum(RHO - gap, 0.0)
+def gamma(one: law.Law, gap: np.ndarray) -> np.ndarray:
+    """Of Dugdale's law with a ramp, the mean over it of `S (rho - g)` without: a quadrature of a kinked line, exact on
+    either side of the kink."""
+    if one.kind == law.EXPONENTIAL:
+        return S * RHO * np.exp(-gap / RHO)
+    low, high = (np.clip(RHO + 0.5 * sign * one.ramp - gap, 0.0, None) for sign in (-1.0, 1.0))
+    return S * 0.5 * (high**2 - low**2) / one.ramp
 
 
 def test_decay() -> None:
@@ -32,31 +39,31 @@ def test_decay() -> None:
     assert [law.decay(x) for x in (0.0, 700.0, 1e300, np.inf)] == [1.0, 0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_energy_and_slope_of_the_attraction(kind: int) -> None:
+@pytest.mark.parametrize("one", LAWS)
+def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
     """`d gamma/dg = -sigma` by central differences (second order, 1e-4 of the range), `gamma(0) = s rho`, and sigma's
-    slope is the softening; between the corners of the law."""
+    slope is the softening; between the corners of the laws."""
     step = 1e-4 * RHO
 
     def energy(gap: float) -> float:
-        return law.energy(kind, RHO, gap, law.attraction(kind, S, RHO, gap))
+        return law.energy(one, gap, law.attraction(one, gap))
 
     assert_allclose(energy(0.0), S * RHO, rtol=1e-15)
-    for gap in (0.1 * RHO, 0.7 * RHO, 2.0 * RHO):
+    for gap in (0.1 * RHO, 0.7 * RHO, 1.2 * RHO, 2.1 * RHO):
         low, high = gap - step, gap + step
-        here = law.attraction(kind, S, RHO, gap)
+        here = law.attraction(one, gap)
         assert_allclose((energy(low) - energy(high)) / (2 * step), here, rtol=1e-7)
-        slope = (law.attraction(kind, S, RHO, low) - law.attraction(kind, S, RHO, high)) / (2 * step)
-        assert_allclose(slope, law.softening(kind, RHO, here), rtol=1e-7)
+        slope = (law.attraction(one, low) - law.attraction(one, high)) / (2 * step)
+        assert_allclose(slope, law.softening(one, here), rtol=1e-7)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("kind", KINDS)
-def test_residual(kind: int, shape: tuple[int, int]) -> None:
+@pytest.mark.parametrize("one", LAWS)
+def test_residual(one: law.Law, shape: tuple[int, int]) -> None:
     gap, q, c, image, _ = maps(shape)
     working, sigma, pressed = np.zeros(shape, bool), np.empty(shape), q.copy()
-    kernels.attract(kind, S, RHO, gap, sigma)
-    assert_allclose(sigma, attraction(kind, gap), rtol=1e-14)
+    kernels.attract(one, gap, sigma)
+    assert_allclose(sigma, attraction(one, gap), rtol=1e-14)
     count, total = kernels.press(gap, pressed, sigma, 0.3, image)
     assert_allclose(pressed, q + 0.3 * image, rtol=1e-14, atol=1e-14)
     assert count == (gap > 0.0).sum()
@@ -73,19 +80,19 @@ def test_residual(kind: int, shape: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("size", [1.0, 1e-4])
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("kind", KINDS)
-def test_change_of_energy(kind: int, shape: tuple[int, int], size: float) -> None:
+@pytest.mark.parametrize("one", LAWS)
+def test_change_of_energy(one: law.Law, shape: tuple[int, int], size: float) -> None:
     """Along a way that closes gaps; along a short one of the exponential law to 1e-7 of what surfaces gain."""
     gap, q, image, t, _ = maps(shape)
     way, new, sigma, sigma_new = (np.empty(shape) for _ in range(4))
     total, cut = kernels.lead(gap, t, 0.4 * size, way)
     assert_allclose(way, np.maximum(gap - 0.4 * size * t, 0.0) - gap, atol=1e-15)
     assert_allclose((total, cut), ((gap + way).sum(), (way + 0.4 * size * t).sum()), rtol=1e-12, atol=1e-12)
-    kernels.attract(kind, S, RHO, gap, sigma)
-    rise, magnitude = kernels.move(kind, S, RHO, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
+    kernels.attract(one, gap, sigma)
+    rise, magnitude = kernels.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
     assert_allclose(new, gap + 0.5 * way, rtol=1e-14, atol=1e-15)
-    assert_allclose(sigma_new, attraction(kind, new), rtol=1e-14)
-    surface = gamma(kind, gap) - gamma(kind, new)
+    assert_allclose(sigma_new, attraction(one, new), rtol=1e-14)
+    surface = gamma(one, gap) - gamma(one, new)
     exact = (0.5 * way * (q + 0.2 + 0.25 * image) + surface).sum()
     assert_allclose(rise, exact, rtol=1e-12, atol=1e-13 + 1e-7 * np.abs(surface).sum() * (size < 1.0))
     assert magnitude >= abs(rise) * (1.0 - 1e-12)
