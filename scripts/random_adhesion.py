@@ -39,7 +39,7 @@ MODULUS = 1e6  # Pa; of the relaxed body
 STEPS = 12  # of a stage
 BALANCE = 1e-9  # of the largest energy: rounding
 WRONG = 0.05  # of all pressure: certificates allow a gap to be wrong by a part of the range
-LEAST = 1e-3  # of the strength: less is none
+LEAST = 1e-3  # of the strength, or of the work of adhesion: less is none
 LATE = 1.5  # steps: between the ends of contact with longer and with shorter ones
 APART = 0.05  # of the largest: areas and pressures on one rank and on three
 RANKS = 3
@@ -126,7 +126,9 @@ def violations(march: March, before: float) -> Iterator[str]:
         if apart > WRONG * np.abs(p).sum() + LEAST * law.strength * p.size:
             yield f"open points carry {apart / np.abs(p).sum():.2g} of all pressure too much or too little"
     parts = row.stored, row.dissipated, surfaces, lost
-    if abs(row.work - sum(parts)) > BALANCE * max(map(abs, (row.work, *parts))):
+    grid = march.scene.choices.grid
+    largest = max(map(abs, (row.work, *parts, LEAST * law.work * grid.lx * grid.ly)))
+    if abs(row.work - sum(parts)) > BALANCE * largest:
         yield f"work {row.work:g} J is not stored, dissipated, surfaces, snaps {parts}"
     if lost < before:
         yield f"snaps give back {before - lost:g} J"
