@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 from ..errors import JobError, RunError
 from ..job import log_range
+from ..job.checks.cells import more_points
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene import set_up
+from ..scene.sanity import ContactWatch
 from ..steady_sliding import curve
+from ..steady_sliding.heating import describe_hot
 from ..steady_sliding.point import Point
 from ..steady_sliding.sliding import SteadySliding
 from ..steady_sliding.table import describe_missed, value_of
@@ -93,20 +96,24 @@ def steady(
     base = set_up(found, slab)
     warn_of(base, wanted.temperatures)
     sliding = SteadySliding(base)
+    contacts = ContactWatch(found.numerics.strict, base.choices.timeline, more=more_points(found.grid))
     points: list[Point | None] = []
     failures: list[str] = []
+    doubts: list[str] = []
     for at in wanted.points:
+        point = None
         try:
             if wanted.temperatures:
                 sliding.heat(at.temperature)
-            points.append(sliding.solve(wanted.velocity(at.speed), at.pressure))
+            point = sliding.solve(wanted.velocity(at.speed), at.pressure)
         except RunError as error:
-            points.append(None)
             failures.append(str(error))
             warn(str(error), RuntimeWarning)
-    if slab.root:
-        for text in describe_missed([point for point in points if point], found):
-            warn(text)
+        points.append(point)
+        doubts += contacts.judge_point(point.measures, str(at)) if point else []
+    solved = [point for point in points if point]
+    for text in (*doubts, *describe_hot(solved), *describe_missed(solved, found)) if slab.root else ():
+        warn(text)
     return _curve(wanted.points, points, tuple(failures))
 
 

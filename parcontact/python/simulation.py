@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
@@ -12,6 +13,7 @@ from typing import Any, NoReturn
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job
+from ..job.checks.cells import more_points
 from ..job.sections.listing import plain_job
 from ..job.text.yamltext import parse
 from ..march.loop import March
@@ -22,11 +24,12 @@ from ..parallel.slab import Array, Slab
 from ..run import restart, runner
 from ..run.run import Options
 from ..scene import choices
+from ..scene.sanity import ContactWatch
 from ..steady_sliding import start
 from ..storage import checkpoint, heights, tables, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.fields import UNITS
-from .given_jobs import Given, agree, all_ranks, path_of, read, warn_of
+from .given_jobs import Given, agree, all_ranks, path_of, read, warn, warn_of
 from .row import Row
 
 
@@ -73,6 +76,8 @@ class Simulation:
             march.advance(step)
             if march.detached:
                 return
+            for text in self._contacts.judge(march.row.step, march.row.measures):
+                self._warns(text)
             yield self.row
 
     def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
@@ -92,7 +97,7 @@ class Simulation:
         self._wait_for_all("runs")
         at = str(self._saved.path if self._saved is not None else path_of(restart))
         with _in_a_file(self.job, self._slab) as job:
-            ended = runner.run_to_end(job, self._slab, Options(quiet, at))
+            ended = runner.run_to_end(job, self._slab, Options(quiet, at, shows=self._warns))
         if ended.march is None and ended.contents is None:
             raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
         self._march_made, self._saved, self._began = ended.march, ended.contents, True
@@ -193,6 +198,17 @@ class Simulation:
             self._march_made = start.first(self.job, self._slab, saved=saved)
             warn_of(self._march_made.scene.setup)
         return self._march_made
+
+    @cached_property
+    def _contacts(self) -> ContactWatch:
+        """What warns of contacts that mean little."""
+        return ContactWatch(self.job.numerics.strict, self._march.timeline(), more=more_points(self.job.grid))
+
+    def _warns(self, text: str) -> bool:
+        """Warn, on root, in the place of whoever would show the text."""
+        if self._slab.root:
+            warn(text)
+        return False
 
     def _wait_for_all(self, what: str) -> None:
         """Wait for all ranks to do `what`; collective. Raises RunError if one does something else or has ended."""

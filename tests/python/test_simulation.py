@@ -251,16 +251,6 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         pc.open("here")
 
 
-def test_warnings_are_those_of_python() -> None:
-    """A slope beyond linear theory: the surface is steep, as the command line says."""
-    steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}
-    with pytest.warns(UserWarning, match="slope") as said:
-        next(pc.Simulation(steep, comm=MPI.COMM_SELF).steps())
-    with pytest.warns(UserWarning, match="slope") as also:
-        pc.steady({**steep, "numerics": {"accuracy": 0.1}}, 0.1, 1e6, comm=MPI.COMM_SELF)
-    assert {warning.filename for warning in [*said, *also]} == {__file__}
-
-
 def test_heights_with_names_of_axes() -> None:
     """They are taken by these, whatever their order."""
     xarray = pytest.importorskip("xarray")

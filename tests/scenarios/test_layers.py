@@ -50,6 +50,7 @@ def test_thin_incompressible_layer_under_a_sphere(boundary: str) -> None:
     assert load == pytest.approx(np.pi * modulus * a**6 / (32 * radius * thickness**3), rel=0.02)
 
 
+@pytest.mark.filterwarnings("ignore:.*the contact reaches the edge of the box")
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_a_thick_layer_is_a_half_space(boundary: str) -> None:
     """A thousand times as thick as the box is long; a free body moves as a whole by box over thickness less."""
@@ -148,6 +149,7 @@ def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
 
 
 @pytest.mark.mpi
+@pytest.mark.filterwarnings("ignore:.*the contact reaches the edge of the box")
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
     """Preconditioners sum up in single precision: to 1e-7 of a step, the last of which are 1e-2 of p or less."""
     for boundary in ("periodic", "free"):
