@@ -7,7 +7,8 @@ mean pressure p on a surface of rms slope h' the share is
 
 here with the modulus G at the frequency with which the shortest wave passes. Ten sliding surfaces had 1.1 to 2 times as
 much. The phase of the modulus is that at EDGES times this frequency. Edges of spots see the frequencies of cells; of 1
-to 32 times, 16 told the most of what the mesh makes of the area.
+to 32 times, 16 told the most of what the mesh makes of the area. Where the loss angle is still in proportion to the
+frequency there, sliding is slow, and edges lose power in waves shorter than the cells (`physics.edge_loss`).
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from .sections.stages import Initial, Stage, Steady
 
 UNKNOWN = 0.1  # accuracy: where slopes or loads are not known
 LEAST, MOST = 0.005, 0.95  # accuracy: for which the laws of the mesh were found
-EDGES = 16.0  # accuracy: times the frequency of the shortest wave
+FEW, EDGES = 0.5, 16.0  # accuracy: times the frequency of the shortest wave: of spots of contact, and of their edges
+SLOWNESS = 1.5  # accuracy: power with which it counts
 NODES = 400  # accuracy: of integrals over the spectrum, to 1e-4
 RELAXATION = EntryPoint("relaxation", "parcontact.effects.relaxation:relaxation_of", "")  # of materials of all kinds
 
@@ -41,13 +43,22 @@ class Loaded(Protocol):
 
 
 def guess(job: Loaded, wave: float, area: float) -> Guess:
-    """Return the smallest share in contact of a job, whose shortest wave [m] and box [m^2] are these, and the largest
-    phase."""
+    """Return the smallest share in contact of a job, whose shortest wave [m] and box [m^2] are these, the largest
+    phase, and how slow the slowest sliding of a friction curve is."""
     slope, series = _slope(job.surface), RELAXATION.load()(job.material)
     loads = [(p, 2.0 * math.pi * v / wave) for p, v in _loads(job, area) if p > 0.0]
     share = min((_share(p, abs(_modulus(series, w)), job.material.poisson, slope) for p, w in loads), default=UNKNOWN)
     phase = max((cmath.phase(_modulus(series, EDGES * w)) for _, w in loads), default=0.5 * math.pi * USUAL_PHASE)
-    return Guess(share if slope else UNKNOWN, 2.0 / math.pi * phase)
+    passing = (2.0 * math.pi * v / wave for v in (job.steady.velocities if job.steady and not job.history else ()))
+    slow = max((_slowness(series, w) for w in passing), default=0.0)
+    return Guess(share if slope else UNKNOWN, 2.0 / math.pi * phase, slow)
+
+
+def _slowness(series: Any, omega: float) -> float:
+    """Return how nearly in proportion to the frequency the body loses, from FEW to EDGES times this one: 1 far below
+    its own frequencies, 0 above."""
+    few, many = (math.sin(cmath.phase(_modulus(series, times * omega))) for times in (FEW, EDGES))
+    return (FEW / EDGES * many / few) ** SLOWNESS if few > 0.0 else 0.0
 
 
 def _share(pressure: float, modulus: float, poisson: float, slope: float) -> float:

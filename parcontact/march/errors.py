@@ -190,7 +190,7 @@ def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony |
     cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # across a line of points there is nothing
     cells = min(waves) / max(cell) if waves else None
     straight = 1 in job.grid.points or _ridges(job.surface)
-    return RunProperties(cells, straight, folded, exponential, prony, cell)
+    return RunProperties(cells, straight, folded, exponential, prony, cell, job.grid.boundary == "free")
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:

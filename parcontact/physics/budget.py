@@ -12,10 +12,10 @@ solver: from the `complementarity` C of the certificate (see `solve.contact.Cert
 time: from how far the spots of contact, or the waves of the surface, pass in a step, and from the embedded pair (see
     `time_error`).
 folded: the bound of the branches without a map.
-mesh: of friction by how much its two views differ, by the slopes of the rigid surface and of the body (`slopes`), and
-    what both have in common: from the cells per shortest wave of a rough surface, and per radius of the spots of
-    contact, along the sliding and across it (`mesh_error`). Of the corrected area from the correction itself. Where
-    there is a run on half the mesh, both from their difference to it.
+mesh: of friction by how much its two views differ, by the slopes of the rigid surface and of the body (`slopes`), or
+    by what edges of contact lose in waves shorter than the cells, and what both views have in common: from the cells
+    per shortest wave of a rough surface, and per radius of the spots of contact (`mesh_error`). Of the corrected area
+    from the correction itself. Where there is a run on half the mesh, both from their difference to it.
 
 Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
 wrong with pressures then counts more, by about the root of the ratio. Pressures that are wrong by the complementarity
@@ -28,7 +28,7 @@ the two views over the slope of the surface, cells per shortest wave, and cells 
 states on rough surfaces, with 2 to 8 cells per shortest wave and friction of 5e-4 to 0.5 of the slope, 95 % are wrong
 by at most twice the estimate, which is 5 times the error in the median. With less than 4 cells, and with maps on grids
 that do not have their shortest waves, both views may be wrong by the same amount: 5 to 50 % at 2 to 3 cells. What cells
-per wave make of marches is then added in full.
+per wave make of marches is then added in full. Slow sliding lacks what edges lose, up to 10 % at 8 cells.
 """
 
 import math
@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 
 from ..printed import per_cent
 from .entries import Entry, Saved
-from .mesh_error import SPOTS_ORDER, SPOTS_POWER, WAVES_ORDER, area_by_mesh, friction_by_mesh
+from .mesh_error import SPOTS_ORDER, SPOTS_POWER, WAVES_ORDER, area_by_mesh, friction_by_mesh, lost_at_edges
 from .time_error import RunProperties, StepObservation, count_spots, share_of_area, time_error
 
 # accuracy: these constants are fitted to true errors, as the text above says
@@ -60,14 +60,15 @@ LEAST_WAY = 1e-60  # m: smaller weights are those of rest
 
 @dataclass(frozen=True)
 class Parts:
-    """Relative errors by what makes them; `across` is that part of the mesh's which the cells across the sliding make,
-    0 where nothing slides."""
+    """Relative errors by what makes them; of the mesh's part `across` is what the cells across the sliding make, 0
+    where nothing slides, and `edges` what edges of contact lose in waves shorter than the cells."""
 
     solver: float
     time: float
     folded: float
     mesh: float
     across: float = 0.0
+    edges: float = 0.0
 
     @property
     def total(self) -> float:
@@ -84,8 +85,9 @@ class Parts:
         return {name: getattr(self, name) for name in NAMES} | {"mesh_across": self.across, "total": self.total}
 
     def with_mesh(self, error: float) -> "Parts":
-        """Return the same with another error by the mesh, in the same proportion along and across."""
-        return replace(self, mesh=error, across=self.across * error / self.mesh if self.mesh > 0.0 else 0.0)
+        """Return the same with another error by the mesh, in the same proportions."""
+        times = error / self.mesh if self.mesh > 0.0 else 0.0
+        return replace(self, mesh=error, across=self.across * times, edges=self.edges * times)
 
 
 NAMES = ("solver", "time", "folded", "mesh")  # that add up
@@ -147,9 +149,10 @@ def _with_interface(
 def _steady_friction(run: RunProperties, observed: StepObservation, points: int) -> Parts:
     share = min(max(1.0, 4.0 / (run.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
     views = BY_ENERGY * observed.views_apart / max(observed.friction, PRESSURES * observed.slope)
+    lost = lost_at_edges(run, observed, points, steady=True)
     along, across = friction_by_mesh(run, observed, points, share)
     solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
-    return Parts(solver, 0.0, run.folded, views + along + across, across)
+    return Parts(solver, 0.0, run.folded, max(views, lost) + along + across, across, lost)
 
 
 def _friction(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:
@@ -157,8 +160,9 @@ def _friction(run: RunProperties, observed: StepObservation, points: int, time: 
     solver = SOLVER_FRICTION * observed.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
     noise = NOISE * max(observed.complementarity, ROUNDING) * observed.slope / observed.friction / math.sqrt(spots)
     along, across = friction_by_mesh(run, observed, points)
-    mesh = observed.views_apart / observed.friction + along + across
-    return Parts(max(solver, noise), time, run.folded, mesh, across)
+    lost = lost_at_edges(run, observed, points, steady=False)
+    mesh = max(observed.views_apart / observed.friction, lost) + along + across
+    return Parts(max(solver, noise), time, run.folded, mesh, across, lost)
 
 
 def compared_with_half_mesh(
@@ -171,13 +175,14 @@ def compared_with_half_mesh(
     """Return the budget with what another run shows of the mesh: `here` friction and corrected area of an instant,
     `coarse` those with twice the cell. As errors go with the power p of the cell, the difference is 2^p - 1 of them.
 
-    With p as above; of the corrected area, whose error falls slower, 1. A run with other time steps has another error
-    of time, by which it takes friction for too small: `coarse_error` is that of its friction in all, by its budget, NaN
-    if it has the same steps, or none. Of that, solver and folded branches make as much as here, the mesh 2^p times as
-    much, and the steps the rest.
+    With p as above, but 1 for what edges of contact lose, and 1 for the corrected area. A run with other time steps has
+    another error of time, by which it takes friction for too small: `coarse_error` is that of its friction in all, by
+    its budget, NaN if it has the same steps, or none. Of that, solver and folded branches make as much as here, the
+    mesh 2^p times as much, and the steps the rest.
     """
-    times = 2.0 ** (WAVES_ORDER if waves else SPOTS_ORDER)
     found, own, other = budget.friction, here[0], coarse[0]
+    first = min(1.0, found.edges / found.mesh) if found is not None and found.mesh > 0.0 else 0.0
+    times = 2.0 * first + 2.0 ** (WAVES_ORDER if waves else SPOTS_ORDER) * (1.0 - first)
     if found is not None and math.isfinite(coarse_error):
         by_steps = max(coarse_error - found.solver - found.folded - times * found.mesh, 0.0)
         own, other = own * (1.0 + found.time), other * (1.0 + by_steps)

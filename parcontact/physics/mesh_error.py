@@ -8,16 +8,24 @@ and of the cells per radius of the spots of contact in the same proportion, with
 loads whatever the waves; many of them average it out, and where little is open there are few edges. On squares the two
 add up to what was found there by experiment; the share of those across is from 16 meshes of ten surfaces
 (`job.checks.cells`). The corrected area is wrong by a share of its correction, by each direction as its cells are long.
+
+Edges of contact lose power in waves that are shorter than the cells, too: `edge_loss` says how much. Where a body
+relaxes before the surface has slid by a cell, this is most of the error, and it falls with the first power of the cell
+only. Friction by energy lacks it, and the two views of friction differ by it, but where they happen to agree.
 """
 
 import math
 
-from .time_error import RunProperties, StepObservation, Vector, count_spots, spot_radius
+from .edge_loss import lost_in_short_waves
+from .time_error import RunProperties, StepObservation, Vector, count_spots, radius_of, spot_radius
 
 # accuracy: these constants are fitted to true errors, as the text above says
 WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 SPOTS_POWER = 0.25  # of the number of spots, by which they average errors out
+LOST, FREE_LOST = 2.0, 6.0  # times s m^k of `edge_loss`; of steady sliding in free boxes, with sampled coefficients
+STEADY_POWER, MARCH_POWER = 1.0, 2.0  # k; in marches the cells per wave make enough of what is fast
+STRAIGHT_POWER = 0.5  # k along edges that follow the grid, which move by whole cells
 ACROSS = 0.06  # of these errors, on squares: that of the cells across the sliding
 EDGES, STRAIGHT_EDGES = 0.25, 3.0  # of the correction of the area; along edges that follow the grid
 SMALL_SPOTS = 0.6  # of the square of the correction, which is large where spots of contact are a few cells wide
@@ -33,6 +41,18 @@ def friction_by_mesh(
         return share * _by_waves(run, cells[0]) + _by_spots(run, observed, points, cells[0]), 0.0
     along, across = (share * _by_waves(run, cell) + _by_spots(run, observed, points, cell) for cell in cells)
     return (1.0 - ACROSS) * along, ACROSS * across
+
+
+def lost_at_edges(run: RunProperties, observed: StepObservation, points: int, steady: bool) -> float:
+    """Return the share of friction that edges of contact lose in waves shorter than the cells along the sliding, at
+    most; 0 at rest, and of an elastic body."""
+    if run.prony is None or not any(observed.way):
+        return 0.0
+    cell = cells_along_and_across(run, observed.way)[0]
+    size = radius_of(run, observed, points) * (run.mean_cell / cell)
+    share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.straight)
+    power = STRAIGHT_POWER if run.straight else STEADY_POWER if steady else MARCH_POWER
+    return min(1.0, (FREE_LOST if run.free and steady else LOST) * (1.0 - observed.area) * share * slow**power)
 
 
 def area_by_mesh(run: RunProperties, observed: StepObservation, points: int) -> tuple[float, float]:

@@ -63,7 +63,7 @@ class RunProperties:
 
     `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
     column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator; `prony`: what
-    relaxes, None of an elastic body; `cell`: its sides, in any unit. `cells_per_wave` counts the longer ones.
+    relaxes, None of an elastic body; `cell`: its sides [m]; `free`: the box. `cells_per_wave` counts the longer sides.
     """
 
     cells_per_wave: float | None
@@ -72,6 +72,7 @@ class RunProperties:
     exponential: bool
     prony: Prony | None = None
     cell: Vector = (1.0, 1.0)
+    free: bool = False
 
     @property
     def mean_cell(self) -> float:

@@ -34,7 +34,7 @@ ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
 MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
 ACROSS_SHARE = 0.2  # accuracy: of that of the mesh, for the cells across the sliding
 CHOSEN_SHARE = 0.65  # accuracy: of the accuracy, what time steps make that follow it, in the mean of a stage
-EDGE_ORDER = 1.0  # accuracy: of the cell, in which the error of the contact area falls
+EDGE_ORDER = 1.0  # accuracy: of the cell, in which the error of the contact area falls, and what edges lose
 CALLS_PER_DECADE = 1.5  # tuning: for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
 LONGER, COARSER, FINER = 4.0, 8.0, 16.0  # times the own steps, and the own cells, at most: no trial tells of more
@@ -72,14 +72,16 @@ def _finer(job: Job, sample: Sample, accuracy: float, axis: int) -> float:
         error, order = mesh_error(sample, "area") or 0.0, EDGE_ORDER
     elif across:
         error, share = (error - across, (1.0 - ACROSS_SHARE) * share) if slides else (across, ACROSS_SHARE * share)
+        edges = min(error, mesh_error(sample, "friction", "edges") or 0.0) if slides else 0.0
+        order += (EDGE_ORDER - order) * edges / error
     factor = (error / share) ** (1.0 / order) * sample.job.grid.points[axis] / job.grid.points[axis]
     return max(of_waves, min(max(factor, 1.0 / COARSER), FINER)) if factor else of_waves or 1.0
 
 
 def mesh_error(sample: Sample, name: str, which: str = "mesh") -> float | None:
     """Return the part of the error of friction or area that the mesh of a sample makes, or its cells `across` the
-    sliding; None where there is none, and for friction that cannot be told from none, which no mesh makes exact to a
-    share of it."""
+    sliding, or its `edges`; None where there is none, and for friction that cannot be told from none, which no mesh
+    makes exact to a share of it."""
     weight = sample.total(f"{name} weight")
     error = sample.total(f"{name} {which} error") / weight if weight else None
     return None if name == "friction" and error is not None and error >= 1.0 else error

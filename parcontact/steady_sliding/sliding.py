@@ -169,7 +169,7 @@ class SteadySliding:
             interface=measures.friction_interface,
             way=velocity,
         )
-        return friction, estimate_steady(self._known, seen, setup.slab.points)
+        return friction, estimate_steady(replace(self._known, prony=setup.prony), seen, setup.slab.points)
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Return the wavelengths [m] of `branch_powers`, and what share of the friction power the waves from each to

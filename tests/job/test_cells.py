@@ -51,6 +51,15 @@ def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     assert found[0] * found[1] == least
 
 
+def test_slow_sliding_needs_cells_in_the_first_order() -> None:
+    """As many as SLOW 4/c asks for, where the other terms are small; half as many for twice the error."""
+    guess = cells.Guess(share=0.2, phase=cells.USUAL_PHASE, slow=1.0)
+    for asked in (0.02, 0.01):
+        nx, _ = cells.choose(WAVE, SIZE, [(1.0, 0.0)], Accuracy(friction=asked, area=0.9), guess)
+        least = cells.SLOW * 4.0 * guess.factor / asked * SIZE[0] / WAVE
+        assert least <= nx < 1.15 * least
+
+
 def test_long_cells_lie_across_the_sliding() -> None:
     along_x, along_y = (cells.choose(WAVE, SIZE, [way], FRICTION) for way in ((1.0, 0.0), (0.0, 1.0)))
     assert along_x == along_y[::-1]

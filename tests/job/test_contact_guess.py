@@ -7,7 +7,7 @@ import pytest
 
 from parcontact.job import Job
 from parcontact.job.checks.cells import Guess
-from parcontact.job.contact_guess import EDGES, LEAST, MOST, UNKNOWN, guess, slope_of
+from parcontact.job.contact_guess import EDGES, FEW, LEAST, MOST, UNKNOWN, guess, slope_of
 from parcontact.job.sections.geometry import Rough
 
 WAVES: dict[str, Any] = {"hurst": 0.5, "long_wavelength": 1e-3, "short_wavelength": 1e-5}
@@ -77,6 +77,20 @@ def test_phase_at_edges() -> None:
     found = guessed(material=body, history=None, steady=curve).phase
     assert found == pytest.approx(max(map(expected, velocities)), rel=1e-12)
     assert guessed().phase == guessed(material=body).phase == 0.0
+
+
+def test_slow_sliding_of_a_friction_curve() -> None:
+    """The loss angle in proportion to the frequency far below those of the body, its inverse far above; the slowest
+    velocity of a curve counts. Marches, whose time steps between cells see the edges, have none."""
+    body = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "relaxation_time": 1e-3}]}
+    curves = ([1e-9], [1e4], [1e-9, 1e4])
+    slow, fast, both = (
+        guessed(material=body, history=None, steady={"velocities": each, "pressures": [1e4]}).slow for each in curves
+    )
+    assert slow == pytest.approx(1.0, rel=1e-6)
+    assert fast == pytest.approx((FEW / EDGES) ** 3, rel=1e-3)
+    assert both == slow
+    assert guessed(material=body, history=[{"pressure": 1e4, "velocity": 1e-9, "distance": 1e-5}]).slow == 0.0
 
 
 def test_what_is_not_known() -> None:

@@ -38,10 +38,11 @@ def test_parts_add_up() -> None:
             1e-4,
             0.05 * 2**-2.5 + by_spots(SEEN, 10_000),
             0.0,
+            0.0,
         )
     )
     solver, time = 0.1 * 1e-3**0.7, 0.21 * 0.9 ** (1 / 3) * budget.friction.time
-    assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, MESH, 0.0))
+    assert astuple(budget.area) == pytest.approx((solver, time, 0.9e-4, MESH, 0.0, 0.0))
     assert budget.area.total == pytest.approx(solver + time + 0.9e-4 + MESH)
 
 
@@ -266,7 +267,7 @@ def test_steady_friction_is_by_energy() -> None:
     assert budget.friction is not None
     solver = 1.1e-3 / spots(seen, 10_000) ** 0.25
     mesh = 4e-3 / (0.3 * 0.2) + 0.2 * 0.05 * 2**-2.5 + by_spots(seen, 10_000)
-    assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, mesh, 0.0))
+    assert astuple(budget.friction) == pytest.approx((solver, 0.0, 0.0, mesh, 0.0, 0.0))
     assert (budget.area.time, budget.area.mesh) == pytest.approx((0.0, MESH))
     assert estimate_steady(KNOWN, replace(seen, friction=0.0), 10_000).friction is None
 

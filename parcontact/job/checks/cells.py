@@ -10,9 +10,11 @@ light contact is of small spots. The phase phi of the modulus, in right angles, 
 pressure of a body that loses energy there rises more steeply at one edge of a spot than at the other. They were found
 by experiment, with A and phi as they are guessed before (`job.contact_guess`): 80 steady states of rough surfaces of 1
 to 100 % contact on 40 to 70 meshes of 2.7 to 48 cells per shortest wave, so that nine of ten keep what is asked for.
-From mesh to mesh the errors of one surface scatter by a factor of 2.4 (one standard deviation), so that no law is
-sharp. `scripts/chosen_mesh.py` tells how the meshes that follow do on others. Along a direction (x, y) the cells of a
-grid are hypot(x dx, y dy). Where nothing slides, either direction counts as the one along the sliding.
+Where sliding is slow (`Guess.slow` is 1, else less) the root has SLOW 4/c for friction, too: edges of contact lose
+power in waves shorter than the cells. From mesh to mesh the errors of one surface scatter by a factor of 2.4 (one
+standard deviation), so that no law is sharp. `scripts/chosen_mesh.py` tells how the meshes that follow do on others.
+Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing slides, either direction counts as the
+one along the sliding.
 """
 
 from __future__ import annotations
@@ -57,16 +59,18 @@ class Law(NamedTuple):
         return max(LEAST_CELLS, 4.0 * (self.across / error) ** (1.0 / self.order_across))
 
 
+SLOW = 0.28  # accuracy: friction that edges of slow contacts lose, with four cells per shortest wave along the sliding
 FRICTION = Law(0.035, 1.9, 0.003, 2.5)  # accuracy
 AREA = Law(0.055, 1.25, 0.018, 1.0)  # accuracy: of the corrected area
 
 
 class Guess(NamedTuple):
-    """A guess made before anything is solved: the share in contact, and the phase of the body's modulus at the
-    frequency of edges, in right angles."""
+    """A guess made before anything is solved: the share in contact, the phase of the body's modulus at the frequency of
+    edges, in right angles, and how `slow` the sliding is, from 0 to 1."""
 
     share: float
     phase: float
+    slow: float = 0.0
 
     @property
     def factor(self) -> float:
@@ -151,7 +155,7 @@ def choose(
     best = along_x[-1], along_y[-1]
     for ny in along_y:
         cells = lambda nx, ny=ny: (wave * nx / size[0], wave * ny / size[1])  # noqa: E731
-        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, within))
+        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, within, guess.slow))
         if place < len(along_x):
             cx, cy = cells(along_x[place])
             if max(cx, cy) <= LONGEST * min(cx, cy):
@@ -167,7 +171,7 @@ def _fast_lengths(most: float) -> list[int]:
     return found
 
 
-def _fits(cx: float, cy: float, directions: Sequence[Vector], within: tuple[float, float]) -> bool:
+def _fits(cx: float, cy: float, directions: Sequence[Vector], within: tuple[float, float], slow: float) -> bool:
     """Return whether cells per wave along x and y keep errors of friction and area within these."""
     if min(cx, cy) < LEAST_CELLS:
         return False
@@ -175,6 +179,6 @@ def _fits(cx: float, cy: float, directions: Sequence[Vector], within: tuple[floa
         c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
         if AREA.error(c, across) > within[1]:
             return False
-        if directions and FRICTION.error(c, across) > within[0]:
+        if directions and math.hypot(FRICTION.error(c, across), 4.0 / c * SLOW * slow) > within[0]:
             return False
     return True
