@@ -1,4 +1,4 @@
-"""Errors of friction where a body relaxes before the surface has slid by a cell, as edges of contact are not resolved."""
+"""Errors of friction where a body relaxes before the surface has slid by a cell: edges of contact are not resolved."""
 
 import warnings
 from typing import Any
