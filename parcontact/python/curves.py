@@ -24,6 +24,7 @@ from ..steady_sliding.sliding import SteadySliding
 from ..steady_sliding.table import describe_missed, value_of
 from ..storage.curve_points import Wanted
 from .given_jobs import Given, all_ranks, read, warn, warn_of
+from .wording import python_words
 
 Array = NDArray[np.float64]
 Values = str | float | Sequence[float] | Array | None
@@ -92,7 +93,8 @@ def steady(
     keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # a job needs no history then
     found = read(job, {**set, **keys} if isinstance(set, Mapping) else set or keys, comm)
     slab = Slab(all_ranks(comm), *found.grid.points)
-    wanted = curve.request(found, *asked.values())
+    with python_words():
+        wanted = curve.request(found, *asked.values())
     base = set_up(found, slab)
     warn_of(base, wanted.temperatures)
     sliding = SteadySliding(base)

@@ -20,6 +20,7 @@ from ..parallel.lockstep import wait_for_all
 from ..parallel.mpi import MPI
 from ..parallel.root import on_root
 from ..scene import Setup, sanity
+from .wording import python_words
 
 Given = str | os.PathLike[str] | Mapping[str, Any] | Job
 SOMEWHERE = {"points": 2, "size": 1.0}  # a grid for what needs none
@@ -43,7 +44,8 @@ def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intra
         made.append(_sound(given if isinstance(given, Job) else jobs.load(given, changes or {})))
         return made[0]
 
-    sent = on_root(world, load)
+    with python_words():
+        sent = on_root(world, load)
     return made[0] if made else sent  # root's has the arrays of heights, which are not sent
 
 

@@ -31,6 +31,7 @@ from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.fields import UNITS
 from .given_jobs import Given, agree, all_ranks, path_of, read, warn, warn_of
 from .row import Row
+from .wording import python_words
 
 
 class Simulation:
@@ -96,7 +97,7 @@ class Simulation:
             raise InputError("run() writes the files of a whole run: it must come before the first of steps()")
         self._wait_for_all("runs")
         at = str(self._saved.path if self._saved is not None else path_of(restart))
-        with _in_a_file(self.job, self._slab) as job:
+        with _in_a_file(self.job, self._slab) as job, python_words():
             ended = runner.run_to_end(job, self._slab, Options(quiet, at, shows=self._warns))
         if ended.march is None and ended.contents is None:
             raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
@@ -182,9 +183,10 @@ class Simulation:
         simulation = cls(job, comm=world)
         slab = simulation._slab
         plain = on_root(world, lambda: plain_job(job))
-        found = restart.sound(file, job, plain, slab)
-        if isinstance(found, str):
-            raise InputError(found)
+        with python_words():
+            found = restart.sound(file, job, plain, slab)
+            if isinstance(found, str):
+                raise InputError(found)
         simulation._saved, simulation._began = found, True
         return simulation
 
@@ -195,7 +197,8 @@ class Simulation:
             self._wait_for_all("begins")
             saved = self._saved
             wisdom.recall(choices(self.job).transforms, self._slab, saved.numbers.get("plans/all") if saved else None)
-            self._march_made = start.first(self.job, self._slab, saved=saved)
+            with python_words():
+                self._march_made = start.first(self.job, self._slab, saved=saved)
             warn_of(self._march_made.scene.setup)
         return self._march_made
 

@@ -2,7 +2,9 @@
 
 import copy
 import pickle
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -55,6 +57,34 @@ def test_mistakes_of_jobs(call: Callable[[], Any], said: str) -> None:
 def test_other_mistakes(call: Callable[[], Any], said: str) -> None:
     with pytest.raises(pc.InputError, match=f"^{said}"):
         call()
+
+
+SWEPT = {**JOB, "sweep": [{"surface.amplitude": [1e-6, 2e-6]}]}
+
+
+def test_advice_in_the_words_of_python(tmp_path: Path) -> None:
+    """Arguments and keys, where the command line has options."""
+    ours = {"output.directory": str(tmp_path / "ours")}
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine").touch()
+    simulation(JOB, ours).run()
+    advice: dict[str, Callable[[], Any]] = {
+        'give restart="never" to start afresh, or output.directory for another': lambda: simulation(
+            JOB, {**ours, "surface.amplitude": 3e-6}
+        ).run(),
+        "restart=PATH goes on from an earlier": lambda: simulation(JOB, {**ours, "history.0.pressure": 3e4}).run(),
+        "it holds mine; give another output.directory, or restart=": lambda: simulation(
+            JOB, {"output.directory": str(tmp_path / "full")}
+        ).run(),
+        'leave it out (set={"sweep": None})': lambda: simulation(SWEPT),
+        'leave the sweep out (set={"sweep": None})': lambda: simulation(SWEPT, {"surface.amplitude": 3e-6}),
+        "no velocities: give velocities [m/s], or": lambda: pc.steady(JOB, comm=MPI.COMM_SELF),
+    }
+    for words, call in advice.items():
+        with pytest.raises(pc.InputError, match=re.escape(words)) as said:
+            call()
+        assert "--" not in str(said.value)
+        assert "--" not in "".join(getattr(said.value, "mistakes", []))
 
 
 def test_more_points_than_any_machine_holds() -> None:
