@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.__main__ import main
+from parcontact.job.sections.height_arrays import Heights
 
 WORLD = MPI.COMM_WORLD
 NX, NY = 16, 12
@@ -53,6 +54,33 @@ def test_arrays_add_up_with_other_shapes() -> None:
     rounding = 1e-14 * 1e-6
     assert both == pytest.approx(HEIGHTS + pc.surface(wave, JOB["grid"]), abs=100 * rounding)
     assert pc.surface([HEIGHTS, wave], JOB["grid"]).tolist() == both.tolist()
+
+
+def test_heights_with_names_of_axes() -> None:
+    """They are taken by these, whatever their order."""
+    xarray = pytest.importorskip("xarray")
+    heights = np.arange(12.0).reshape(3, 4)
+    named = xarray.DataArray(heights, dims=("y", "x"))
+    assert Heights(named) == Heights(named.transpose("x", "y")) == Heights(heights)
+
+
+def test_heights_with_coordinates() -> None:
+    """They are sorted, and have to be those of the grid, wherever it begins."""
+    xarray = pytest.importorskip("xarray")
+    heights, x, y = 1e-7 * np.arange(12.0).reshape(3, 4), 5.0 + 1e-3 * np.arange(4), 2e-3 * np.arange(3)
+    grid = {"points": [4, 3], "size": [4e-3, 6e-3]}
+    named = xarray.DataArray(heights, {"y": y, "x": x}, ("y", "x"))
+    fallen = xarray.DataArray(heights[::-1], {"y": y[::-1], "x": x}, ("y", "x"))
+    for each in (named, fallen, named.transpose("x", "y")):
+        assert np.array_equal(pc.surface(each, grid), pc.surface(heights, grid))
+    wrong = {
+        "surface has points 0.001 m apart along x, but the grid has 0.002 m": (named, [8e-3, 6e-3]),
+        "surface has points 2 m apart along y": (named.assign_coords(y=1e3 * y), [4e-3, 6e-3]),
+        "got coordinates x that are not equally spaced": (named.assign_coords(x=[0.0, 1e-3, 3e-3, 4e-3]), [4e-3, 6e-3]),
+    }
+    for words, (given, size) in wrong.items():
+        with pytest.raises(pc.JobError, match=words):
+            pc.surface(given, {"points": [4, 3], "size": size})
 
 
 def frictions(directory: Path) -> list[str]:

@@ -14,7 +14,6 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.__main__ import main
-from parcontact.job.sections.height_arrays import Heights
 
 ROOT = Path(__file__).parents[2]
 JOB: dict[str, Any] = {
@@ -249,14 +248,6 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ImportError, match="needs xarray, which is not installed: pip install xarray"):
         pc.open("here")
-
-
-def test_heights_with_names_of_axes() -> None:
-    """They are taken by these, whatever their order."""
-    xarray = pytest.importorskip("xarray")
-    heights = np.arange(12.0).reshape(3, 4)
-    named = xarray.DataArray(heights, dims=("y", "x"))
-    assert Heights(named) == Heights(named.transpose("x", "y")) == Heights(heights)
 
 
 def test_a_finished_run_has_its_last_row(nowhere: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..sections.calculation import Body, Grid, Numerics, Output
 from ..sections.geometry import OnOneMesh, Rough
-from ..sections.height_arrays import HeightArray
+from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
@@ -113,11 +113,17 @@ def steady_at_rest(initial: Initial, material: AnyMaterial) -> Iterator[Fault]:
 
 
 def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
-    """Check that arrays have the shape of the grid."""
+    """Check that arrays have the shape of the grid, and its cell if they have coordinates."""
     for index, shape in enumerate(surface):
-        if isinstance(shape, HeightArray) and shape.heights.shape != (grid.ny, grid.nx):
-            sentence = f"has shape {shape.heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}"
-            yield Fault(sentence, ("surface", index, "heights"))
+        if not isinstance(shape, HeightArray):
+            continue
+        heights, place = shape.heights, ("surface", index, "heights")
+        if heights.shape != (grid.ny, grid.nx):
+            yield Fault(f"has shape {heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}", place)
+            continue
+        for axis, apart, cell in zip("xy", heights.cell, (grid.dx, grid.dy), strict=True):
+            if abs(apart - cell) > SAME_CELL * cell:
+                yield Fault(f"has points {apart:.6g} m apart along {axis}, but the grid has {cell:.6g} m", place)
 
 
 def loads_are_borne(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from io import BytesIO
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -17,18 +18,24 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+SAME_CELL = 1e-3  # accuracy: relative: coordinates this close are rounded
 EXPECTED = "must be a numpy array of heights [m], real and finite, of shape (ny, nx)"
 
 
 class Heights:
-    """A map of heights [m], read only. Where a job is sent to other ranks, `values` stay behind: root deals them."""
+    """A map of heights [m], read only. Where a job is sent to other ranks, `values` stay behind: root deals them.
+
+    `cell` is the distance [m] of its points along x and y, nan where they have no coordinates.
+    """
 
     def __init__(self, given: Any) -> None:
         """Raise TypeError or ValueError for what is no map of finite real numbers."""
         import numpy as np  # slow to import, and jobs in files do without
 
-        if getattr(given, "dims", None) == ("x", "y"):
-            given = given.transpose("y", "x")  # xarray's axes have names
+        self.cell = math.nan, math.nan
+        if sorted(map(str, getattr(given, "dims", ()))) == ["x", "y"]:  # xarray's axes have names, and places
+            given = given.transpose("y", "x").sortby([axis for axis in ("x", "y") if axis in given.coords])
+            self.cell = _distance(given, "x"), _distance(given, "y")
         found = np.asanyarray(given)
         if found.ndim != 2 or not np.can_cast(found.dtype, np.float64, "same_kind"):
             raise TypeError(f"an array of shape {found.shape} of {found.dtype}")
@@ -62,6 +69,22 @@ class Heights:
 
     def __repr__(self) -> str:
         return f"an array of shape {self.shape}"
+
+
+def _distance(given: Any, axis: str) -> float:
+    """Return how far the points of an xarray.DataArray are apart along an axis [m], nan where they have no coordinates.
+
+    Raises ValueError where they are not equally spaced.
+    """
+    import numpy as np
+
+    if axis not in given.coords or given.coords[axis].size < 2:
+        return math.nan
+    steps = np.diff(np.asarray(given.coords[axis], dtype=np.float64))
+    mean = float(steps.mean())
+    if not (np.abs(steps - mean) <= SAME_CELL * mean).all():
+        raise ValueError(f"coordinates {axis} that are not equally spaced")
+    return mean
 
 
 def _heights(given: Any) -> Heights:
