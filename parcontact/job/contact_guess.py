@@ -44,14 +44,14 @@ class Loaded(Protocol):
 
 def guess(job: Loaded, wave: float, area: float) -> Guess:
     """Return the smallest share in contact of a job, whose shortest wave [m] and box [m^2] are these, the largest
-    phase, and how slow the slowest sliding of a friction curve is."""
+    phase, how many such waves a side of the box has, and how slow the slowest sliding of a friction curve is."""
     slope, series = _slope(job.surface), RELAXATION.load()(job.material)
     loads = [(p, 2.0 * math.pi * v / wave) for p, v in _loads(job, area) if p > 0.0]
     share = min((_share(p, abs(_modulus(series, w)), job.material.poisson, slope) for p, w in loads), default=UNKNOWN)
     phase = max((cmath.phase(_modulus(series, EDGES * w)) for _, w in loads), default=0.5 * math.pi * USUAL_PHASE)
     passing = (2.0 * math.pi * v / wave for v in (job.steady.velocities if job.steady and not job.history else ()))
     slow = max((_slowness(series, w) for w in passing), default=0.0)
-    return Guess(share if slope else UNKNOWN, 2.0 / math.pi * phase, slow)
+    return Guess(share if slope else UNKNOWN, 2.0 / math.pi * phase, math.sqrt(area) / wave, slow)
 
 
 def _slowness(series: Any, omega: float) -> float:

@@ -3,18 +3,19 @@
 Friction and the contact area come from slopes along the sliding: the mesh makes their errors along it, and little
 across. With c cells per shortest wave along the sliding and c' across it the relative errors are at most about
 
-    max(0.1/A, 1)^0.4 (1 - A)^1.5 exp(phi - 0.25) hypot(along (4/c)^p, across (4/c')^q),
+    max(0.1/A, 1)^0.4 (1 - A)^1.5 hypot(few (12/N)^0.5, lossy phi) hypot(along (4/c)^p, across (4/c')^q),
 
 with numbers of their own for friction and area, where a share A is in contact: what is wrong is wrong at edges, and
-light contact is of small spots. The phase phi of the modulus, in right angles, is that at the frequency of edges: the
-pressure of a body that loses energy there rises more steeply at one edge of a spot than at the other. They were found
-by experiment, with A and phi as they are guessed before (`job.contact_guess`): 80 steady states of rough surfaces of 1
-to 100 % contact on 40 to 70 meshes of 2.7 to 48 cells per shortest wave, so that nine of ten keep what is asked for.
-Where sliding is slow (`Guess.slow` is 1, else less) the root has SLOW 4/c for friction, too: edges of contact lose
-power in waves shorter than the cells. From mesh to mesh the errors of one surface scatter by a factor of 2.4 (one
-standard deviation), so that no law is sharp. `scripts/chosen_mesh.py` tells how the meshes that follow do on others.
-Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing slides, either direction counts as the
-one along the sliding.
+light contact is of small spots. Part of the errors is by chance, as edges lie among the points: the more spots there
+are in a box with N of the shortest waves along a side, the better they average out. The rest is by the body that loses
+energy: the phase phi of its modulus, in right angles, is that at the frequency of edges, and the pressure of such a
+body rises more steeply at one edge of a spot than at the other. They were found by experiment, with A and phi as they
+are guessed before (`job.contact_guess`): some 40 steady states of rough surfaces of 1 to 100 % contact with 12 to 36 of
+their shortest waves along a side, on 60 meshes of 2.7 to 40 cells per shortest wave, so that nine of ten keep what is
+asked for. Where sliding is slow (`Guess.slow` is 1, else less) friction has a further error of 0.22 (4/c), times the
+first two factors: edges of contact lose power in waves shorter than the cells. `scripts/chosen_mesh.py` tells how the
+meshes that follow do on others. Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing
+slides, either direction counts as the one along the sliding.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ Vector = tuple[float, float]
 
 LIGHT, SMALL_SPOTS = 0.1, 0.4  # accuracy: the share in contact below which spots are small, and the power of it
 OPEN = 1.5  # accuracy: power of the share that is open
+FEW, MANY, AVERAGED = 12.0, 36.0, 0.5  # accuracy: waves along a side in the experiments, and the power of them
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: with which more of them are advised for less
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across
@@ -42,45 +44,53 @@ MULTIPLE = 16  # tuning: of which points along a side are, so that there are coa
 SAME = 1e-9  # accuracy: relative: numbers this close are the same
 
 
+class Guess(NamedTuple):
+    """A guess made before anything is solved: the share in contact, the phase of the body's modulus at the frequency of
+    edges, in right angles, how many of the shortest waves a side of the box has, and how `slow` the sliding is, from 0
+    to 1."""
+
+    share: float
+    phase: float
+    waves: float
+    slow: float = 0.0
+
+    @property
+    def edges(self) -> float:
+        """Return by how much errors are larger than where little is open and spots are large."""
+        return (1.0 - self.share) ** OPEN * max(LIGHT / self.share, 1.0) ** SMALL_SPOTS
+
+
 class Law(NamedTuple):
-    """Errors by the cells along the sliding and across it, with four of each per shortest wave, and their orders."""
+    """Errors by the cells along the sliding and across it, with four of each per shortest wave, and their orders; by
+    how much they are larger where waves are few, and in a body that loses energy; what slow sliding adds."""
 
     along: float
     order_along: float
     across: float
     order_across: float
+    few: float
+    lossy: float
+    slow: float
 
-    def error(self, c: float, across: float) -> float:
-        """Return the relative error with so many cells along the sliding and across it, for a `Guess` of factor 1."""
-        return math.hypot(self.along * (4.0 / c) ** self.order_along, self.across * (4.0 / across) ** self.order_across)
+    def error(self, c: float, across: float, guess: Guess) -> float:
+        """Return the relative error with so many cells along the sliding and across it."""
+        own = math.hypot(self.along * (4.0 / c) ** self.order_along, self.across * (4.0 / across) ** self.order_across)
+        return math.hypot(self.factor(guess) * own, guess.edges * self.slow * guess.slow * 4.0 / c)
+
+    def factor(self, guess: Guess) -> float:
+        """Return by how much errors of fast sliding are larger for what is guessed."""
+        chance = self.few * (FEW / min(max(guess.waves, FEW), MANY)) ** AVERAGED
+        return guess.edges * math.hypot(chance, self.lossy * guess.phase)
 
     def cells_across(self, error: float) -> float:
         """Return how many cells across the sliding make this error."""
         return max(LEAST_CELLS, 4.0 * (self.across / error) ** (1.0 / self.order_across))
 
 
-SLOW = 0.28  # accuracy: friction that edges of slow contacts lose, with four cells per shortest wave along the sliding
-FRICTION = Law(0.035, 1.9, 0.003, 2.5)  # accuracy
-AREA = Law(0.055, 1.25, 0.018, 1.0)  # accuracy: of the corrected area
-
-
-class Guess(NamedTuple):
-    """A guess made before anything is solved: the share in contact, the phase of the body's modulus at the frequency of
-    edges, in right angles, and how `slow` the sliding is, from 0 to 1."""
-
-    share: float
-    phase: float
-    slow: float = 0.0
-
-    @property
-    def factor(self) -> float:
-        """Return by how much errors are larger than where little is open, spots are large and the phase is usual."""
-        open_share, light = 1.0 - self.share, max(LIGHT / self.share, 1.0)
-        return open_share**OPEN * light**SMALL_SPOTS * math.exp(self.phase - USUAL_PHASE)
-
-
+FRICTION = Law(0.035, 1.9, 0.003, 2.5, few=0.9, lossy=0.4, slow=0.22)  # accuracy
+AREA = Law(0.055, 1.3, 0.018, 1.1, few=1.05, lossy=0.3, slow=0.0)  # accuracy: of the corrected area
 USUAL_PHASE = 0.25  # accuracy
-TYPICAL = Guess(0.2, USUAL_PHASE)  # accuracy: where none is known
+TYPICAL = Guess(0.2, USUAL_PHASE, FEW)  # accuracy: where none is known
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:
@@ -113,7 +123,7 @@ def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[fl
     that slides along these directions (unit vectors); without any as many as along the sliding."""
     if not directions or any(abs(way[axis]) > ASIDE for way in directions):
         return cells_per_wave(asked.friction), cells_for_area(asked.area)
-    return cells_across(asked.friction), AREA.cells_across(asked.area / TYPICAL.factor)
+    return cells_across(asked.friction), AREA.cells_across(asked.area / AREA.factor(TYPICAL))
 
 
 def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Steady | None) -> list[Vector]:
@@ -150,12 +160,11 @@ def choose(
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,
     where it slides along these directions (unit vectors), or nowhere, and touches as is guessed. Of meshes with as many
     points it is the one with the fewest along a side."""
-    within = asked.friction / guess.factor, asked.area / guess.factor
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     best = along_x[-1], along_y[-1]
     for ny in along_y:
         cells = lambda nx, ny=ny: (wave * nx / size[0], wave * ny / size[1])  # noqa: E731
-        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, within, guess.slow))
+        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, asked, guess))
         if place < len(along_x):
             cx, cy = cells(along_x[place])
             if max(cx, cy) <= LONGEST * min(cx, cy):
@@ -171,14 +180,14 @@ def _fast_lengths(most: float) -> list[int]:
     return found
 
 
-def _fits(cx: float, cy: float, directions: Sequence[Vector], within: tuple[float, float], slow: float) -> bool:
-    """Return whether cells per wave along x and y keep errors of friction and area within these."""
+def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, guess: Guess) -> bool:
+    """Return whether cells per wave along x and y keep the errors asked for."""
     if min(cx, cy) < LEAST_CELLS:
         return False
     for x, y in directions or ((1.0, 0.0), (0.0, 1.0)):
         c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-        if AREA.error(c, across) > within[1]:
+        if AREA.error(c, across, guess) > asked.area:
             return False
-        if directions and math.hypot(FRICTION.error(c, across), 4.0 / c * SLOW * slow) > within[0]:
+        if directions and FRICTION.error(c, across, guess) > asked.friction:
             return False
     return True
