@@ -19,6 +19,7 @@ from ..physics.budget import ErrorBudget, Parts
 from ..physics.entries import Entry, Saved
 from ..scene import Scene
 from ..solve.contact import Contact
+from .sudden import ALLOWED, tolerance_at_end
 
 SHARES = 0.1, 0.4  # accuracy: of the error of friction and of that of the area, for the solver; the latter is less by
 # half and more than is estimated
@@ -36,11 +37,17 @@ class StepTolerance:
     mean: float = 0.0
 
     def of(self, scene: Scene, step: Step) -> float | None:
-        """Return the tolerance of the solve of a step, None where it is that of the job, as it is after a jump."""
-        if not follows(scene) or step.dt == 0.0:
-            return None
+        """Return the tolerance of the solve of a step, None where it is that of the job, as it is in a jump. Before a
+        sudden change and in the first step of a stage it is smaller (`sudden`)."""
         own = scene.choices.numerics.tolerance
-        return float(min(own * 2.0 ** (0.5 * round(2.0 * self.mean)), max(LOOSEST, own)))
+        if step.dt == 0.0:
+            return None
+        most = tolerance_at_end(scene.choices, step)
+        if step.growth == 0.0 and scene.material.branched is not None:
+            most = min(most, ALLOWED)
+        if not follows(scene):
+            return most if most < own else None
+        return float(min(own * 2.0 ** (0.5 * round(2.0 * self.mean)), max(LOOSEST, own), most))
 
     def after(self, scene: Scene, contact: Contact, budget: ErrorBudget | None) -> "StepTolerance":
         """Return the memory after a step."""

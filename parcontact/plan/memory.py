@@ -15,6 +15,7 @@ from ..job import Job
 from ..job.checks.size import machines
 from ..march import sticking
 from ..march.state import State
+from ..march.sudden import tolerance_of_start
 from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
 from ..parallel.slab import deal, dealt_to
@@ -91,7 +92,8 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
         return 0
     part, points, even = _Part(job, ranks, rank), job.grid.points, not job.initial.velocity[1]
     spectrum, blocks = part.transform(points)
-    held = SteadySolver.footprint(*points, tolerance_of(job.numerics.tolerance), ranks, part.number, sets)
+    tolerance = min(tolerance_of(job.numerics.tolerance), tolerance_of_start(choices(job)))
+    held = SteadySolver.footprint(*points, tolerance, ranks, part.number, sets)
     held += 2 * 8 * part.cells(points)  # the heights and the start
     held += spectrum + blocks + part.surface_waves
     held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)

@@ -49,11 +49,13 @@ Make = Callable[[Level, Vector], tuple[SteadySolver | Proximal, Convolution]]
 class SteadySliding:
     """Steady states of one job's surface and body; making and calling it are collective.
 
-    Started from coarser grids, or from the last state where that is very near. `footprint` says what it holds.
+    Started from coarser grids, or from the last state where that is very near. `footprint` says what it holds. The
+    tolerance on certificates follows from that of the job, and is `most` at most.
     """
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, most: float = math.inf) -> None:
         self.setup = setup
+        self._tolerance = min(tolerance_of(setup.choices.numerics.tolerance), most)
         self.probe = setup.probe()
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
         finest, *coarser = nested.levels_of(setup.slab, heights)
@@ -245,7 +247,7 @@ class SteadySliding:
         self, level: Level, velocity: Vector, operator: Convolution, preconditioner: Convolution
     ) -> SteadySolver:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
-        tolerance = max(tolerance_of(numerics.tolerance), 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
+        tolerance = max(self._tolerance, 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
         limit, along = 20 * numerics.max_iterations, soft_stripes(self.setup, velocity)
         return SteadySolver(level.slab, operator, preconditioner, height, tolerance, limit, along=along)
 
