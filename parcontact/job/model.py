@@ -55,6 +55,7 @@ class Job(Part):
         Rule(("grid", "numerics"), limits.kernel_fits),
         Rule(("grid", "body"), limits.layer_is_resolved),
         Rule(("grid", "body", "initial", "steady"), limits.no_wake_in_a_layer),
+        Rule(("grid", "steady"), limits.waves_are_independent),
         Rule(("surface",), limits.some_shape),
         Rule(("grid", "surface"), limits.waves_fit),
         Rule(("grid", "surface"), limits.arrays_fit),
@@ -64,6 +65,7 @@ class Job(Part):
         Rule(("history",), limits.loads_press),
         Rule(("initial", "material"), limits.steady_at_rest),
         Rule(("grid", "material", "history", "initial", "steady"), limits.loads_are_borne),
+        Rule(("material", "steady"), limits.temperatures_are_reached),
         Rule(("grid", "history"), limits.steps_can_be_made),
         Rule(("output",), limits.no_temperature),
     )

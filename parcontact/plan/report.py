@@ -13,12 +13,16 @@ from .costs import Costs
 SUMS_PER_STEP = 1  # that a run makes besides those of its march: whether to stop
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
 LARGE = 1e10  # bytes from which on GB are the unit
+OF_STEADY_STATES = (
+    *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
+    *("interface", "thermal"),
+)
 STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
 
 
 def effects(job: Job) -> Iterator[str]:
-    """Every effect, on or off, and why."""
-    found = choices(job).effects
+    """Every effect, on or off, and why; of a friction curve alone, those that a steady state can have."""
+    found = [effect for effect in choices(job).effects if job.history or effect.name in OF_STEADY_STATES]
     width = max(len(effect.name) for effect in found)
     yield "effects"
     for effect in sorted(found, key=lambda effect: not effect.on):

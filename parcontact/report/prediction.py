@@ -20,8 +20,9 @@ from ..parallel.slab import Slab
 from ..physics.layer import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
-from ..steady_sliding.curve import Request
+from ..steady_sliding.curve import Request, request
 from ..storage import files, hdf5, tables
+from ..storage.curve_points import Wanted
 from ..summary import theory_beside, theory_settings
 from ..summary.theory_settings import TheorySettings
 from ..theory import full_contact, persson, persson_rings
@@ -112,20 +113,41 @@ def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> I
         yield SteadyInstant(speed, pressure, temperature, time_factor_of(at.material), float(friction), float(area))
 
 
-def write_steady(job: Job, wanted: Request) -> Path:
-    """Write the prediction for a curve as steady_theory.csv beside it and draw both; returns the picture."""
-    from ..plotting import plots  # matplotlib is slow to import, and for pictures only
+def write_steady(job: Job, wanted: Request) -> SteadyInstant:
+    """Write the prediction for a curve as steady_theory.csv, and draw both if the curve is there; returns the point of
+    the highest friction."""
+    rows = list(predict_steady(job, wanted))
+    _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, iter(rows))
+    if (curve := job.output.directory / "steady.csv").is_file():
+        from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
-    _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, predict_steady(job, wanted))
-    return plots.draw_steady(job.output.directory / "steady.csv")
+        plots.draw_steady(curve)
+    return max(rows, key=lambda row: row.friction)
 
 
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
-    """Write theory.csv for a job on one rank, and return sentences about it, beside the job's run if there is one."""
+    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve; returns sentences about it,
+    beside the job's run if there is one."""
     settings = TheorySettings(gamma, waves)
+    if not job.history:
+        return _foretell_curve(job, settings)
     path = write(job, predict(job, Slab(MPI.COMM_SELF, *job.grid.points), gamma, waves), settings)
     beside = theory_beside.describe(path.parent, job.history, job.grid.dx)
     return [f"Persson's theory, {settings.sentence}: {path}", *beside]
+
+
+def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
+    if settings != TheorySettings(persson.GAMMA, "continuum"):
+        raise InputError("--gamma and --waves are for histories, and this job has a friction curve alone")
+    _refuse_free(job)
+    if not has_spectrum(job):
+        raise InputError(ONE_ROUGH.partition(";")[0])
+    highest = write_steady(job, request(job))
+    place = Wanted(highest.velocity, highest.pressure, highest.temperature)
+    return [
+        f"Persson's theory, {settings.sentence}: {job.output.directory / STEADY_FILE}",
+        f"Persson's theory predicts a highest friction of {highest.friction:.3g}, at {place}",
+    ]
 
 
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
@@ -139,7 +161,7 @@ def _write(
     """Write a table, and its settings beside it; raises InputError for a path that cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(path, theory_settings.is_own_table if settings else None) as file:
+        with files.replaced(path, theory_settings.is_own_table if settings else _is_own_curve) as file:
             file.write(f"{','.join(columns)}\n".encode())
             for row in rows:
                 file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
@@ -150,16 +172,20 @@ def _write(
     return path
 
 
+def _is_own_curve(path: Path) -> bool:
+    return path.read_bytes().startswith(",".join(SteadyInstant._fields).encode())
+
+
 def _refuse_unknown(job: Job) -> None:
-    if not job.history:
-        raise InputError(
-            "history: theory.csv follows a history, and this job has none; `parcontact steady` predicts its curve"
-        )
-    if job.grid.boundary == "free":
-        raise InputError("grid.boundary: Persson's theory is for periodic surfaces, and this box is free")
+    _refuse_free(job)
     for index, stage in enumerate(job.history):
         if stage.control == "approach":
             raise InputError(f"history.{index}.approach: the theory needs a pressure [Pa] or a force [N]")
+
+
+def _refuse_free(job: Job) -> None:
+    if job.grid.boundary == "free":
+        raise InputError("grid.boundary: Persson's theory is for periodic surfaces, and this box is free")
 
 
 # -- the waves --------------------------------------------------------------------------------------------------------

@@ -64,8 +64,6 @@ def request(
         raise InputError("no pressure: give --pressures [Pa], or a stage with a pressure or force in the job")
     if any(not 0.0 < value < math.inf for value in (*speeds, *loads)):
         raise InputError("velocities [m/s] and pressures [Pa] of steady sliding must be positive")
-    if job.grid.boundary == "free" and section and section.waves:
-        raise InputError("steady.waves: the waves of a free scene are not independent; it needs a periodic one")
     direction = section.unit_direction if section else (1.0, 0.0)
     degrees = tuple(temperatures) or (section.temperatures if section and section.temperatures else ())
     for temperature in degrees:
@@ -173,7 +171,8 @@ class _Curve:
 
     def go(self) -> int:
         """Solve what lacks; collective. Returns the exit code."""
-        lacking = self.slab.agree(self.table.lacking(self.wanted.points) if self.table else [])
+        bare = self.maps.lacking() if self.maps and self.slab.root else []
+        lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
         for count, index in enumerate(lacking):
             if self._stopped():
                 self._say(f"stopped with {len(lacking) - count} points to go; run again to go on")

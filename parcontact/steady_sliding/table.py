@@ -91,11 +91,14 @@ class CurveTable:
                 new.write(whole[: whole.rfind(b"\n") + 1])
         return curve_points.of_table(columns)
 
-    def lacking(self, points: Sequence[Wanted]) -> list[int]:
-        """Return the numbers of the points that are not there."""
+    def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
+        """Return the numbers of the points that are not there, or are `bare` of the maps that are asked for."""
         found = curve_points.lacking(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
+        if again := sorted({*bare} - {*found}):
+            self.say(f"{len(again)} of these are solved again, for their maps")
+            found = sorted([*found, *again])
         self._bar = progress.Bar(len(found), "steady states", "point", not self.quiet)
         return found
 
@@ -114,7 +117,10 @@ class CurveTable:
             self._console.warn(text, shown(text))
 
     def write(self, point: Point, waves: Any) -> None:
+        """Add a point, unless it was there before and is solved for its maps only."""
         m, speed = point.measures, point.speed
+        if not curve_points.lacking([Wanted(speed, m.pressure, point.temperature)], self.known):
+            return
         if self._waves:
             for wavelength, share in zip(*waves, strict=True):
                 self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])

@@ -33,7 +33,7 @@ COPIES = {  # of the job: as given, and with every default
     "study": ("study.job.yaml", "study.resolved.yaml"),
 }
 LOCK = ".lock"
-BESIDE = (stopfile.NAME, "theory.csv", "theory.yaml")  # may be there before the first run
+BESIDE = (stopfile.NAME, "theory.csv", "theory.yaml", "steady_theory.csv")  # may be there before the first run
 SHOWN = 4  # tuning: names of files that a message lists
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 ADVICE = "give --restart never to start afresh, or --out for another directory"

@@ -42,6 +42,11 @@ class SteadyMaps:
         marks = dict(zip(self.axes, self.points[index], strict=True))
         hdf5.save_maps(self.path, self.slab, index, {DATASETS[name]: maps[name] for name in self.names}, marks)
 
+    def lacking(self) -> list[int]:
+        """Return the numbers of the points without maps; root only."""
+        with h5py.File(self.path, "r") as file:
+            return [number for number, speed in enumerate(file["velocity"][...]) if np.isnan(speed)]
+
     def _fits(self) -> bool:
         """Return whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""
         shape = (len(self.points), self.slab.ny, self.slab.nx)

@@ -103,6 +103,13 @@ def test_steady_states_beside_a_history() -> None:
     assert steady.steady.pressures == (1e4,)
 
 
+def test_effects_of_a_curve_alone() -> None:
+    """Those that a steady state can have; each is one of a run, too."""
+    curve = job(history=[], steady={"velocities": [1e-2], "pressures": [1e5]})
+    names = [[re.split(" {2,}", line.strip())[1] for line in list(report.effects(each))[1:]] for each in (curve, job())]
+    assert set(names[0]) == set(report.OF_STEADY_STATES) < set(names[1])
+
+
 def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:
     """As a user reads it, for the steady section of a job with a history."""
     monkeypatch.chdir(tmp_path)

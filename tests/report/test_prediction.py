@@ -17,9 +17,11 @@ from parcontact import __version__
 from parcontact.__main__ import main
 from parcontact.errors import InputError
 from parcontact.job import Job
+from parcontact.job import load as load_job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
 from parcontact.report import prediction
+from parcontact.steady_sliding.curve import request
 from parcontact.summary import info, theory_settings
 from parcontact.summary.theory_settings import TheorySettings
 from parcontact.theory import full_contact
@@ -136,7 +138,6 @@ def test_steady_friction_of_the_continuum() -> None:
         ({"surface": [ROUGH, ROUGH]}, "one rough surface"),
         ({"surface": [{**ROUGH, "short_wavelength": 2.5e-4}]}, "got equal ones"),
         ({"grid": {"points": 16, "size": 1e-3, "boundary": "free"}}, "grid.boundary"),
-        ({"history": [], "steady": {"velocities": [1.0], "pressures": [1e5]}}, "parcontact steady"),
     ],
 )
 def test_jobs_that_the_theory_does_not_know(changes: dict[str, Any], words: str) -> None:
@@ -223,3 +224,23 @@ def test_full_contact_of_a_lattice_is_exact() -> None:
     exact = np.hypot(*full_contact.traction(*waves, complex_modulus(0.04 * waves.kx, *PRONY))) / 1e8
     for gamma in (0.0, 0.45):
         assert_allclose(predicted(one, gamma=gamma)[0].friction, exact, rtol=1e-10)
+
+
+def test_theory_of_a_friction_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has a row for each point, may come before the curve, and is the same as that of the curve."""
+    monkeypatch.chdir(tmp_path)
+    curve = {"velocities": [0.01, 0.1], "pressures": [1e5, 3e5]}
+    job = {"grid": {"points": 20, "size": 1e-3}, "surface": ROUGH, "material": SLS, "steady": curve}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(job))
+    assert main(["theory", "job.yaml", "--quiet"]) == 0
+    path = tmp_path / "out" / "job" / "steady_theory.csv"
+    before = path.read_bytes()
+    found = load_job("job.yaml")
+    wanted = [str(row.friction) for row in prediction.predict_steady(found, request(found))]
+    with path.open(newline="") as file:
+        assert [row["friction"] for row in csv.DictReader(file)] == wanted
+    assert main(["steady", "job.yaml", "--quiet"]) == 0
+    assert path.read_bytes() == before
+    assert main(["theory", "job.yaml", "--gamma", "0.5"]) == 2
+    assert main(["theory", "job.yaml", "--set", "grid.boundary=free"]) == 2
+    assert path.read_bytes() == before

@@ -129,7 +129,8 @@ def test_curve_of_a_sweep_has_only_begun_while_points_lack(
     assert main("steady", "job.yaml") == (DONE, "")
     assert (len(solved), states()) == (6, ["done", "done"])
     assert states("steady.velocities=[0.01, 0.1, 0.5, 1.0]") == ["begun", "begun"]
-    assert states("steady.temperatures=[20.0]") == ["begun", "begun"]
+    shift = "material.shift={law: arrhenius, energy: 1.0e5, reference: 20.0}"
+    assert states("steady.temperatures=[20.0]", shift) == ["begun", "begun"]
 
 
 def test_points_of_another_effect_are_not_gone_on_with(main: Main, tmp_path: Path) -> None:
@@ -222,6 +223,19 @@ def test_maps_of_each_point(main: Main, tmp_path: Path) -> None:
         assert np.abs(file["gap"][...]).max() < 1e-4 * 1e-6  # the tolerance, of the height
         bare = file["displacement"][...] - file["height"][...]
         assert np.ptp(bare, axis=(1, 2)).max() < 1e-4 * 1e-6
+
+
+def test_maps_of_points_that_are_there(main: Main, tmp_path: Path, solved: list[tuple[float, float]]) -> None:
+    """They are made by solving these again, once; the table stays as it is."""
+    fields = ("--set", "output.fields=[pressure]")
+    assert main(*CURVE)[0] == DONE
+    before = (tmp_path / "out" / "steady.csv").read_bytes()
+    for _ in range(2):
+        assert main(*CURVE, *fields)[0] == DONE
+    assert len(solved) == 2 * len(ALL)
+    assert (tmp_path / "out" / "steady.csv").read_bytes() == before
+    with h5py.File(tmp_path / "out" / "steady.h5") as file:
+        assert np.allclose(file["pressure"][...].mean(axis=(1, 2)), [pressure for _, pressure in ALL], rtol=1e-9)
 
 
 def test_kernel_of_cells(main: Main, tmp_path: Path) -> None:

@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ...errors import InputError
 from ..sections.calculation import Body, Grid, Numerics, Output
 from ..sections.geometry import OnOneMesh, Rough
 from ..sections.height_arrays import SAME_CELL, HeightArray
-from ..sections.materials import AnyMaterial
+from ..sections.materials import AnyMaterial, heated
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
 from .advice import SAME_LENGTH
@@ -34,6 +35,11 @@ def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
 def no_wake_in_a_layer(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
     if body is not None and grid.boundary == "free" and (initial.state == "steady" or steady is not None):
         yield Fault("must be periodic for steady sliding on a layer", ("grid", "boundary"))
+
+
+def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
+    if steady is not None and steady.waves and grid.boundary == "free":
+        yield Fault("needs a periodic box: the waves of a free one are not independent", ("steady", "waves"))
 
 
 def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
@@ -104,6 +110,16 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
             ends = () if stage.load.constant else ("from" if stage.load.start == least else "to",)
             sentence = f"must be {LOADS[stage.control]}, got {least:g}"
             yield Fault(sentence, ("history", index, stage.control, *ends))
+
+
+def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
+    """Check that the shift of the material reaches the temperatures of steady states."""
+    for temperature in (steady.temperatures if steady else None) or ():
+        try:
+            heated(material, temperature)
+        except InputError as error:
+            yield Fault(f"has {temperature:g} C: {error}", ("steady", "temperatures"))
+            return
 
 
 def steady_at_rest(initial: Initial, material: AnyMaterial) -> Iterator[Fault]:
