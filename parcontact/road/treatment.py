@@ -23,12 +23,14 @@ SWEEPS = 200  # accuracy: of relaxation that fill holes smoothly, on each of the
 @dataclass(frozen=True)
 class Treated:
     """A map without missing points, and what was done to it: counts of missing points and outliers, the plane or
-    paraboloid taken off (coefficients of 1, x, y, x^2, x y, y^2 over the box from -1 to 1, in units of height)."""
+    paraboloid taken off (coefficients of 1, x, y, x^2, x y, y^2 over the box from -1 to 1, in units of height), by
+    which factor a window has `enlarged` what is inside."""
 
     heights: Array
     missing: int
     outliers: int
     trend: tuple[float, ...]
+    enlarged: float
 
 
 def treat(heights: Array, detrend: Detrend, periodic: Periodic) -> Treated:
@@ -40,7 +42,8 @@ def treat(heights: Array, detrend: Detrend, periodic: Periodic) -> Treated:
     odd = count_outliers(filled)
     make = {"smooth": make_periodic, "window": taper, "mirror": mirror}.get(periodic)
     made = np.ascontiguousarray(make(filled) if make else filled)
-    return Treated(made, int((~known).sum()), odd, tuple(map(float, trend)))
+    enlarged = 1.0 / _window(made.shape)[1] if periodic == "window" else 1.0
+    return Treated(made, int((~known).sum()), odd, tuple(map(float, trend)), enlarged)
 
 
 def repeated(heights: Array) -> tuple[float, int]:
@@ -123,10 +126,15 @@ def make_periodic(heights: Array) -> Array:
 
 def taper(heights: Array) -> Array:
     """The map less its mean, taken to 0 at the edges by cosines, and enlarged so that its mean square stays."""
-    weights = [_cosines(n) for n in heights.shape]
-    weight = weights[0][:, None] * weights[1]
-    level = heights - heights.mean()
-    return np.asarray(level * weight / np.sqrt(np.mean(weight**2)))
+    weight, rms = _window(heights.shape)
+    return np.asarray((heights - heights.mean()) * weight / rms)
+
+
+def _window(shape: tuple[int, ...]) -> tuple[Array, float]:
+    """Return a window that is 1 inside, and its root mean square."""
+    along_y, along_x = map(_cosines, shape)
+    weight = np.asarray(along_y[:, None] * along_x)
+    return weight, float(np.sqrt(np.mean(weight**2)))
 
 
 def _cosines(count: int) -> Array:
