@@ -88,7 +88,7 @@ class Law(NamedTuple):
 
 
 FRICTION = Law(0.035, 1.9, 0.003, 2.5, few=0.9, lossy=0.4, slow=0.22)  # accuracy
-AREA = Law(0.055, 1.3, 0.018, 1.1, few=1.05, lossy=0.3, slow=0.0)  # accuracy: of the corrected area
+AREA = Law(0.055, 1.3, 0.018, 1.1, few=1.15, lossy=0.3, slow=0.0)  # accuracy: of the corrected area
 USUAL_PHASE = 0.25  # accuracy
 TYPICAL = Guess(0.2, USUAL_PHASE, FEW)  # accuracy: where none is known
 
