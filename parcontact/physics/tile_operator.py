@@ -40,7 +40,7 @@ class TileOperator:
     and x, and `nodes` do the second one."""
 
     def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes | PeriodicNodes", tally: Tally) -> None:
-        self._tiles = tiles
+        self._tiles, self._tally = tiles, tally
         self._near = TileConvolution(tiles, len(near) // SIDE - 1, near, tally)
         step = step_of_nodes(tiles)
         self._weights, self._per_tile = _interpolation(step), SIDE // step
@@ -78,7 +78,7 @@ class TileOperator:
         across, down = tiles_along(self._tiles.points)
         reached = self._near.reached()
         for number, rows in enumerate(parts):
-            whole = np.empty((max(rows.stop - rows.start, 0), nx))
+            whole = allocate((max(rows.stop - rows.start, 0), nx), np.float64, self._tally)
             first, last = rows.start // SIDE, min(-(-rows.stop // SIDE), down)
             for row in range(first, last if whole.size else first):
                 strip = self._interpolate_row(nodes, row, across)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..parallel import regrid
 from ..parallel.root import on_root
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array, Slab, allocate
 from ..physics.tile_operator import TileOperator
 from ..physics.tiles import SIDE, TileConvolution, Tiles, tiles_along
 from .contact import Contact, ContactSolver
@@ -199,12 +199,13 @@ def _parts(slab: Slab, tiles: Tiles) -> list[tuple[tuple[slice, slice], tuple[sl
 
 def _stacked(slab: Slab, tiles: Tiles, field: Array) -> Array | None:
     """The stacked map of tiles on root, 0 beyond the end of the grid; None on other ranks; collective."""
-    own = np.zeros(tiles.shape)
+    own = allocate(tiles.shape, np.float64, slab.tally)
+    own.fill(0.0)
     for there, here in _parts(slab, tiles):
         own[there] = field[here]
     if slab.comm.size == 1:
         return own
-    whole = np.empty_like(own) if slab.root else None
+    whole = allocate(tiles.shape, np.float64, slab.tally) if slab.root else None
     slab.comm.Reduce(own, whole)
     return whole
 

@@ -43,11 +43,12 @@ def test_displacement_is_that_of_the_whole_box(
         whole[row : row + SIDE, column : column + SIDE] = p[number * SIDE : (number + 1) * SIDE]
     pressure = np.ascontiguousarray(whole[:ny, :nx])
     expected = body.operator(FFT(Slab.alone(nx, ny), measured=False)).apply(pressure, np.empty((ny, nx)))
-    operator, _ = body.on_tiles(tiles, Tally())
+    operator, _ = body.on_tiles(tiles, tally := Tally())
     u, v = operator.apply(p, np.empty_like(p)), operator.apply(q, np.empty_like(q))
     assert_allclose(u * marked, stacked(tiles, expected), rtol=0.0, atol=ERROR * expected.max())
-    parts = list[np.ndarray]()
+    parts, held = list[np.ndarray](), tally["map bytes"]
     operator.displace(p, [slice(0, 7), slice(7, 7), slice(7, 70), slice(70, ny)], lambda _, rows: parts.append(rows))
+    assert tally["map bytes"] - held == expected.nbytes  # of all parts, which are kept here
     assert_allclose(np.concatenate(parts), expected, rtol=0.0, atol=ERROR * expected.max())
     assert np.vdot(q, u) == pytest.approx(np.vdot(p, v), rel=1e-12)
 
