@@ -31,7 +31,7 @@ from ..scene.rigid_surface import highest_waves
 from ..solve.adhesive.solver import GapSolver
 from ..solve.contact import ContactSolver
 from ..solve.nonsymmetric.steady import SteadySolver
-from ..solve.preconditioner.extension import grids_for
+from ..solve.preconditioner.extension import grids_for, pairs_for
 from ..steady_sliding.sliding import tolerance_of
 
 FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
@@ -93,7 +93,8 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     part, points, even = _Part(job, ranks, rank), job.grid.points, not job.initial.velocity[1]
     spectrum, blocks = part.transform(points)
     tolerance = min(tolerance_of(job.numerics.tolerance), tolerance_of_start(choices(job)))
-    held = SteadySolver.footprint(*points, tolerance, ranks, part.number, sets)
+    pairs = pairs_for(job.grid.dx, job.grid.dy)
+    held = SteadySolver.footprint(*points, tolerance, ranks, part.number, sets, pairs)
     held += 2 * 8 * part.cells(points)  # the heights and the start
     held += spectrum + blocks + part.surface_waves
     held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)

@@ -17,7 +17,7 @@ import numpy as np
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .constraint import CELL, Set
+from .constraint import CELL, Cells, Set
 
 MAX_PASSES = 20  # accuracy: of scaling to the load, of which each takes in those that reach H; 2 or 3 do as a rule
 LOAD_ROUNDING = 1e-14  # accuracy: of the load, a smaller part of which cannot be told from none
@@ -43,13 +43,13 @@ class Bounded:
         found: tuple[float, ...] = _mark(p, u, h, d, self.highest, working)
         return found
 
-    def advance(self, p_old: Array, t: Array, step: float, p: Array, above: int, sums: Array) -> tuple[float, float]:
-        load, cut = _advance(p_old, t, step, p, self.highest, above, sums)
+    def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
+        load, cut = _advance(p_old, t, step, p, self.highest, cells, sums)
         return float(load), float(cut)
 
-    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, above: int) -> None:
+    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
         """Free pressures give back load; those that reach H by it stay there."""
-        _scale_cells(p, self.highest, above, kept)
+        _scale_cells(p, self.highest, cells, kept)
         self.give_load(slab, p, load, total)
 
     def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
@@ -120,14 +120,14 @@ def _mark(p, u, h, d, highest, working):
 
 
 @loop
-def _advance(p_old, t, step, p, highest, above, sums):
+def _advance(p_old, t, step, p, highest, cells, sums):
     """`p = p_old - step t` between 0 and H; the sums over cells of free p, and beside them of what was added less what
     was taken off. Returns the sum of p, and of what was added or taken off."""
     columns = sums.shape[1] // 2
     load, cut = 0.0, 0.0
     sums[:] = 0.0
     for j in range(p.shape[0]):
-        row = sums[(j + above) // CELL]
+        row = sums[(j + cells.above) // cells.rows]
         row_load, row_cut = 0.0, 0.0
         for i in range(p.shape[1]):
             value = p_old[j, i] - step * t[j, i]
@@ -143,10 +143,10 @@ def _advance(p_old, t, step, p, highest, above, sums):
 
 
 @loop
-def _scale_cells(p, highest, above, factors):
+def _scale_cells(p, highest, cells, factors):
     """Scale each free pressure by the factor of its cell, up to H."""
     for j in range(p.shape[0]):
-        row = factors[(j + above) // CELL]
+        row = factors[(j + cells.above) // cells.rows]
         for i in range(p.shape[1]):
             p[j, i] = min(p[j, i] * row[i // CELL], highest) if p[j, i] < highest else p[j, i]
 

@@ -4,7 +4,7 @@
 known not to be negative. Another law is another class with these methods (`bounded`).
 """
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,16 @@ from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
 
-CELL = 16  # tuning: points along each side of a cell of `LocalLoad`; 8 and 32 need a few iterations more
+CELL = 16  # tuning: points along x of a cell of `LocalLoad`; 8 and 32 need a few iterations more
 Set = NDArray[np.bool_]
+
+
+class Cells(NamedTuple):
+    """Cells of `LocalLoad` on a rank: the `rows` of points of each, and how many of the first one another rank `above`
+    has."""
+
+    rows: int
+    above: int
 
 
 class Constraint(Protocol):
@@ -35,11 +43,11 @@ class Constraint(Protocol):
         times what is wrong with g, the number of these points and their sum of g, the number of points that are held
         under pressure, and the deepest penetration that is not allowed."""
 
-    def advance(self, p_old: Array, t: Array, step: float, p: Array, above: int, sums: Array) -> tuple[float, float]:
+    def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
         """`p = p_old - step t`, cut off at the bounds, which may be in the place of the old one; sums over cells of
         free p, and beside them of what cutting off added (`LocalLoad`). Returns the sum of p, and how much was cut."""
 
-    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, above: int) -> None:
+    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
         """Scale p in each cell by its share that is `kept`, which makes its sum `load`, and then to the sum `total`."""
 
     def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
@@ -66,13 +74,13 @@ class NonNegative:
         wrong, count, gaps, deepest = mark(p, u, h, d, working)
         return wrong, count, gaps, 0.0, deepest
 
-    def advance(self, p_old: Array, t: Array, step: float, p: Array, above: int, sums: Array) -> tuple[float, float]:
-        advance(p_old, t, step, p, above, sums)
+    def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
+        advance(p_old, t, step, p, cells, sums)
         loads, cuts = np.split(sums, 2, axis=1)
         return float(loads.sum()), float(cuts.sum())
 
-    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, above: int) -> None:
-        scale_cells(p, above, total / load * kept)
+    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
+        scale_cells(p, cells, total / load * kept)
 
     def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
         kernels.scale(p, total / load)
@@ -118,7 +126,7 @@ def mark(p, u, h, d, working):
 
 
 @loop
-def advance(p_old, t, step, p, above, sums):
+def advance(p_old, t, step, p, cells, sums):
     """`p = max(p_old - step t, 0)`; the sums over cells of p, and beside them of what was added.
 
     Rows of a cell are added up first, which is as fast as no sums at all.
@@ -133,8 +141,8 @@ def advance(p_old, t, step, p, above, sums):
             p[j, i] = kept
             load[i] += kept
             cut[i] += kept - value
-        if (j + above + 1) % CELL == 0 or j + 1 == p.shape[0]:
-            row = sums[(j + above) // CELL]
+        if (j + cells.above + 1) % cells.rows == 0 or j + 1 == p.shape[0]:
+            row = sums[(j + cells.above) // cells.rows]
             for i in range(p.shape[1]):
                 row[i // CELL] += load[i]
                 row[columns + i // CELL] += cut[i]
@@ -143,12 +151,12 @@ def advance(p_old, t, step, p, above, sums):
 
 
 @loop
-def scale_cells(p, above, factors):
+def scale_cells(p, cells, factors):
     """Scale each pressure by the factor of its cell."""
     line = np.empty(p.shape[1])
     for j in range(p.shape[0]):
-        if j == 0 or (j + above) % CELL == 0:
-            row = factors[(j + above) // CELL]
+        if j == 0 or (j + cells.above) % cells.rows == 0:
+            row = factors[(j + cells.above) // cells.rows]
             for i in range(line.size):
                 line[i] = row[i // CELL]
         for i in range(p.shape[1]):

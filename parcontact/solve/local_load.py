@@ -4,7 +4,9 @@ A step makes pressures at the edges of contact negative, and 0 in their place ad
 scaled by one factor to take it back, every spot would be lifted or lowered by its share of waves as long as the box: by
 much more, on a large grid, than the gaps are beside an edge, so that points penetrate along all edges, enter, and are
 cut off again. So each cell of CELL x CELL points gives back what was added in it, which changes the displacement near
-by only. From a cold start on 4096 x 4096 points that makes 22 of 57 applications of the operator.
+by only. From a cold start on 4096 x 4096 points that makes 22 of 57 applications of the operator. Where points are
+nearer along x than along y, cells have fewer rows and are about square: in higher ones spots give back what others
+added, and projected steps towards a steady state may cycle.
 """
 
 from itertools import pairwise
@@ -13,18 +15,20 @@ import numpy as np
 
 from ..parallel.regrid import fetch
 from ..parallel.slab import Array, Slab
-from .constraint import CELL, Constraint
+from .constraint import CELL, Cells, Constraint
 
 LEAST_CUT = 3e-4  # tuning, of the load: less disturbs no long wave, and is better taken from all points alike
+LEAST_ROWS = 4  # tuning: of a cell; with fewer, as on cells of 16 : 1, contacts may cycle
 MOST_GIVEN_BACK = 0.5  # tuning, of the load of a cell: more is not taken from it
 
 
 class LocalLoad:
     """Cells of one grid, the same on any number of ranks; it holds no maps."""
 
-    def __init__(self, slab: Slab) -> None:
-        self._slab = slab
-        touched = [_rows_of_cells(part) for part in slab.dealt]
+    def __init__(self, slab: Slab, pairs: int = 0) -> None:
+        """On a grid where so many `pairs` along x make square cells."""
+        self._slab, rows = slab, max(CELL >> pairs, LEAST_ROWS)
+        touched = [_rows_of_cells(part, rows) for part in slab.dealt]
         rank, width = slab.comm.rank, -(-slab.nx // CELL)
         ends = np.cumsum([0] + [part.stop - part.start for part in touched]).tolist()
         stacked = [slice(start, stop) for start, stop in pairwise(ends)]
@@ -33,13 +37,13 @@ class LocalLoad:
         self._wanted = [slice(*np.searchsorted(numbers, [part.start, part.stop]).tolist()) for part in touched]
         own = np.arange(touched[rank].start, touched[rank].stop)
         self._starts = np.searchsorted(numbers[self._wanted[rank]], own)
-        self._above = slab.rows.start % CELL
+        self._cells = Cells(rows, slab.rows.start % rows)
         self._sums = np.zeros(self._stack.shape)
 
     def advance(self, constraint: Constraint, p_old: Array, t: Array, step: float, p: Array) -> tuple[float, float]:
         """`p = p_old - step t`, cut off at the bounds, which may be in the place of the old one; returns the sum of p
         and how much was cut off; collective."""
-        load, cut = self._slab.sum(*constraint.advance(p_old, t, step, p, self._above, self._sums))
+        load, cut = self._slab.sum(*constraint.advance(p_old, t, step, p, self._cells, self._sums))
         return load, cut
 
     def restore(self, constraint: Constraint, p: Array, load: float, total: float, near_by: bool) -> None:
@@ -50,7 +54,7 @@ class LocalLoad:
         if near_by:
             shares = _shares(self._complete(self._sums))
             load -= self._slab.sum(float(np.sum(shares * loads)))[0]
-        constraint.restore(self._slab, p, load, total, 1.0 - shares, self._above)
+        constraint.restore(self._slab, p, load, total, 1.0 - shares, self._cells)
 
     def _complete(self, own: Array) -> Array:
         """The sums over whole cells, of those that this rank has points of."""
@@ -58,10 +62,10 @@ class LocalLoad:
         return np.add.reduceat(parts, self._starts, axis=0) if len(parts) else parts
 
 
-def _rows_of_cells(part: slice) -> slice:
-    """The rows of cells that some rows of points belong to."""
-    start = part.start // CELL
-    return slice(start, max(-(-part.stop // CELL), start) if part.stop > part.start else start)
+def _rows_of_cells(part: slice, rows: int) -> slice:
+    """The rows of cells, of so many rows of points, that some rows of points belong to."""
+    start = part.start // rows
+    return slice(start, max(-(-part.stop // rows), start) if part.stop > part.start else start)
 
 
 def _shares(sums: Array) -> Array:

@@ -23,6 +23,7 @@ from ..solve import kernels, nested
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
+from ..solve.preconditioner.extension import pairs_for
 from .heating import Feedback, warm
 from .losses import branch_powers
 from .point import Point
@@ -249,7 +250,9 @@ class SteadySliding:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
         tolerance = max(self._tolerance, 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
         limit, along = 20 * numerics.max_iterations, soft_stripes(self.setup, velocity)
-        return SteadySolver(level.slab, operator, preconditioner, height, tolerance, limit, along=along)
+        slab, grid = level.slab, self.setup.grid
+        pairs = pairs_for(grid.lx / slab.nx, grid.ly / slab.ny)
+        return SteadySolver(slab, operator, preconditioner, height, tolerance, limit, along=along, pairs=pairs)
 
     def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""

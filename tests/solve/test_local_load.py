@@ -18,24 +18,24 @@ ROUNDING, TOTAL = 1e-13, 3.0
 ANY_RANKS = pytest.mark.parametrize("shape", [(1, 1), (7, 40), (33, 16), (50, 37), (64, 64)])
 
 
-def cut_off(values: Map, near_by: bool = True) -> tuple[slice, Map, float, float]:
+def cut_off(values: Map, near_by: bool = True, pairs: int = 0) -> tuple[slice, Map, float, float]:
     """The rows that this rank has, their pressure after the cut, made to have the sum TOTAL, and the load and the cut
     that are returned."""
     slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
     p, t = values[slab.rows] + 2.0, np.full(values[slab.rows].shape, 4.0)
-    local = LocalLoad(slab)
+    local = LocalLoad(slab, pairs)
     load, cut = local.advance(NonNegative(), p, t, 0.5, p)
     if load > 0.0:
         local.restore(NonNegative(), p, load, TOTAL, near_by)
     return slab.rows, p, load, cut
 
 
-def expected(values: Map) -> Map:
-    """Cell by cell."""
+def expected(values: Map, rows: int) -> Map:
+    """Cell by cell, of so many rows."""
     out = np.maximum(values, 0.0)
-    for j in range(0, values.shape[0], CELL):
+    for j in range(0, values.shape[0], rows):
         for i in range(0, values.shape[1], CELL):
-            cell = np.s_[j : j + CELL, i : i + CELL]
+            cell = np.s_[j : j + rows, i : i + CELL]
             load = out[cell].sum()
             share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
             out[cell] *= 1.0 - share
@@ -50,15 +50,18 @@ def pressures(shape: tuple[int, int], sunk: float) -> Map:
 @pytest.mark.mpi
 @ANY_RANKS
 @pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
-@pytest.mark.parametrize("near_by", [True, False])
-def test_each_cell_gives_back_what_was_added_in_it(shape: tuple[int, int], sunk: float, near_by: bool) -> None:
+@pytest.mark.parametrize(("near_by", "pairs", "high"), [(True, 0, CELL), (True, 1, 8), (True, 4, 4), (False, 0, CELL)])
+def test_each_cell_gives_back_what_was_added_in_it(
+    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, high: int
+) -> None:
+    """Cells have fewer rows where pairs along x make square cells, but four at least."""
     values = pressures(shape, sunk) + 2.0 - 2.0  # with the rounding of what is advanced
-    rows, p, load, cut = cut_off(values, near_by)
+    rows, p, load, cut = cut_off(values, near_by, pairs)
     whole = np.maximum(values, 0.0)
     assert_allclose(load, whole.sum(), rtol=ROUNDING)
     assert_allclose(cut, (whole - values).sum(), rtol=ROUNDING, atol=ROUNDING)
     if load > 0.0:
-        kept = expected(values) if near_by else whole
+        kept = expected(values, high) if near_by else whole
         assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=ROUNDING)
 
 

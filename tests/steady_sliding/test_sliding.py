@@ -177,6 +177,22 @@ def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monk
     assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)
 
 
+def test_long_cells(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """Cells of 4 : 1 take at most 1.15 times the operator calls of squares of the same height; measured 0.96, and 1.49
+    with the preconditioner of squares."""
+    text = (
+        "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 6.25e-5, rms_slope: 0.02}\n"
+        "material: {include: synthetic_tyre}\n"
+        "history: [{pressure: 1.0}]\n"
+    )
+
+    def calls(nx: int) -> float:
+        states = sliding(shared_path, f"grid: {{points: [{nx}, 128], size: 1.0e-3}}\n" + text, comm)
+        return sum(states.solve((speed, 0.0), 1e5).operator_calls for speed in (0.01, 0.03, 0.1))
+
+    assert calls(512) <= 1.15 * calls(128)
+
+
 def test_random_scenes_are_right_or_say_so(shared_path: Path, comm: MPI.Intracomm) -> None:
     """What is returned as converged meets the contact conditions, by an operator of numpy's own."""
     random = np.random.default_rng(20)

@@ -18,6 +18,7 @@ WAVE: Json = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]}
 SPHERE: Json = {"shape": "sphere", "radius": 1e-2}
 SCENES: dict[str, tuple[Json, Json, tuple[float, float]]] = {
     "along x": ({"points": 128}, WAVE, (0.1, 0.0)),
+    "long cells": ({"points": [128, 32]}, WAVE, (0.1, 0.0)),
     "oblique": ({"points": [128, 96]}, WAVE, (0.1, 0.05)),
     "free": ({"points": 64, "boundary": "free"}, SPHERE, (0.1, 0.0)),
 }

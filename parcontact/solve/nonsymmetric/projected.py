@@ -22,25 +22,34 @@ from .gcr import gaps_on, residual, sum_on
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
-WIDE, NARROW = (Grids(5), 0.5), (Grids(4), 1.0)  # tuning: grids and floor of `ExtendedPreconditioner`; the latter take
-# a fifth more calls, but where a body is far stiffer at once, as on a line of points, larger cells or a smaller floor
-# may make sets of points come and go; so may pairs of long cells
+SQUARES, WIDE, NARROW = 5, 0.5, (Grids(4), 1.0)  # tuning: grids of squares and floor of `ExtendedPreconditioner`; the
+# last take a fifth more calls, but where a body is far stiffer at once, as on a line of points, larger cells or a
+# smaller floor may make sets of points come and go
+WITH_PAIRS = 0.3  # tuning: the floor with pairs along x: a higher one takes a tenth more calls
 
 
-def extension_on(nx: int, ny: int) -> tuple[Grids, float]:
-    """The grids and the floor of `ExtendedPreconditioner` on so many points."""
-    return NARROW if 1 in (nx, ny) else WIDE
+def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
+    """The grids and the floor of `ExtendedPreconditioner` on so many points, where so many `pairs` along x make square
+    cells."""
+    if 1 in (nx, ny):
+        return NARROW
+    return Grids(SQUARES + pairs, pairs), WITH_PAIRS if pairs else WIDE
 
 
 class Projected:
-    """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`."""
+    """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`.
 
-    def __init__(self, slab: Slab, operator: Operator, preconditioner: Operator, constraint: Constraint) -> None:
+    With `pairs` along x that make square cells, cells of `LocalLoad` are smaller: so is the least cut they give back.
+    """
+
+    def __init__(
+        self, slab: Slab, operator: Operator, preconditioner: Operator, constraint: Constraint, pairs: int = 0
+    ) -> None:
         self.slab, self.operator, self.preconditioner, self.constraint = slab, operator, preconditioner, constraint
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
-        grids, floor = extension_on(slab.nx, slab.ny)
+        grids, floor = extension_on(slab.nx, slab.ny, pairs)
         self.extended = ExtendedPreconditioner(slab, floor, grids)
-        self.local_load = LocalLoad(slab)
+        self.local_load, self._least_cut = LocalLoad(slab, pairs), LEAST_CUT / 2.0**pairs
 
     @property
     def pairs(self) -> list[tuple[Array, Array]]:
@@ -67,7 +76,7 @@ class Projected:
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
         now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
-        self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > LEAST_CUT * now)
+        self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > self._least_cut * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 

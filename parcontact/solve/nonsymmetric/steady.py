@@ -78,7 +78,8 @@ class SteadySolver:
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate; `max_steps` of the linear solves in all; `directions` kept in each; the axis `along` which the surface
-    slides where the body is far softer along stripes (`stripes`), else None.
+    slides where the body is far softer along stripes (`stripes`), else None; `pairs` along x that make square cells
+    (`extension.pairs_for`).
     """
 
     def __init__(
@@ -91,11 +92,12 @@ class SteadySolver:
         max_steps: int,
         directions: int = MAX_DIRECTIONS,
         along: int | None = None,
+        pairs: int = 0,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self.constraint = NonNegative()
-        self._projected = Projected(slab, operator, preconditioner, self.constraint)
+        self._projected = Projected(slab, operator, preconditioner, self.constraint, pairs)
         kept = precision_of_directions(tolerance, LOOSE)
         self._striped = along is not None
         on_sets: OnSet = Plain(preconditioner)
@@ -107,12 +109,12 @@ class SteadySolver:
         self._working: NDArray[Any] = slab.zeros(np.bool_)
 
     @staticmethod
-    def footprint(nx: int, ny: int, tolerance: float, ranks: int, rank: int, sets: bool = False) -> int:
+    def footprint(nx: int, ny: int, tolerance: float, ranks: int, rank: int, sets: bool = False, pairs: int = 0) -> int:
         """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
         rows, kept = dealt_to(ny, ranks, rank), precision_of_directions(tolerance, LOOSE)
         bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * 8 + 1
         bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
-        cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, extension_on(nx, ny)[0])
+        cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, extension_on(nx, ny, pairs)[0])
         return bytes_of_maps * (rows.stop - rows.start) * nx + cells
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:

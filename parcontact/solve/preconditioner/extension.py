@@ -43,6 +43,14 @@ class Grids(NamedTuple):
 ALL = Grids()
 
 
+def pairs_for(dx: float, dy: float) -> int:
+    """Return how often points at distances dx and dy have to be joined to pairs along x until cells are about square; 0
+    where they are not nearer along x, or too far from square."""
+    if max(dx, dy) > LONG * min(dx, dy):
+        return 0
+    return max(round(math.log2(dy / dx)), 0)
+
+
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     """Return the grids of larger cells to use with distances dx and dy of points.
 
@@ -53,7 +61,7 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
-    pairs = max(round(math.log2(dy / dx)), 0)
+    pairs = pairs_for(dx, dy)
     if reach == math.inf:
         return Grids(None, pairs)
     sizes = max(math.log2(reach / max(dx, dy)), -10.0)

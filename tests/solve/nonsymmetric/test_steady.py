@@ -23,17 +23,17 @@ class Identity:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("tolerance", [1e-8, 1e-5])
+@pytest.mark.parametrize(("tolerance", "pairs"), [(1e-8, 0), (1e-5, 0), (1e-5, 2)])
 def test_maps_are_made_when_they_are_needed(
-    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, tolerance: float
+    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, tolerance: float, pairs: int
 ) -> None:
     """Projected steps need few; with none of those allowed, an active set that uses all of its directions follows."""
     slab = Slab(comm, NX, NY)
     operator = HalfSpace(SIZE).operator(FFT(slab))
     before = slab.tally["map bytes"]
-    solver = SteadySolver(slab, operator, Identity(), 1.0, tolerance, 1000)
+    solver = SteadySolver(slab, operator, Identity(), 1.0, tolerance, 1000, pairs=pairs)
     numbers = NX, NY, tolerance, comm.size, comm.rank
-    few, most = (SteadySolver.footprint(*numbers, sets) for sets in (False, True))
+    few, most = (SteadySolver.footprint(*numbers, sets, pairs) for sets in (False, True))
 
     def held() -> int:
         return slab.tally["map bytes"] - before

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for
+from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for, pairs_for
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
@@ -112,11 +112,12 @@ def test_holds_what_it_says(shape: tuple[int, int], larger: Grids) -> None:
 
 def test_pairs_along_x_until_cells_are_square() -> None:
     """Where points are further apart along x there are none; up to a reach of eight of the longer distances."""
-    found = [grids_for(dx, dy).pairs for dx, dy in ((1.0, 1.0), (1.0, 1.4), (1.0, 1.5), (1.0, 4.0), (4.0, 1.0))]
+    found = [pairs_for(dx, dy) for dx, dy in ((1.0, 1.0), (1.0, 1.4), (1.0, 1.5), (1.0, 4.0), (4.0, 1.0))]
     assert found == [0, 0, 1, 2, 0]
     assert grids_for(1.0, 4.0, reach=32.0) == (5, 2, 1.0)
     assert grids_for(4.0, 1.0, reach=32.0) == (3, 0, 1.0)
     assert grids_for(1.0, 1.0, reach=1.0) == (2, 0, pytest.approx(2.0 ** (1.5 * FADING)))  # cells of two count for less
+    assert pairs_for(1.0, 17.0) == 0
     assert grids_for(1.0, 17.0).most == grids_for(17.0, 1.0).most == 0
 
 
