@@ -1,6 +1,7 @@
 """Signals that ask a program to stop, or to save, noted until all ranks have agreed on what to do."""
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -27,11 +28,12 @@ class Signals:
     def noted(self) -> Iterator["Signals"]:
         """Note signals meanwhile; before and after, they end the process at once, as there is nothing to save.
 
-        Where another one notes them already, as that of a sweep around its cases, it is the one to ask.
+        Where another one notes them already, as that of a sweep around its cases, it is the one to ask. In a thread
+        beside the main one none can be noted.
         """
         outer = getattr(signal.getsignal(SAVE), "__self__", None)
-        if isinstance(outer, Signals):
-            yield outer
+        if isinstance(outer, Signals) or threading.current_thread() is not threading.main_thread():
+            yield outer if isinstance(outer, Signals) else self
             return
         before = {number: signal.signal(number, self.note) for number in (*STOP, SAVE)}
         try:

@@ -54,6 +54,7 @@ class Simulation:
         self._saved: Contents | None = None
         self._march_made: March | None = None
         self._began = False  # whether the row of the initial state has been handed out
+        self._stepped = False  # whether steps are made in memory
 
     # -- running ------------------------------------------------------------------------------------------------------
 
@@ -64,7 +65,7 @@ class Simulation:
         is then that before it. All ranks make each step: one that leaves the loop, by `break` or an exception of its
         own, makes the others raise RunError.
         """
-        march = self._march
+        march, self._stepped = self._march, True
         timeline = march.timeline()
         if not self._began:
             self._began = True
@@ -86,14 +87,14 @@ class Simulation:
 
         A job that names an output directory runs as on the command line, with the files that it asks for: from the
         newest checkpoint there, afresh (`restart="never"`), or from a checkpoint by its path; `quiet=False` prints a
-        line per step. It may stop early, when a signal or a stop file asks for it: see `finished`. Raises RunError for
-        a step that could not be made, InputError for a directory that is not its own.
+        line per step. It may stop early, when a signal or a stop file asks for it: see `finished`; called again it goes
+        on. Raises RunError for a step that could not be made, InputError for a directory that is not its own.
         """
         if not self.job.origin.names_directory:
             for _ in self.steps():
                 pass
             return self.row
-        if self._march_made is not None and self._began:
+        if self._stepped:
             raise InputError("run() writes the files of a whole run: it must come before the first of steps()")
         self._wait_for_all("runs")
         at = str(self._saved.path if self._saved is not None else path_of(restart))
@@ -102,6 +103,7 @@ class Simulation:
         if ended.march is None and ended.contents is None:
             raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
         self._march_made, self._saved, self._began = ended.march, ended.contents, True
+        self.__dict__.pop("_contacts", None)  # of the march before
         return self.row
 
     @property

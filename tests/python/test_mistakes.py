@@ -4,6 +4,7 @@ import copy
 import pickle
 import re
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,24 @@ def test_mistakes_of_jobs(call: Callable[[], Any], said: str) -> None:
 def test_other_mistakes(call: Callable[[], Any], said: str) -> None:
     with pytest.raises(pc.InputError, match=f"^{said}"):
         call()
+
+
+def test_run_again_and_in_a_thread(tmp_path: Path) -> None:
+    """A run that was stopped goes on when it is called again; one that has finished says the same again."""
+    stopped = simulation(JOB, {"output.directory": str(tmp_path / "out")})
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "stop").touch()
+    with ThreadPoolExecutor(1) as threads:
+        assert threads.submit(stopped.run).result().step == 0
+    ends = [stopped.finished]
+    rows = [stopped.run() for _ in range(2)]
+    assert [*ends, stopped.finished] == [False, True]
+    assert rows[0].step > 0
+    assert rows[0].friction == rows[1].friction
+    steps = simulation(JOB, {"output.directory": str(tmp_path / "other")})
+    next(steps.steps())
+    with pytest.raises(pc.InputError, match="must come before the first of steps"):
+        steps.run()
 
 
 SWEPT = {**JOB, "sweep": [{"surface.amplitude": [1e-6, 2e-6]}]}
