@@ -21,8 +21,8 @@ so that history decides the branch. One iteration, with M = keep the values on t
 4. the way `w = max(g - alpha t, 0) - g` of a step as long as the last one should have been;
 5. `g <- g + theta w` with the step of Newton, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`, and where that curvature
    is not clearly positive the majorized one, `-<c, w>/<w, K w>`: as gamma is concave it lowers E. It is no longer than
-   gaps allow. A way that closes gaps is gone to its end, theta = 1; where Newton's theta is less than a half, a shorter
-   way takes its place;
+   gaps allow, and a way that closes gaps is gone to its end, theta = 1, if it nearly is by Newton. Where cutting off
+   has made a way that raises E, a shorter one takes its place;
 6. E must not rise: else the step is halved.
 
 So there are two operator calls in an iteration, `A c` and `K w`: the pressure goes on with `theta K w`.
@@ -45,8 +45,8 @@ from .law import Law
 
 # tuning
 LEAST_CURVATURE = 0.02  # of the elastic one: with less the majorized step is made
-WHOLE = 0.5  # share of a way that closes gaps, if Newton's step: from it on it is gone to its end, else it is too long
-LEAST_WAY = 0.1  # of a shorter one over it
+WHOLE = 0.75  # share of a way that closes gaps, if Newton's step: from it on it is gone to its end
+SHORTER = 0.1  # length of a way over that of one that raises E
 MAX_TRIES = 12  # of ways, and of halvings of a step that raises E
 MAX_STALLED_ITERATIONS = 120  # iterations without a better certificate after which a solve gives up
 LEAST_DESCENT = 0.1  # over that without the last direction: with less it is forgotten
@@ -221,9 +221,9 @@ class GapSolver:
             if it.given is not None and cut > 0.0:
                 kernels.rescale(g, it.given * self.slab.points / total, self._way)
             wanted, most = self._newton(it, g)
-            if cut == 0.0 or wanted >= WHOLE:
+            if cut == 0.0 or wanted > 0.0:
                 break
-            it.step *= max(wanted, LEAST_WAY)
+            it.step *= SHORTER
         it.step *= wanted if wanted > 0.0 else 1.0
         return 1.0 if cut > 0.0 and wanted >= WHOLE else min(wanted, most)
 
