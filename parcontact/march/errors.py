@@ -202,9 +202,11 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 
 
 def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:
-    """Return a unit direction, that of sliding, at rest against the force, and friction along it without the
-    interface's."""
-    x, y = velocity if any(velocity) else (-measures.force_x, -measures.force_y)
+    """Return a unit direction, and friction along it without the interface's: that of sliding, or that against the
+    force at rest and where the force is rather across, as of ridges that slide along themselves."""
+    (x, y), (force_x, force_y) = velocity, (measures.force_x, measures.force_y)
+    if abs(force_x * y - force_y * x) >= abs(force_x * x + force_y * y):
+        x, y = -force_x, -force_y
     size = math.hypot(x, y)
-    along = -(measures.force_x * x + measures.force_y * y) / (size * measures.normal_force)
+    along = -(force_x * x + force_y * y) / (size * measures.normal_force)
     return (x / size, y / size), along - measures.friction_interface

@@ -19,14 +19,6 @@ def excess_of(dx: float, dy: float, straight: bool = False) -> float:
     return SIDE if straight else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
 
 
-def opposing(force: tuple[float, float], velocity: tuple[float, float]) -> float:
-    """Return the size of a tangential force along a velocity, at rest that of all of it: what friction counts."""
-    speed = math.hypot(*velocity)
-    if speed == 0.0:
-        return math.hypot(*force)
-    return abs(force[0] * (velocity[0] / speed) + force[1] * (velocity[1] / speed))
-
-
 @dataclass(frozen=True)
 class Measures:
     """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; area as a share of the nominal.
@@ -34,9 +26,8 @@ class Measures:
     `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
     the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
     spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
-    `at_edge` says that an isolated contact reaches it. `friction` is the size of the force along the sliding, at rest
-    of all tangential force, over the normal one. Forces and `friction` hold what an interface adds, whose part is
-    `friction_interface`.
+    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, whose part of
+    it is `friction_interface`.
     """
 
     pressure: float = 0.0
@@ -61,6 +52,7 @@ class Measures:
     def friction_x(self) -> float:
         """Tangential over normal force along x, positive where it opposes motion along +x: `-force_x/normal force`.
 
-        Unlike `friction` it changes its sign with the direction of sliding; 0 at zero load, and where nothing touches.
+        Unlike `friction` it changes its sign with the direction of sliding; 0 at zero load.
         """
-        return 0.0 - self.force_x / self.normal_force if self.normal_force > 0.0 and self.contact_area > 0.0 else 0.0
+        force = math.hypot(self.force_x, self.force_y)
+        return 0.0 - self.friction * (self.force_x / force) if force > 0.0 else 0.0

@@ -14,7 +14,7 @@ from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
 from .interface import InterfaceFriction, Vector
-from .measures import Measures, excess_of, opposing
+from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
 
@@ -72,7 +72,7 @@ class Probe:
             pressure=load / points * unit_pressure,
             force_x=force_x,
             force_y=force_y,
-            friction=opposing((force_x, force_y), velocity) / normal if presses else 0.0,
+            friction=math.hypot(force_x, force_y) / normal if presses else 0.0,
             contact_area=count / points,
             approach=d * units.height - self.surface.datum,
             mean_gap=(gaps / points - d) * units.height,

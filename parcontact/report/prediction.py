@@ -278,7 +278,7 @@ def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterato
     for leg, time, found in zip(legs, start, follow(memory, legs, gamma), strict=True):
         distances = slid + math.hypot(*leg.velocity) * leg.instants
         slid = float(distances[-1])
-        friction = found.friction(leg.pressures, leg.velocity)
+        friction = found.friction(leg.pressures)
         yield from map(Instant, time + leg.instants, distances, leg.pressures, friction, found.contact_area)
 
 

@@ -16,9 +16,8 @@ class Point:
     """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN where none was asked for), by what factor
     relaxation times are longer than at the reference, what it measures, its certificate, and what it took.
 
-    `friction` is the power that the body dissipates, over load and velocity, and what an interface adds: the force
-    along the sliding over the normal one. That of `measures` is the same by the slopes of the rigid surface. They
-    differ by the mesh, and `errors` is the budget of the former.
+    `friction` is the power that the body dissipates, over load and velocity, and what an interface adds; that of
+    `measures` is by the slopes of the rigid surface. They differ by the mesh, and `errors` is the budget of the former.
     `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did.
     `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box). `flash`
     has the temperatures of the contact, None where the job has no `thermal`; with feedback, found in so many `rounds`,
@@ -45,13 +44,6 @@ class Point:
     def speed(self) -> float:
         """The size of the velocity [m/s]."""
         return math.hypot(*self.velocity)
-
-    @property
-    def friction_x(self) -> float:
-        """Tangential over normal force along x: `friction`, and the force across the sliding."""
-        (x, y), force = (component / self.speed for component in self.velocity), self.measures
-        across = force.force_y * x - force.force_x * y
-        return self.friction * x + across * y / force.normal_force
 
     @property
     def error_friction(self) -> float:

@@ -32,7 +32,7 @@ WAVES = ("velocity", "pressure", "wavelength", "share")
 FOUND: dict[str, Callable[[Point], float]] = {  # columns that are neither of the point nor of its measures by name
     "velocity": lambda point: point.speed,
     "pressure": lambda point: point.measures.pressure,
-    "friction_x": lambda point: point.friction_x,
+    "friction_x": lambda point: point.friction * (point.velocity[0] / point.speed),
     "friction_slopes": lambda point: point.measures.friction,
     "friction_viscous": lambda point: point.friction - point.measures.friction_interface,
     "residual": lambda point: point.certificate.worst,

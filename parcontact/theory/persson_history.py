@@ -43,11 +43,9 @@ class Outcome(NamedTuple):
     traction: Array
     contact_area: Array
 
-    def friction(self, pressures: Array, velocity: tuple[float, float]) -> Array:
-        """The size of the tangential force along a velocity, at rest of all of it, over the normal force; 0 without
-        load."""
-        speed = np.hypot(*velocity)
-        size = np.abs(self.traction @ np.array(velocity)) / speed if speed else np.hypot(*self.traction.T)
+    def friction(self, pressures: Array) -> Array:
+        """The tangential over the normal force, not negative; 0 without load."""
+        size = np.hypot(*self.traction.T)
         return np.divide(size, pressures, out=np.zeros_like(size), where=pressures > 0)
 
 

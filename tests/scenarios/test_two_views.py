@@ -88,14 +88,18 @@ def test_friction_of_an_elastic_slide_is_0_within_its_error(velocity: Any) -> No
     assert any(line.startswith("friction is 0 +- ") for line in summary.lines((0.01, 0.01)))
 
 
-def test_ridges_that_slide_along_themselves_have_no_friction() -> None:
-    """What the mesh makes of it is a force across."""
+def test_friction_across_the_slide_has_an_error() -> None:
+    """Ridges that slide along themselves have no friction; what the mesh makes is across, where the views differ."""
     ridges = {"shape": "wave", "amplitude": 1e-6, "waves": [5, 0], "phase": 0.4}
     slide = {"pressure": 2e4, "velocity": [0.0, 0.1], "distance": 1.25e-4, "cells_per_step": 1}
     data = {**scene(8, ONE), "grid": {"points": [32, 8], "size": [1e-3, 2.5e-4]}, "surface": ridges, "history": [slide]}
     _, rows = marched(Job.model_validate({**data, "numerics": {"tolerance": 1e-6}}))
-    assert max(row.measures.friction for row in rows) < 1e-15
-    assert max(abs(row.measures.friction_x) for row in rows) > 1e-7
+    judged = [row for row in rows if row.errors is not None and row.measures.friction > 1e-7]
+    assert judged
+    for row in judged:
+        assert row.errors is not None
+        assert row.errors.friction is not None
+        assert row.errors.friction.mesh > 0.9
 
 
 def test_small_friction_of_a_march() -> None:

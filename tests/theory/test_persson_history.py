@@ -78,16 +78,14 @@ def test_full_contact_with_other_loads(memory: Memory) -> None:
     for gamma in (0.0, 0.45, 1.0):
         (found,) = follow(Memory(memory.rings, ZENER), [Leg(OBLIQUE, 5e-3, instants, pressures)], gamma)
         assert_allclose(found.traction, exact, rtol=1e-12, atol=1e-12 * np.abs(exact).max())
-        along = exact @ np.array(OBLIQUE) / np.hypot(*OBLIQUE)
-        assert_allclose(found.friction(pressures, OBLIQUE), np.abs(along) / pressures, rtol=1e-12)
-        assert_allclose(found.friction(pressures, (0.0, 0.0)), np.hypot(*exact.T) / pressures, rtol=1e-12)
+        assert_allclose(found.friction(pressures), np.hypot(*exact.T) / pressures, rtol=1e-12)
         assert np.all(found.contact_area == 1.0)
 
 
 def test_no_load(memory: Memory) -> None:
     (found,) = follow(memory, [at((0.1, 0.0), np.array([1e-3]), pressure=0.0)])
     assert found.contact_area == [0.0]
-    assert found.friction(np.array([0.0]), (0.1, 0.0)) == [0.0]
+    assert found.friction(np.array([0.0])) == [0.0]
 
 
 def test_chunks(memory: Memory, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,7 +145,7 @@ def test_peak_after_a_velocity_step(small_road: Rings, row: tuple[float, ...]) -
     memory.slide_for_ever((0.01, 0.0))
     distances = np.linspace(1.0, 3.0, 41) * 1e-6
     (found,) = follow(memory, [at((velocity, 0.0), distances / velocity, PRESSURE)])
-    friction = found.friction(np.full(41, PRESSURE), (velocity, 0.0))
+    friction = found.friction(np.full(41, PRESSURE))
     assert_allclose(friction.max(), highest, rtol=2e-3)
     assert_allclose(1e6 * distances[friction.argmax()], where, atol=0.1)
 
@@ -165,7 +163,7 @@ def test_tyre(small_road: Rings, velocity: float, highest: float, where: float) 
     distances = np.linspace(1.0, 3.0, 41) * 1e-6
     resting, sliding = tyre(small_road, velocity, distances)
     assert_allclose(resting.contact_area, [0.0152, 0.0465, 0.1371, 0.2487, 0.3210], atol=6e-5)
-    friction = sliding.friction(np.full(41, PRESSURE), (velocity, 0.0))
+    friction = sliding.friction(np.full(41, PRESSURE))
     assert_allclose(friction.max(), highest, rtol=2e-3)
     assert_allclose(1e6 * distances[friction.argmax()], where, atol=0.1)
 
@@ -173,7 +171,7 @@ def test_tyre(small_road: Rings, velocity: float, highest: float, where: float) 
 @pytest.mark.parametrize(("velocity", "end"), [(1.0, 0.00869), (3.0, 0.00836)])
 def test_tyre_at_the_end_of_its_slide(road: Rings, velocity: float, end: float) -> None:
     sliding = tyre(road, velocity, np.array([5e-4]))[1]
-    assert_allclose(sliding.friction(np.array([PRESSURE]), (velocity, 0.0)), end, rtol=2e-3)
+    assert_allclose(sliding.friction(np.array([PRESSURE])), end, rtol=2e-3)
 
 
 def test_persson_of_a_step_is_that_of_full_contacts_modulus(small_road: Rings) -> None:
