@@ -163,8 +163,8 @@ class AdhesionColumns(Effect):
         if 0.0 < zone < cell * (1.0 - SAME):
             yield (
                 f"adhesion: a cell, {cell:.3g} m, is {cell / zone:.2g} times as long as the process zone, and the "
-                f"forces at edges of contact are not resolved: 1.2 times makes pull-off wrong by 2 %, 2.7 times by "
-                f"12 %; use a range of {least:.3g} m or more, or cells of {zone:.3g} m"
+                f"forces at edges of contact are not resolved: 1.2 times makes pull-off wrong by 4 %, 1.8 times by "
+                f"23 %; use a range of {least:.3g} m or more, or cells of {zone:.3g} m"
             )
 
     @staticmethod
