@@ -206,7 +206,7 @@ class Simulation:
 
     @cached_property
     def _contacts(self) -> ContactWatch:
-        """What warns of contacts that mean little."""
+        """Return the watch that warns of contacts which mean little."""
         return ContactWatch(self.job.numerics.strict, self._march.timeline(), more=more_points(self.job.grid))
 
     def _warns(self, text: str) -> bool:

@@ -104,7 +104,7 @@ def test_steady_states_beside_a_history() -> None:
 
 
 def test_effects_of_a_curve_alone() -> None:
-    """Those that a steady state can have; each is one of a run, too."""
+    """The plan of a curve lists the effects that a steady state can have; each is one of a run, too."""
     curve = job(history=[], steady={"velocities": [1e-2], "pressures": [1e5]})
     names = [[re.split(" {2,}", line.strip())[1] for line in list(report.effects(each))[1:]] for each in (curve, job())]
     assert set(names[0]) == set(report.OF_STEADY_STATES) < set(names[1])

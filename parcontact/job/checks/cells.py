@@ -10,7 +10,7 @@ light contact is of small spots. Part of the errors is by chance, as edges lie a
 are in a box with N of the shortest waves along a side, the better they average out. The rest is by the body that loses
 energy: the phase phi of its modulus, in right angles, is that at the frequency of edges, and the pressure of such a
 body rises more steeply at one edge of a spot than at the other. They were found by experiment, with A and phi as they
-are guessed before (`job.contact_guess`): some 40 steady states of rough surfaces of 1 to 100 % contact with 12 to 36 of
+are guessed before (`job.contact_guess`): some 40 steady states of rough surfaces of 1 to 100 % contact with 12 or 24 of
 their shortest waves along a side, on 60 meshes of 2.7 to 40 cells per shortest wave, so that nine of ten keep what is
 asked for. Where sliding is slow (`Guess.slow` is 1, else less) friction has a further error of 0.22 (4/c), times the
 first two factors: edges of contact lose power in waves shorter than the cells. `scripts/chosen_mesh.py` tells how the
@@ -32,7 +32,7 @@ Vector = tuple[float, float]
 
 LIGHT, SMALL_SPOTS = 0.1, 0.4  # accuracy: the share in contact below which spots are small, and the power of it
 OPEN = 1.5  # accuracy: power of the share that is open
-FEW, MANY, AVERAGED = 12.0, 36.0, 0.5  # accuracy: waves along a side in the experiments, and the power of them
+FEW, MANY, AVERAGED = 12.0, 36.0, 0.5  # accuracy: waves along a side, within these (12 and 24 tried); their power
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: with which more of them are advised for less
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across

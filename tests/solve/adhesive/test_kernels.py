@@ -24,8 +24,8 @@ def attraction(one: law.Law, gap: np.ndarray) -> np.ndarray:
 
 
 def gamma(one: law.Law, gap: np.ndarray) -> np.ndarray:
-    """Of Dugdale's law with a ramp, the mean over it of `S (rho - g)` without: a quadrature of a kinked line, exact on
-    either side of the kink."""
+    """Return the energy at a gap. With a ramp that of Dugdale's law is the mean over it of `S (rho - g)` without: a
+    quadrature of a kinked line, exact on either side of the kink."""
     if one.kind == law.EXPONENTIAL:
         return S * RHO * np.exp(-gap / RHO)
     low, high = (np.clip(RHO + 0.5 * sign * one.ramp - gap, 0.0, None) for sign in (-1.0, 1.0))

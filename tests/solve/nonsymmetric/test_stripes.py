@@ -54,7 +54,7 @@ def test_means_are_carried_on_along_stripes(comm: MPI.Intracomm, along: int) -> 
 @pytest.mark.mpi
 @ALONG
 def test_symmetric(comm: MPI.Intracomm, along: int) -> None:
-    """What is carried on is brought back by the transpose: `a K b = b K a` on a set, if K is symmetric."""
+    """The transpose brings back what is carried on: `a K b = b K a` on a set, if K is symmetric."""
     slab = Slab(comm, NX, NY)
     stripes = Stripes(slab, Doubling(), ExtendedPreconditioner(slab), along)
     working = drawn(slab, 3) > 0.5
