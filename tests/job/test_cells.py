@@ -23,14 +23,14 @@ def test_fast_lengths(count: int) -> None:
 
 def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, float]:
     """Return the errors of friction and area by the laws of the module, in a slide along a unit vector at 5 % of
-    contact of a body with a phase of 0.2 at edges, in a box of 24 waves."""
+    contact of a body with a phase of 0.8 at edges, in a box of 24 waves."""
     (nx, ny), (x, y) = points, way
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
     c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
     friction = math.hypot(0.035 * (4.0 / c) ** 1.9, 0.003 * (4.0 / across) ** 2.5)
     area = math.hypot(0.055 * (4.0 / c) ** 1.3, 0.018 * (4.0 / across) ** 1.1)
     spots = 0.95**1.5 * 2**0.4
-    return friction * spots * math.hypot(0.9 * 0.5**0.5, 0.08), area * spots * math.hypot(1.15 * 0.5**0.5, 0.06)
+    return friction * spots * math.hypot(0.9 * 0.5**0.5, 0.32), area * spots * math.hypot(1.15 * 0.5**0.5, 0.24)
 
 
 @pytest.mark.parametrize("asked", [BOTH, FRICTION, Accuracy(friction=0.05, area=0.3)])
@@ -38,7 +38,7 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
 def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     """It keeps both errors, with no more points than the best of all meshes that transform fast."""
     way = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    found = cells.choose(WAVE, SIZE, [way], asked, cells.Guess(share=0.05, phase=0.2, waves=24.0))
+    found = cells.choose(WAVE, SIZE, [way], asked, cells.Guess(share=0.05, phase=0.8, waves=24.0))
     lengths = [n for n in range(16, 800, 16) if cells.fast_length(n) == n]
 
     def keeps(points: tuple[int, int]) -> bool:

@@ -30,6 +30,11 @@ def share(**sections: Any) -> float:
     return guessed(**sections).share
 
 
+def test_waves_along_a_side() -> None:
+    """Of a box of 1 mm with shortest waves of 10 um."""
+    assert guessed().waves == pytest.approx(100.0)
+
+
 def test_rms_slope_of_a_self_affine_surface() -> None:
     """Hurst exponent 0.5: m0 = int k^-2 dk (in units of C k_0^3/2 pi), m2 = int k^0 dk; to 1e-4."""
     m0, m2 = LOW**3 * (1.0 / LOW - 1.0 / HIGH), LOW**3 * (HIGH - LOW)
