@@ -1,6 +1,10 @@
-"""What a job is warned of as it is read."""
+"""What a job is warned of, or refused for, as it is read."""
 
 from pathlib import Path
+
+import pytest
+
+from parcontact.errors import InputError
 
 from .texts import SMALL, job_of, replaced
 
@@ -47,3 +51,12 @@ def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
 def test_warning_of_velocity_without_duration(tmp_path: Path) -> None:
     (warning,) = job_of(tmp_path, SMALL, "history.0.velocity=3").warnings
     assert warning == "history.0: nothing slides in a stage without duration or distance; its velocity has no effect"
+
+
+def test_waves_of_a_free_box_are_refused(tmp_path: Path) -> None:
+    """They are not independent there. Without them the same job is read."""
+    steady = "{velocities: 1, pressures: 1e5, waves: %s}"
+    free = SMALL.split("history")[0].replace("grid: {", "grid: {boundary: free, ")
+    job_of(tmp_path, replaced(free, steady=steady % "false"))
+    with pytest.raises(InputError, match=r"steady\.waves needs a periodic box"):
+        job_of(tmp_path, replaced(free, steady=steady % "true"))

@@ -190,15 +190,6 @@ def test_steady_may_stand_alone(tmp_path: Path) -> None:
     assert job.steady.unit_direction == pytest.approx((0.6, 0.8), rel=1e-15)
 
 
-def test_waves_of_a_free_box_are_refused(tmp_path: Path) -> None:
-    """They are not independent there. Without them the same job is read."""
-    steady = "{velocities: 1, pressures: 1e5, waves: %s}"
-    free = SMALL.split("history")[0].replace("grid: {", "grid: {boundary: free, ")
-    job_of(tmp_path, replaced(free, steady=steady % "false"))
-    with pytest.raises(InputError, match=r"steady\.waves needs a periodic box"):
-        job_of(tmp_path, replaced(free, steady=steady % "true"))
-
-
 def test_log_range_of_one() -> None:
     assert log_range("2:2:1") == (2.0,)
 
