@@ -10,6 +10,8 @@ longer than wide it is less (`measures.excess_of`).
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
@@ -17,6 +19,8 @@ from .interface import InterfaceFriction, Vector
 from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
+
+LEAST_LOAD = 1e-9  # accuracy: of the forces that pull, below which a load is what rounding leaves of 0
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,15 @@ class Probe:
         with `velocity` [m/s]; collective.
 
         `touching` is a map that is not 0 where the surfaces touch; without one that is where there is a pressure.
-        Where nothing touches all pressure is tension. A load above 0 is then an error of the solve, and friction is 0.
+        Friction is 0 where no load presses: none, tension, or what rounding leaves of two forces that balance. Where
+        nothing touches all pressure is tension, and a load above 0 is an error of the solve.
         """
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
         mask = p if touching is None else touching
         *sums, largest = loops.measure(p, u, h, mask, rows.before_first(self.slab, mask, cyclic), cyclic)
         edge = 0.0 if cyclic else _largest_at_edge(self.slab, mask)
+        pull = 0.0 if touching is None else self.slab.sum(float(np.minimum(p, 0.0).sum()))[0]
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
@@ -64,7 +70,7 @@ class Probe:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
-        presses = normal > 0.0 and count > 0
+        presses = load > -LEAST_LOAD * pull and count > 0
         corrected = (count - self._excess * sides) / points
         own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]

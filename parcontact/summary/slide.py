@@ -24,7 +24,10 @@ ERRORS = ("error_friction", "error_area")  # columns of the error budget of each
 
 
 class Slide(NamedTuple):
-    """`mu_max` and the distance [m] from the start of the slide to it; means over the last three quarters of it."""
+    """`mu_max` and the distance [m] from the start of the slide to it; means over the last three quarters of it.
+
+    Friction is nan where it is not defined, as no load presses in some steps.
+    """
 
     mu_max: float
     mu_max_distance: float
@@ -50,20 +53,35 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
     distance, friction, area = (np.asarray(columns[name])[rows] for name in ("distance", "friction", "contact_area"))
     if distance.size < 2 or distance[-1] == distance[0]:
         return None
+    if _without_load(columns, rows).size:
+        return Slide(math.nan, math.nan, math.nan, mean_over_end(distance, area))
     start = distance[0]
     highest = int(np.argmax(friction[1:])) + 1
     means = mean_over_end(distance, friction), mean_over_end(distance, area)
     return Slide(float(friction[highest]), float(distance[highest] - start), *means)
 
 
+def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return those of some rows, but the first, in which a tangential force acts under no load, or under tension."""
+    friction = np.asarray(columns["friction"], float)[rows]
+    return rows[1:][((friction == 0.0) & (_tangential(columns, rows) > 0.0))[1:]]
+
+
+def _tangential(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the tangential force of some rows [N]; 0 in tables without one."""
+    none = np.zeros(len(columns["friction"]))
+    x, y = (np.asarray(columns.get(name, none), float)[rows] for name in ("force_x", "force_y"))
+    return np.hypot(x, y)
+
+
 def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
     """Return the absolute errors of mu_max, mu_dyn and the corrected contact area of a slide, as far as they are
     estimated; `cell` is the spacing of the grid along x [m]."""
-    known = errors(history, columns)
+    known, slid = errors(history, columns), measure(history, columns)
     rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
-    if measure(history, columns) is None:
+    if slid is None:
         return {}
-    if not math.isnan(known.get(ERRORS[0], math.nan)):
+    if not math.isnan(known.get(ERRORS[0], math.nan) + slid.mu_dyn):
         found["mu_max"] = _highest(columns, rows, cell)[1]
         found["mu_dyn"] = _mean(columns, rows, "friction", ERRORS[0])[1]
     if CORRECTED in columns and not math.isnan(known.get(ERRORS[1], math.nan)):
@@ -129,15 +147,9 @@ def describe(
         ends_with = _slide(so_far).stop - 1
         yield f"the last slide has not begun; these numbers are of the one before, which ends with history.{ends_with}"
     rows = _during(so_far, np.asarray(columns["time"], float))
-    way = columns["distance"][rows[-1]] - columns["distance"][rows[0]]
-    late = ", in its last tenth: friction may still rise" if found.mu_max_distance > LATE * way else ""
-    after = f"{quantity(found.mu_max_distance, 'm')} after its start{late}"
-    mu_max, error, wave = _highest(columns, rows, cell)
-    rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * error else ""
-    yield f"mu_max, the highest friction of the slide, is {with_error(mu_max, error)}{rippled}, {after}"
-    length, dynamic = quantity(way, "m"), with_error(*_mean(columns, rows, "friction", ERRORS[0]))
-    yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
-    yield from _unsettled(columns, rows)
+    yield from (
+        _tell_friction(found, cell, columns, rows) if found.mu_dyn == found.mu_dyn else _tell_force(columns, rows)
+    )
     area = f"{found.contact_area:.4g} as counted in points"
     if CORRECTED in columns:
         area = f"{with_error(*_mean(columns, rows, CORRECTED, ERRORS[1]))} as corrected for its edges, and {area}"
@@ -155,6 +167,30 @@ def describe(
         yield "in some steps of the slide friction is smaller than its estimated error"
     if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
+
+
+def _tell_friction(
+    found: Slide, cell: float, columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
+) -> Iterator[str]:
+    """Yield the highest friction of a slide, its mean, and whether it has settled."""
+    way = columns["distance"][rows[-1]] - columns["distance"][rows[0]]
+    late = ", in its last tenth: friction may still rise" if found.mu_max_distance > LATE * way else ""
+    after = f"{quantity(found.mu_max_distance, 'm')} after its start{late}"
+    mu_max, error, wave = _highest(columns, rows, cell)
+    rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * error else ""
+    yield f"mu_max, the highest friction of the slide, is {with_error(mu_max, error)}{rippled}, {after}"
+    length, dynamic = quantity(way, "m"), with_error(*_mean(columns, rows, "friction", ERRORS[0]))
+    yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
+    yield from _unsettled(columns, rows)
+
+
+def _tell_force(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:
+    """Yield the tangential force of a slide whose friction is not defined."""
+    force, steps = _tangential(columns, rows), _without_load(columns, rows).size
+    mean = mean_over_end(np.asarray(columns["distance"], float)[rows], force)
+    where = f"in {steps} of {len(rows) - 1} steps of the slide, in which no load presses, and is 0 in the table"
+    size = f"{quantity(force[1:].max(), 'N')} at most, and {quantity(mean, 'N')} in the mean over the last"
+    yield f"friction is not defined {where}: the tangential force is {size} three quarters of the slide"
 
 
 def _unsettled(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:

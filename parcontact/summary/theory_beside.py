@@ -45,7 +45,8 @@ def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tup
         return {"contact area": (area[-1], columns.get(slide.ERRORS[1], [math.nan])[-1] * area[-1])}
     within = slide.absolute_errors(history, columns, cell)
     values = {"mu_max": found.mu_max, "mu_dyn": found.mu_dyn, "contact area": found.contact_area}
-    return {name: (value, within.get(name.replace(" ", "_"), math.nan)) for name, value in values.items()}
+    defined = {name: value for name, value in values.items() if value == value}
+    return {name: (value, within.get(name.replace(" ", "_"), math.nan)) for name, value in defined.items()}
 
 
 def describe(directory: Path, history: Sequence[Stage], cell: float) -> Iterator[str]:

@@ -143,3 +143,14 @@ def test_a_load_on_nothing_has_no_friction(comm: MPI.Intracomm, touches: bool) -
     found = Probe(slab, surface, UNITS).measure(p, ALPHA, h, h, 0.0, (0.0, 0.0), touching=touching)
     assert found.pressure > 0.0
     assert (found.friction > 0.0) == touches
+
+
+@pytest.mark.parametrize(("more", "defined"), [(0.0, False), (1e-12, False), (1e-6, True), (-1e-6, False)])
+def test_no_friction_where_pull_and_push_balance(comm: MPI.Intracomm, more: float, defined: bool) -> None:
+    """What rounding leaves of two forces that balance is no load; a load of a millionth of the pull is one."""
+    surface = wave(comm, (3, 0))
+    slab, h = surface.slab, surface.heights((0.0, 0.0), surface.slab.empty())
+    p = more + np.cos(angle(slab, (3, 0)) - 0.6)
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h, h, 0.0, (0.0, 0.0), touching=np.ones_like(p))
+    assert found.force_x != 0.0
+    assert (found.friction > 0.0) == defined

@@ -1,5 +1,6 @@
 """Highest and dynamic friction of a slide, from made-up rows."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,18 @@ def test_sentences_about_a_slide() -> None:
     assert "the mean flash temperature over the same distance is 0.5 K, at most 3 K at a point" in said(
         [REST, CLIMB, SETTLE], table
     )
+
+
+def test_forces_of_a_slide_under_no_load() -> None:
+    """Surfaces that stick have forces where friction is not defined: the largest and the mean are told."""
+    table = rows((0, 0, 0), (1, 0, 0), (1.5, 1, 0), (2.0, 2, 0), (3.0, 4, 6))
+    table |= {"force_x": [9.0, 9.0, -3.0, 0.0, -1.0], "force_y": [0.0, 0.0, 4.0, 2.0, 0.0]}
+    found = measure(stages(REST, CLIMB, SETTLE), table)
+    assert found is not None
+    assert math.isnan(found.mu_max + found.mu_dyn)
+    (force, *_), where = said([REST, CLIMB, SETTLE], table), "in 2 of 3 steps of the slide, in which no load presses"
+    mean = "5 N at most, and 2.17 N in the mean"  # 3.5 over a metre, 1.5 over two
+    assert force.startswith(f"friction is not defined {where}, and is 0 in the table: the tangential force is {mean}")
 
 
 def test_sentences_about_a_slide_that_others_follow() -> None:
