@@ -216,7 +216,10 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
         if not scene.goes_on_open:
             raise DetachedError(step.time, step.load)
         stuck, sentence = sticking.open_up(scene, stuck, trial), failure.nothing_holds(step.control, step.load)
-        remark = f"{failure.where(scene, step)}: {sentence}" if state.row.measures.contact_area > 0.0 else ""
+        if state.row.measures.contact_area == state.row.measures.pressure == 0.0:  # they were apart before
+            stuck = stuck._replace(snapped=False)
+        else:
+            remark = f"{failure.where(scene, step)}: {sentence}"
     contact = stuck.contact
     if contact.failure and not _accepts(scene, contact):
         moved = math.hypot(*cells_moved(scene, step, state.position))

@@ -71,14 +71,15 @@ class StickingMemory:
 
 class StuckContact(NamedTuple):
     """The contact of a step, the memory after it, where the surfaces touch, and its numbers for columns; `pushed`
-    [J] is the work of the load along its path; `flips` is the number of points that came into contact or left it;
-    `snapped` and `detached` say that the contact did, or that nothing holds the load any more."""
+    [J] is the work of the load along its path, None if that is not through equilibria; `flips` is the number of points
+    that came into contact or left it; `snapped` and `detached` say that the contact did, or that nothing holds the load
+    any more."""
 
     contact: Contact
     memory: StickingMemory
     touching: Array
     columns: tuple[float, ...]
-    pushed: float
+    pushed: float | None
     flips: float
     snapped: bool
     detached: bool
@@ -160,7 +161,8 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     now = replace(now, snaps=memory.snaps, told=memory.told)
     (flips,) = scene.slab.sum(kernels.count_flips(memory.pasts[0].gap, gap)) if now_known else (0.0,)
     columns = _columns(scene, trial, contact.p)
-    return StuckContact(contact, now, gap == 0.0, columns, work.total * trial.alpha, flips, snapped, detached)
+    pushed = None if detached or path.together else work.total * trial.alpha
+    return StuckContact(contact, now, gap == 0.0, columns, pushed, flips, snapped, detached)
 
 
 def is_apart(stuck: StuckContact, before: Measures, now: Measures) -> bool:

@@ -3,6 +3,10 @@
 In a step in which the body gains energy, stored and dissipated, and the surfaces do, the load does its work along the
 path, by the trapezoidal rule, `F dd - F_t ds`. What is missing is lost in a snap if the load could not have done it on
 any way between its two ends; else it is what the rule makes wrong, and the work is that of the energies.
+
+Surfaces that come off under a load are in no equilibrium until they are apart, and the same holds for those that a load
+brings together again. What a load does on such a way depends on the inertia that the model leaves out. Its work then is
+the least that the change takes, and 0 if energy is set free, which is lost.
 """
 
 from dataclasses import dataclass
@@ -56,14 +60,14 @@ def after_step(
     past: StickingEnergies,
     gap: Array,
     trial: Trial,
-    pushed: float,
+    pushed: float | None,
     body: float,
     before: Measures,
     measures: Measures,
     slid: float,
 ) -> StickingEnergies:
-    """Return the energies after a step to a gap in which the load has `pushed` with a work [J] and the body has gained
-    an energy [J], while the surface has slid [m]; collective."""
+    """Return the energies after a step to a gap in which the load has `pushed` with a work [J], None on a way without
+    equilibria, and the body has gained an energy [J], while the surface has slid [m]; collective."""
     law = scene.law(trial.alpha)
     assert scene.energy is not None
     assert law is not None
@@ -72,7 +76,10 @@ def after_step(
     gained = body + surfaces - past.surfaces
     dragged, doubt = _drag(before, measures, slid)
     area, way = scene.choices.grid.lx * scene.choices.grid.ly, measures.approach - before.approach
-    doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
+    if pushed is None:
+        pushed = max(gained - dragged, 0.0)
+    else:
+        doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
     work = pushed + dragged
     lost = work - gained
     snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))

@@ -23,7 +23,7 @@ from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
 from ..storage.stopfile import StopFile
-from ..summary import slide
+from ..summary import pull_off, slide
 from .watch import Watch
 
 DONE, STOPPED_EARLY = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again
@@ -200,20 +200,22 @@ class Run:
 
     def _log_summary(self) -> int:
         """Say how the run has ended and how wrong it is, and note it in its directory; returns the exit code."""
-        row, console, errors = self.march.row, self.console, self.march.state.errors
+        row, console, errors, stuck = self.march.row, self.console, self.march.state.errors, self.march.state.sticking
         slides = any(stage.speed for stage in self.job.history)
         self._log_counts()
-        if self.slab.root and slides and not self.stop:
+        if self.slab.root and (slides or stuck is not None) and not self.stop:
+            grid = self.job.grid
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
                 rows = tables.read(self.directory.path / "measures.csv")
-                for text in slide.describe(self.job.history, self.job.initial, self.job.grid.dx, rows):
+                told = slide.describe(self.job.history, self.job.initial, grid.dx, rows)
+                for text in (*told, *pull_off.describe(rows, grid.lx * grid.ly)):
                     console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
             console.say(text)
-        if (stuck := self.march.state.sticking) is not None and stuck.snaps:
+        if stuck is not None and stuck.snaps:
             console.say(f"the contact snapped in {stuck.snaps} of the steps: no error is stated across them")
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))

@@ -22,7 +22,7 @@ from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import slide, sweep_table, theory_beside, theory_settings
+from . import pull_off, slide, sweep_table, theory_beside, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: numbers of one name at most
@@ -166,26 +166,12 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if job is not None:
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
-        yield from (f"  {text}" for text in describe_pull_off(columns, job.grid.lx * job.grid.ly))
+        yield from (f"  {text}" for text in pull_off.describe(columns, job.grid.lx * job.grid.ly))
 
 
 def _slides(job: Job | None) -> bool:
     """Return whether something slides in a job: else friction is noise. Of a job that is not there it may."""
     return job is None or bool(job.directions)
-
-
-def describe_pull_off(columns: Mapping[str, list[Any]], area: float) -> Iterator[str]:
-    """The lowest load after the deepest approach, if it pulls, and where: columns of measures.csv, area of box [m^2].
-
-    On the way there surfaces that stick may pull each other harder, which is no pull-off.
-    """
-    pressures, approaches = columns["pressure"], columns["approach"]
-    deepest = approaches.index(max(approaches))
-    row = min(range(deepest, len(pressures)), key=pressures.__getitem__)
-    if pressures[row] < 0.0:
-        where = f"t = {quantity(columns['time'][row], 's', 4)}, approach {quantity(columns['approach'][row], 'm', 4)}"
-        load = f"{quantity(pressures[row] * area, 'N', 4)}, {quantity(pressures[row], 'Pa', 4)}"
-        yield f"lowest load: {load}, at {where}"
 
 
 def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:

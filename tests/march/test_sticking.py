@@ -8,7 +8,7 @@ import pytest
 from marching import column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
-from restarting import ELASTIC, ROUGH, SPHERE, ZENER, Bench, cut, rows, same
+from restarting import ELASTIC, ROUGH, ZENER, Bench, cut, rows, same
 
 from parcontact import Simulation
 from parcontact.leakage.flow import leak
@@ -124,26 +124,6 @@ def test_detached_state_from_python(bench: Bench) -> None:
     held = {**OFF, "force": {"from": 0.0, "to": -5.0 * back.row.time}, "duration": back.row.time}
     other = Simulation.restore(last, {"history": [held, {"name": "rest", "approach": 0.0}]}, bench.comm)
     assert (other.detached, other.finished, other.run().step) == ("", False, rows[0].step + 1)
-
-
-@pytest.mark.parametrize("material", [ELASTIC, ZENER], ids=["elastic", "rubber"])
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-@pytest.mark.parametrize("control", ["approach", "force"])
-def test_open_after_detachment(control: str, boundary: str, material: dict[str, Any]) -> None:
-    """If the job says so, the run goes on with open surfaces. Approached or pressed, they touch again as surfaces that
-    never did before, to the solver's tolerance; rubber relaxes in 4e-3 of a step."""
-    job = {"grid": {"points": 20, "size": 1e-3, "boundary": boundary}, "surface": SPHERE, "material": material}
-    job["adhesion"] = {**STICK, "detached": "open"}
-    start, from_rest, end = {"approach": (-3e-6, -3e-6, 2e-6), "force": (-5e-3, 0.0, 1e-2)}[control]
-    again = {control: {"from": start, "to": end}, "duration": 1.0, "time_step": 0.25}
-    _, found = marched({**job, "history": [OFF, again]})
-    _, fresh = marched({**job, "history": [{**again, control: {"from": from_rest, "to": end}}]})
-    apart, now, never_apart = (row.measures for row in (found[10], found[-1], fresh[-1]))
-    assert apart.pressure == apart.contact_area == 0.0
-    assert now.contact_area == never_apart.contact_area > 0.0
-    assert_allclose([now.pressure, now.approach], [never_apart.pressure, never_apart.approach], rtol=5e-3)
-    assert sum(row.operator_calls for row in found[-4:]) < 200
-    assert ["any more" in row.remark for row in found].count(True) == 1  # when they come off, not while they are apart
 
 
 def test_a_wave_that_fills_its_free_box_comes_off() -> None:

@@ -1,0 +1,63 @@
+"""Pull-offs: the loads at which surfaces that stick came off, from the rows of a run."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..printed import quantity
+
+LEAST_PULL = 1e-9  # accuracy: of the highest pressure, below which a mean pressure is what rounding leaves of 0
+
+Columns = Mapping[str, Sequence[float]]
+
+
+class PullOff(NamedTuple):
+    """The row of the lowest load of a pull, by how much the loads of the rows beside it differ from that [Pa], and the
+    first row without contact; None where contact has held so far."""
+
+    row: int
+    beside: float
+    lost: int | None
+
+
+def find(columns: Columns) -> list[PullOff]:
+    """Return the pull-offs of a run in their order, from its columns `pressure`, `max_pressure`, `approach` and
+    `contact_area`.
+
+    A pull begins with the highest load of a contact, and ends where the surfaces part no more: those that have come off
+    may pull each other harder than before, and what they do when they come near again is not of the pull.
+    """
+    pressure, approach, area = (np.asarray(columns[name], float) for name in ("pressure", "approach", "contact_area"))
+    touching = np.concatenate([[False], area > 0.0, [False]])
+    changes = np.flatnonzero(touching[1:] != touching[:-1]).tolist()
+    pulls = (_find(pressure, approach, *ends) for ends in zip(changes[::2], changes[1::2], strict=True))
+    least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
+    return [pull for pull in pulls if pressure[pull.row] < least[pull.row]]
+
+
+def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], start: int, end: int) -> PullOff:
+    """Return the lowest load of a contact from the row `start` to before the row `end`."""
+    highest, stop = start + int(np.argmax(pressure[start:end])), end
+    while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 where nothing held
+        stop += 1
+    row = highest + int(np.argmin(pressure[highest:stop]))
+    near = pressure[max(row - 1, start) : min(row + 2, stop)]
+    return PullOff(row, float(np.abs(near - pressure[row]).max()), end if end < len(approach) else None)
+
+
+def describe(columns: Columns, area: float) -> Iterator[str]:
+    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is the box [m^2]."""
+    pulls = find(columns)
+    many = sum(pull.lost is not None for pull in pulls) > 1
+    for number, (row, beside, lost) in enumerate(pulls, 1):
+        pressure, time, approach = (columns[name][row] for name in ("pressure", "time", "approach"))
+        load = f"{quantity(-pressure * area, 'N', 4)} ({quantity(-pressure, 'Pa', 4)})"
+        where = f"at t = {quantity(time, 's', 4)}, approach {quantity(approach, 'm', 4)}"
+        within = f"the steps beside it differ by {quantity(beside * area, 'N', 2)}"
+        if lost is None:
+            yield f"largest pull so far: {load}, {where}; contact holds"
+            continue
+        name, end = f"pull-off {number}" if many else "pull-off", quantity(columns["time"][lost], "s", 4)
+        yield f"{name}: {load}, {where}; {within}, and contact was lost by t = {end}"

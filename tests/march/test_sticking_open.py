@@ -1,0 +1,54 @@
+"""Surfaces that come off under a load, and stay apart until they are brought together again (`detached: open`)."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from marching import column, marched
+from numpy.testing import assert_allclose
+from restarting import ELASTIC, SPHERE, ZENER
+
+STICK = {"work": 0.05, "range": 1e-6, "detached": "open"}
+OFF = {"name": "off", "force": {"from": 0.0, "to": -5e-3}, "duration": 1e-3, "time_step": 1e-4}
+
+
+@pytest.mark.parametrize("material", [ELASTIC, ZENER], ids=["elastic", "rubber"])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("control", ["approach", "force"])
+def test_open_after_detachment(control: str, boundary: str, material: dict[str, Any]) -> None:
+    """If the job says so, the run goes on with open surfaces. Approached or pressed, they touch again as surfaces that
+    never did before, to the solver's tolerance; rubber relaxes in 4e-3 of a step."""
+    job = {"grid": {"points": 20, "size": 1e-3, "boundary": boundary}, "surface": SPHERE, "material": material}
+    job["adhesion"] = STICK
+    start, from_rest, end = {"approach": (-3e-6, -3e-6, 2e-6), "force": (-5e-3, 0.0, 1e-2)}[control]
+    again = {control: {"from": start, "to": end}, "duration": 1.0, "time_step": 0.25}
+    _, found = marched({**job, "history": [OFF, again]})
+    _, fresh = marched({**job, "history": [{**again, control: {"from": from_rest, "to": end}}]})
+    apart, now, never_apart = (row.measures for row in (found[10], found[-1], fresh[-1]))
+    assert apart.pressure == apart.contact_area == 0.0
+    assert now.contact_area == never_apart.contact_area > 0.0
+    assert_allclose([now.pressure, now.approach], [never_apart.pressure, never_apart.approach], rtol=5e-3)
+    assert sum(row.operator_calls for row in found[-4:]) < 200
+    assert ["any more" in row.remark for row in found].count(True) == 1  # when they come off, not while they are apart
+
+
+@pytest.mark.parametrize("count", [4, 16])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_cycle_under_a_load_loses_what_the_touch_sets_free(boundary: str, count: int) -> None:
+    """An elastic body in a cycle of loads loses in all what it does in the snap into contact under no load, as the work
+    of coming off is the least that this takes. So it does in steps of any length, and again in the next cycle; open
+    surfaces add nothing, and are no snaps. The trapezoidal rule leaves some 1e-3."""
+    job = {"grid": {"points": 20, "size": 1e-3, "boundary": boundary}, "surface": SPHERE, "material": ELASTIC}
+    pull = {"force": {"from": 0.0, "to": -5e-3}, "duration": 1.0, "time_step": 1.0 / count}
+    wait = {"force": {"from": -5e-3, "to": -9e-3}, "duration": 1.0, "time_step": 0.5}
+    cycle = [{"force": 0.0, "duration": 1.0}, pull, wait]
+    march, found = marched({**job, "adhesion": STICK, "history": [*cycle, *cycle], "output": {"energy": True}})
+    touching, lost = column(found, "contact_area") > 0.0, np.array([row.added[3] for row in found])
+    ends = np.flatnonzero(touching[:-1] & ~touching[1:]) + 1
+    assert len(ends) == 2
+    assert_allclose(lost[ends], lost[ends[0]] * np.array([1.0, 2.0]), rtol=1e-3)
+    assert_allclose(lost[ends[0]], lost[1], rtol=1e-3)
+    assert_allclose([found[end].work for end in ends], lost[ends], rtol=1e-4)
+    assert len(set(lost[ends[0] : ends[0] + 3])) == len(set(lost[ends[1] :])) == 1
+    assert march.state.sticking is not None
+    assert march.state.sticking.snaps == 4
