@@ -15,7 +15,7 @@ from .. import progress
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
 from ..plotting.run import Run, find_free_area, label_frames, to_load
-from ..storage import hdf5, tables
+from ..storage import hdf5, marker, tables
 from ..storage.row import UNITS
 from ..summary import pull_off, slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, Section, Table, draw_chart, to_uri
@@ -48,7 +48,7 @@ def describe_run(directory: Path) -> Section:
     numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
     told = [
         *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
-        *pull_off.describe(columns, run.job.grid.lx * run.job.grid.ly),
+        *pull_off.describe(columns, run.job.grid.lx * run.job.grid.ly, bool(marker.detached(directory))),
         theory_settings.describe(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)

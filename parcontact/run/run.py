@@ -208,7 +208,7 @@ class Run:
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
                 rows = tables.read(self.directory.path / "measures.csv")
                 told = slide.describe(self.job.history, self.job.initial, grid.dx, rows)
-                for text in (*told, *pull_off.describe(rows, grid.lx * grid.ly)):
+                for text in (*told, *pull_off.describe(rows, grid.lx * grid.ly, bool(self.march.detached))):
                     console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
 from . import files
 
 MARKER = ".parcontact"
@@ -54,6 +55,16 @@ def read(directory: Path) -> dict[str, Claim]:
     except (ValueError, TypeError, KeyError, AttributeError):
         raise ValueError(f"{path} is damaged") from None
     raise ValueError(f"{path} was written by a newer parcontact")
+
+
+def detached(directory: Path) -> str:
+    """Return how the surfaces of the run in a directory came off for good, empty where they did not; raises InputError
+    for a marker that cannot be read."""
+    try:
+        claim = read(directory).get("run")
+    except (OSError, ValueError) as error:
+        raise InputError(str(error)) from error
+    return "" if claim is None else claim.detached
 
 
 def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:

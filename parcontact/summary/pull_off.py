@@ -15,16 +15,16 @@ Columns = Mapping[str, Sequence[float]]
 
 class PullOff(NamedTuple):
     """The row of the lowest load of a pull, by how much the loads of the rows beside it differ from that [Pa], and the
-    first row without contact; None where contact has held so far."""
+    first row without contact: the one after the last where the run ended with it, None where contact holds."""
 
     row: int
     beside: float
     lost: int | None
 
 
-def find(columns: Columns) -> list[PullOff]:
+def find(columns: Columns, detached: bool = False) -> list[PullOff]:
     """Return the pull-offs of a run in their order, from its columns `pressure`, `max_pressure`, `approach` and
-    `contact_area`.
+    `contact_area`; it may have ended as its surfaces `detached`.
 
     A pull begins with the highest load of a contact, and ends where the surfaces part no more: those that have come off
     may pull each other harder than before, and what they do when they come near again is not of the pull.
@@ -32,7 +32,9 @@ def find(columns: Columns) -> list[PullOff]:
     pressure, approach, area = (np.asarray(columns[name], float) for name in ("pressure", "approach", "contact_area"))
     touching = np.concatenate([[False], area > 0.0, [False]])
     changes = np.flatnonzero(touching[1:] != touching[:-1]).tolist()
-    pulls = (_find(pressure, approach, *ends) for ends in zip(changes[::2], changes[1::2], strict=True))
+    pulls = [_find(pressure, approach, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
+    if detached and pulls:
+        pulls[-1] = pulls[-1]._replace(lost=pulls[-1].lost or len(area))
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
     return [pull for pull in pulls if pressure[pull.row] < least[pull.row]]
 
@@ -47,9 +49,9 @@ def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], start: i
     return PullOff(row, float(np.abs(near - pressure[row]).max()), end if end < len(approach) else None)
 
 
-def describe(columns: Columns, area: float) -> Iterator[str]:
+def describe(columns: Columns, area: float, detached: bool = False) -> Iterator[str]:
     """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is the box [m^2]."""
-    pulls = find(columns)
+    pulls = find(columns, detached)
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, (row, beside, lost) in enumerate(pulls, 1):
         pressure, time, approach = (columns[name][row] for name in ("pressure", "time", "approach"))
@@ -59,5 +61,7 @@ def describe(columns: Columns, area: float) -> Iterator[str]:
         if lost is None:
             yield f"largest pull so far: {load}, {where}; contact holds"
             continue
-        name, end = f"pull-off {number}" if many else "pull-off", quantity(columns["time"][lost], "s", 4)
-        yield f"{name}: {load}, {where}; {within}, and contact was lost by t = {end}"
+        after = "nothing held the next load"
+        if lost < len(columns["time"]):
+            after = f"contact was lost by t = {quantity(columns['time'][lost], 's', 4)}"
+        yield f"{f'pull-off {number}' if many else 'pull-off'}: {load}, {where}; {within}, and {after}"

@@ -16,8 +16,8 @@ from typing import Any
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
-from ..storage import curve_points, files, tables
-from . import slide
+from ..storage import curve_points, files, marker, tables
+from . import pull_off, slide
 
 TABLE = "sweep.csv"
 CURVES = "sweep_curves.csv"
@@ -25,10 +25,11 @@ PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
+PULL_OFFS = ("pull_off", "pull_off_approach")
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(f"theory_{name}" for name in RESULTS)
 COLUMNS = ("state", *RESULTS, *FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
-NUMBERS = {"case", *COLUMNS, *CURVE_COLUMNS} - {"state"}
+NUMBERS = {"case", *COLUMNS, *PULL_OFFS, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
@@ -43,11 +44,12 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
     with _alone(directory):
         keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
         rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
-        save(directory / TABLE, ["case", *keys, *COLUMNS], rows)
+        pulls = PULL_OFFS if any(case.job.section("adhesion") for case in cases) else ()
+        save(directory / TABLE, ["case", *keys, *COLUMNS, *pulls], rows)
         if points:
             save(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
-            save(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *THEORY]))
+            save(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *pulls, *THEORY]))
         if seeded and points:
             save(directory / "sweep_curves_mean.csv", *_means(points, [*keys, *PLACES], CURVE_RESULTS))
 
@@ -99,12 +101,22 @@ def _row(case: Case) -> dict[str, Any]:
             row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
             row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
         if columns["time"] and not prefix:
+            row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
             row |= slide.errors(case.job.history, columns)
             within = slide.absolute_errors(case.job.history, columns, case.job.grid.dx)
             row |= {name: within.get(name.removesuffix("_error"), math.nan) for name in FRICTION_ERRORS}
     return row
+
+
+def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Return the last pull-off of a case [N], and its approach [m]; nothing where contact holds."""
+    lost = [each for each in pull_off.find(columns, bool(marker.detached(case.job.output.directory))) if each.lost]
+    if not lost:
+        return {}
+    force, approach = (columns[name][lost[-1].row] for name in ("pressure", "approach"))
+    return dict(zip(PULL_OFFS, (-force * case.job.grid.lx * case.job.grid.ly, approach), strict=True))
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:
@@ -132,7 +144,7 @@ def state(case: Case) -> str:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]
     timeline = Timeline.of(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
-    return "done" if steps and steps[-1] >= len(timeline) else "begun"
+    return "done" if steps and (steps[-1] >= len(timeline) or marker.detached(directory)) else "begun"
 
 
 def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:

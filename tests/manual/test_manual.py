@@ -154,7 +154,7 @@ COLUMNS = {
     "steady_waves.csv": steady_table.WAVES,
     "theory.csv": prediction.Instant._fields,
     "steady_theory.csv": prediction.SteadyInstant._fields,
-    "sweep.csv": ["case", *sweep_table.COLUMNS],
+    "sweep.csv": ["case", *sweep_table.COLUMNS, *sweep_table.PULL_OFFS],
     "study.csv": outcome.COLUMNS,
     "fields.h5": [*fields.UNITS, "t", "y", "x", "step"],
 }

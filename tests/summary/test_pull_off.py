@@ -53,6 +53,13 @@ def test_a_contact_that_holds_has_none() -> None:
     assert held == "largest pull so far: 1.5 N (3 Pa), at t = 4 s, approach -1 um; contact holds"
 
 
+def test_a_run_that_ended_with_its_contact_has_one() -> None:
+    """Nothing held the load after the last row."""
+    assert find(table(*NEAR, *PULL), detached=True) == [PullOff(4, 5.0, 6)]
+    (told,) = describe(table(*NEAR, *PULL), 1.0, detached=True)
+    assert told.endswith("the steps beside it differ by 5 N, and nothing held the next load")
+
+
 def test_nothing_is_said_without_a_pull() -> None:
     assert find(table((0.0, 0.0, 0.0), (2.0, 1e-6, 0.1), (0.0, 0.0, 0.0))) == []
     assert find(table(*NEAR[:2])) == []

@@ -1,12 +1,15 @@
 """Tables of a sweep, from what its cases have left in their directories."""
 
+import math
 from pathlib import Path
 
 import pytest
 from sweeping import JOB, table
 
+from parcontact.__main__ import main
 from parcontact.job import Case, load_cases
 from parcontact.plotting import sweep as pictures
+from parcontact.storage import tables
 from parcontact.summary import sweep_table
 
 
@@ -126,3 +129,24 @@ def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None
     sweep_table.write(Path("out/job"), cases)
     assert [row["theory_mu_max"] for row in table()] == ["0.02", "0.02", "", "", "", ""]
     assert [row["mu_max"] for row in table()] == [""] * 6
+
+
+def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A case that ends as its surfaces come off is done, and has its pull-off; one that holds is done without."""
+    monkeypatch.chdir(tmp_path)
+    pull = "{force: {from: 0.0, to: -6.0e-4}, duration: 1.0, time_step: 0.1}"
+    lines = (
+        "grid: {points: 24, size: 4.0e-4, boundary: free}",
+        "surface: {shape: sphere, radius: 2.0e-3}",
+        "material: {model: elastic, shear_modulus: 0.3e6}",
+        f"adhesion: {{work: 0.05, range: 2.0e-6}}\nhistory: [{{force: 0.0, duration: 1.0}}, {pull}]",
+        "sweep: {adhesion.work: [0.05, 0.1]}\nnumerics: {accuracy: 0.1}\n",
+    )
+    Path("pulls.yaml").write_text("\n".join(lines))
+    assert main(["pulls.yaml", "--quiet"]) == 0
+    came_off, holds = sweep_table.read(Path("out/pulls/sweep.csv"))
+    rows = tables.read(Path("out/pulls/cases/000/measures.csv"))
+    assert came_off["state"] == holds["state"] == "done"
+    assert came_off["pull_off"] == pytest.approx(-min(rows["pressure"]) * 4e-4**2, rel=1e-15)
+    assert came_off["pull_off_approach"] == rows["approach"][-1]
+    assert math.isnan(holds["pull_off"])
