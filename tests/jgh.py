@@ -1,11 +1,10 @@
 """A rigid surface wavy in two directions on an elastic half-space (Johnson, Greenwood and Higginson).
 
 The surface is h(x, y) = Delta cos(2 pi x/lambda) cos(2 pi y/lambda), two crests per square lambda x lambda; p is the
-mean pressure. Contact is complete at p* = sqrt(2) pi E* Delta/lambda, E* = 2 G/(1 - nu). In between there is no closed
-form, but for its ends:
+mean pressure. Contact is complete at p* = sqrt(2) pi E* Delta/lambda, E* = 4 G. Below there is no closed form,
+but for high loads:
 
-    low loads   f -> pi (3 p/(8 pi p*))^(2/3)        independent Hertzian contacts
-    high loads  f -> 1 - 3/(2 pi) (1 - p/p*)         pressurised penny-shaped cracks at the lowest points
+    f -> 1 - 3/(2 pi) (1 - p/p*)         pressurised penny-shaped cracks at the lowest points
 
 Source: K. L. Johnson, J. A. Greenwood, J. G. Higginson, Int. J. Mech. Sci. 27 (1985) 383. Arguments are in SI units
 and broadcast.
@@ -45,33 +44,16 @@ REFERENCE = (
 )
 
 
-def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
+def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values) -> Array:
     """p* = sqrt(2) pi E* Delta/lambda in Pa, the mean pressure at which contact becomes complete."""
-    modulus = 2 * shear_modulus / (1 - poisson)
-    return np.asarray(np.sqrt(2) * np.pi * modulus * amplitude / wavelength)
-
-
-def low_load_contact_fraction(
-    mean_pressure: Values,
-    amplitude: Values,
-    wavelength: Values,
-    shear_modulus: Values,
-    poisson: Values = 0.5,
-) -> Array:
-    """The asymptote pi (3 p/(8 pi p*))^(2/3) of the contact fraction for p << p*."""
-    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
-    return np.asarray(np.pi * np.cbrt(3 * load / (8 * np.pi)) ** 2)
+    return np.asarray(np.sqrt(2) * np.pi * 4 * shear_modulus * amplitude / wavelength)
 
 
 def high_load_contact_fraction(
-    mean_pressure: Values,
-    amplitude: Values,
-    wavelength: Values,
-    shear_modulus: Values,
-    poisson: Values = 0.5,
+    mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values
 ) -> Array:
     """The asymptote 1 - 3/(2 pi) (1 - p/p*) of the contact fraction for p -> p* from below; 1 above."""
-    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus)
     return 1 - 3 / (2 * np.pi) * np.maximum(1 - load, 0)
 
 
@@ -82,9 +64,8 @@ def full_contact_pressure_field(
     amplitude: Values,
     wavelength: Values,
     shear_modulus: Values,
-    poisson: Values = 0.5,
 ) -> Array:
     """p + p* cos(2 pi x/lambda) cos(2 pi y/lambda) in Pa, the exact pressure wherever the mean pressure p >= p*."""
     k = 2 * np.pi / wavelength
-    full = full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
+    full = full_contact_pressure(amplitude, wavelength, shear_modulus)
     return mean_pressure + full * np.cos(k * x) * np.cos(k * y)

@@ -10,8 +10,9 @@ as it is without. In between is Maugis' sphere, whose attraction is constant up 
     wave       p/(pi E* h/lambda) = sin^2 psi - alpha sqrt(tan psi),   alpha^2 = 2 w lambda/(pi^2 E* h^2)
 
 with contact radius or half width a, force P, approach d, radius R, contact modulus E* (`hertz.contact_modulus`), height
-h cos(2 pi x/lambda) of the wave, psi = pi a/lambda. The law of the program is sigma(g) = (w/rho) exp(-g/rho) with the
-range rho; Tabor's parameter says how near to JKR (large) or DMT (small) it is.
+h cos(2 pi x/lambda) of the wave, psi = pi a/lambda. Tabor's parameter (`physics.adhesion`) says how near to JKR (large)
+or DMT (small) a law of attraction is. Maugis' parameter is lambda = 2 sigma0 (R/(pi w K^2))^(1/3) for an attraction
+sigma0 that reaches as far as w/sigma0, K = 4 E*/3.
 
 Sources: K. L. Johnson, K. Kendall, A. D. Roberts, Proc. R. Soc. A 324 (1971) 301; B. V. Derjaguin, V. M. Muller,
 Yu. P. Toporov, J. Colloid Interface Sci. 53 (1975) 314; M. Barquins, J. Adhesion 26 (1988) 1 (cylinder); K. Kendall,
@@ -25,19 +26,6 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from .arrays import Array, Values
-
-# laws of attraction
-
-
-def tabor(radius: Values, work: Values, attraction_range: Values, contact_modulus: Values) -> Array:
-    """mu = (R w^2/(E*^2 rho^3))^(1/3) of the exponential law; above 3 like JKR, below 0.1 like DMT."""
-    return np.asarray(np.cbrt(radius * (work / contact_modulus) ** 2) / attraction_range)
-
-
-def process_zone(work: Values, attraction_range: Values, contact_modulus: Values) -> Array:
-    """l = E* rho^2/w in m: the length at the edge of the contact over which the attraction acts."""
-    return np.asarray(contact_modulus * np.square(attraction_range) / work)
-
 
 # JKR: sphere
 
@@ -63,16 +51,6 @@ def sphere_contact_radius(force: Values, radius: Values, work: Values, contact_m
 def sphere_pull_off(radius: Values, work: Values) -> Array:
     """-3/2 pi w R in N: the lowest force, reached under load and under approach control alike."""
     return np.asarray(-1.5 * np.pi * work * radius)
-
-
-def sphere_last_force(radius: Values, work: Values) -> Array:
-    """-5/6 pi w R in N: the force at which contact ends under approach control, at the lowest approach."""
-    return np.asarray(-5 / 6 * np.pi * work * radius)
-
-
-def dmt_pull_off(radius: Values, work: Values) -> Array:
-    """-2 pi w R in N: the pull-off of a sphere if the attraction reaches far (Derjaguin, Muller, Toporov)."""
-    return np.asarray(-2 * np.pi * work * radius)
 
 
 # JKR: cylinder and flat punch
@@ -106,12 +84,6 @@ class MaugisSphere(NamedTuple):
     approach: Array
 
 
-def maugis_parameter(radius: Values, work: Values, stress: Values, contact_modulus: Values) -> Array:
-    """lambda = 2 sigma0 (R/(pi w K^2))^(1/3) for the attraction sigma0 (Pa), which reaches as far as w/sigma0."""
-    stiffness = 4 / 3 * contact_modulus
-    return np.asarray(2 * stress * np.cbrt(radius / (np.pi * work * np.square(stiffness))))
-
-
 def maugis_sphere(parameter: Values, outer_radius: Values) -> MaugisSphere:
     """The equilibrium with `outer_radius` m = c/a > 1, c the radius up to which the attraction acts (Maugis, Eqs. 6.17,
     6.20 and 6.21), for the `parameter` lambda > 0.
@@ -141,11 +113,6 @@ def maugis_pull_off(parameter: float) -> float:
 
 
 # Johnson: a wave
-
-
-def wave_adhesion(amplitude: Values, wavelength: Values, work: Values, contact_modulus: Values) -> Array:
-    """alpha = sqrt(2 w lambda/(pi^2 E* h^2)) of a wave h cos(2 pi x/lambda) with the amplitude h (m)."""
-    return np.asarray(np.sqrt(2 * work * wavelength / (contact_modulus * np.square(np.pi * amplitude))))
 
 
 def wave_pressure(contact_fraction: Values, adhesion: Values) -> Array:

@@ -23,11 +23,6 @@ from .arrays import Array, Values
 NEAR = 1e-3  # accuracy: relative difference of a and b below which the limit is taken, to its square
 
 
-def mean_rise(heat: Values, time: Values, conductivity: float, diffusivity: float) -> Array:
-    """2 Q sqrt(D t/pi)/kappa in K: of the surface of a half space under the uniform heat Q [W/m^2] for a time t [s]."""
-    return np.asarray(2.0 * heat * np.sqrt(diffusivity * np.asarray(time) / np.pi) / conductivity)
-
-
 def kernel(q: Values, other: Values, reach: Values) -> Array:
     """G in m for waves q and q' [1/m] after diffusion over D t [m^2]."""
     root = np.sqrt(reach)

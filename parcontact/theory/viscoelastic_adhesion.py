@@ -1,4 +1,4 @@
-"""Adhesion of viscoelastic bodies: the steady crack, and a sphere that is pulled off at once.
+"""Adhesion of viscoelastic bodies: the steady crack.
 
 The edge of a contact that opens or closes with the velocity V is a crack with a cohesive zone in which the attraction
 sigma0 is constant (Dugdale). Its length is c0 = pi E0 w/(4 sigma0^2) at rest. With the creep compliance C(t) for a unit
@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from ..physics.prony import creep_spectrum, normal_form
-from . import adhesion
 from .arrays import Array
 from .quadrature import graded_rule
 
@@ -47,20 +46,6 @@ def closing_crack(velocity: float, modulus_inf: float, moduli: ArrayLike, relaxa
     length = _solve(lambda length: 1 - relative_work(length), creep)
     intensity = weights @ (creep(rest * length / velocity) / (2 * np.sqrt(x)))
     return float(length * intensity**2)
-
-
-def instant_pull_off(contact_radius: float, radius: float, work: float, contact_modulus: float, ratio: float) -> float:
-    """Pull-off in N, negative, of a sphere that was relaxed with a contact of `contact_radius` (m) and is pulled at
-    once; short-ranged adhesion (JKR), `contact_modulus` E0 (Pa) relaxed, `ratio` k = E_inf/E0.
-
-    Where the body has touched, it comes off like an elastic body of modulus E0 and work of adhesion k w: the contact
-    keeps its radius until that equilibrium is reached. The limit of large contacts is -3/2 pi k w R.
-    """
-    tough = ratio * work
-    weakest = float(
-        adhesion.sphere_contact_radius(adhesion.sphere_pull_off(radius, tough), radius, tough, contact_modulus)
-    )
-    return float(adhesion.sphere_force(min(contact_radius, weakest), radius, tough, contact_modulus))
 
 
 def _relative_creep(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Callable[[ArrayLike], Array]:
