@@ -140,28 +140,6 @@ def test_direct_sum(communicators: list[MPI.Intracomm], nx: int, ny: int, poisso
         assert_allclose(u, expected, atol=1e-13 * np.abs(expected).max())
 
 
-def test_one_loaded_cell(comm: MPI.Intracomm) -> None:
-    """p h asinh(1)/(pi G) under its centre, for nu = 1/2."""
-    slab = Slab(comm, 9, 9)
-    whole = np.zeros((9, 9))
-    whole[4, 4] = 3.0
-    u = applied(free(slab, (0.9, 0.9)), whole)
-    assert_allclose(u[4, 4], 3.0 * 0.1 * np.arcsinh(1.0) / np.pi, rtol=1e-13)
-    assert_allclose(u[4, 4], 0.2805499 * 3.0 * 0.1, rtol=1e-7)
-    assert u.max() == u[4, 4]
-
-
-def test_far_field(comm: MPI.Intracomm) -> None:
-    """A point force's (1 - nu)/(2 pi) W/r, outside the box's middle to second order in the size of the cell."""
-    slab = Slab(comm, 65, 33)
-    whole = np.zeros((33, 65))
-    whole[0, 0] = 1.0
-    u = applied(free(slab, (6.5, 3.3), 0.25), whole)
-    assert_allclose(u[32, 64], 0.75 / (2 * np.pi) * 0.01 / np.hypot(6.4, 3.2), rtol=1e-4)
-    y, x = 0.1 * np.indices(u.shape)
-    assert_allclose(u, love(x, y, 0.1, 0.1, 0.25), rtol=1e-11)
-
-
 @pytest.mark.parametrize(("wx", "wy"), [(0, 0), (1, 0), (0, 5), (3, 2), (17, 13)])
 def test_inverse_of_half_waves(communicators: list[MPI.Intracomm], wx: int, wy: int) -> None:
     """The preconditioner takes displacements to go on mirrored at the edges."""
@@ -231,16 +209,6 @@ def test_single_precision(comm: MPI.Intracomm) -> None:
     assert_allclose(single.apply(mine, slab.empty()), reference[slab.rows], atol=tolerance)
     reference = applied(free(slab, size), whole)
     assert_allclose(applied(free(slab, size, dtype=np.float32), whole), reference, atol=1e-6 * np.abs(reference).max())
-
-
-def test_wave_on_a_free_half_space_looks_periodic(comm: MPI.Intracomm) -> None:
-    """In the middle of many short waves the free and the periodic Love operator agree but for the ends: to 1e-3."""
-    slab, size = Slab(comm, 256, 256), (1.0, 1.0)
-    x, y = coordinates(slab, size)
-    pressure = np.cos(2 * np.pi * 32 * x) * np.cos(2 * np.pi * 32 * y)
-    unbounded = gathered(free(slab, size).apply(pressure, slab.empty()), slab)[112:144, 112:144]
-    wrapped = gathered(OPERATORS["love"](slab, size, 0.5).apply(pressure, slab.empty()), slab)[112:144, 112:144]
-    assert_allclose(unbounded - unbounded.mean(), wrapped, atol=1e-3 * wrapped.max())
 
 
 @pytest.mark.parametrize("kernel", ["spectral", "love"])
