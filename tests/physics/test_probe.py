@@ -58,17 +58,6 @@ def test_pressure_ahead_of_a_wave(comm: MPI.Intracomm, waves: tuple[int, int], c
     assert_allclose(found.mean_gap, 0.0, atol=1e-14 * UNITS.height)
 
 
-def test_central_differences(comm: MPI.Intracomm) -> None:
-    """They make a slope, and so the force, sin(q dx)/(q dx) of what it is; rounding."""
-    surface, exact = wave(comm, (3, 0), differences=True), wave(comm, (3, 0))
-    slab = surface.slab
-    p, u = slab.empty(), slab.zeros()
-    p[...] = 2.0 + np.sin(angle(slab, (3, 0)))
-    forces = [Probe(slab, kind, UNITS).measure(p, ALPHA, u, u, 0.0, (0.0, 0.0)).force_x for kind in (surface, exact)]
-    step = 2 * np.pi * 3 / NX
-    assert_allclose(forces[0] / forces[1], math.sin(step) / step, rtol=1e-12)
-
-
 def test_partial_contact(comm: MPI.Intracomm) -> None:
     """Some points carry load; the gap counts everywhere."""
     surface = wave(comm, (1, 0))

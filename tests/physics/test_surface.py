@@ -39,13 +39,6 @@ def test_shortest_waves(comm: MPI.Intracomm, waves: tuple[int, int], phase: floa
     assert_allclose(heights, heights_of(slab, [(A, waves, phase)]), rtol=0, atol=1e-13 * A)
 
 
-def test_sum_of_waves(communicators: list[MPI.Intracomm]) -> None:
-    for comm in communicators:
-        slab = Slab(comm, 20, 13)
-        heights = surface_of(slab, WAVES).heights((0.0, 0.0), slab.empty())
-        assert_allclose(heights, heights_of(slab, WAVES), rtol=0, atol=1e-13 * A)
-
-
 @pytest.mark.parametrize("shift", [(0.3, 0.0), (0.0, 0.25), (-0.7, 2.4), (1e3 + 0.5, -1e3 - 1 / 3)])
 def test_shift_by_a_fraction(communicators: list[MPI.Intracomm], shift: tuple[float, float]) -> None:
     """Exact for waves longer than two cells; here to the rounding of a distance of a thousand cells."""

@@ -42,17 +42,6 @@ def test_force_is_the_sum_over_points(communicators: list[MPI.Intracomm], shift:
         assert_allclose(surface_of(slab, WAVES).forces(pressure, shift), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("waves", [(4, 0), (0, 3), (3, 2), (2, -5)])
-def test_finite_differences(comm: MPI.Intracomm, waves: tuple[int, int]) -> None:
-    """They shrink the slope of a wave by sin(q dx)/(q dx)."""
-    slab = Slab(comm, 18, 14)
-    pressure = heights_of(slab, [(1.0, waves, 0.4)])
-    exact = surface_of(slab, [(A, waves, 0.0)]).forces(pressure, (0.0, 0.0))
-    rough = surface_of(slab, [(A, waves, 0.0)], differences=True).forces(pressure, (0.0, 0.0))
-    steps = [2 * np.pi * n / count for n, count in zip(waves, (18, 14), strict=True)]
-    assert_allclose(rough, np.array(exact) * np.sinc(np.array(steps) / np.pi), rtol=1e-11, atol=1e-9 * A)
-
-
 @pytest.mark.parametrize("shapes", [False, True])
 def test_finite_differences_are_those_of_the_map(comm: MPI.Intracomm, shapes: bool) -> None:
     """Across the edge of a periodic box too."""

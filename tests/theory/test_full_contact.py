@@ -99,29 +99,6 @@ def test_velocity_step_table(before: float, after: float, table: list[float], pe
     assert_allclose(best.x, 1e-3 * peak_time, rtol=0, atol=6e-7)
 
 
-def test_full_contact_lasts_in_the_tables() -> None:
-    """The fluctuation of the pressure stays below the mean pressure."""
-    t = np.linspace(0, 10e-3, 2001)
-    for before, after, *_ in VELOCITY_STEPS:
-        modulus = full_contact.velocity_step_modulus(t, before * K, after * K, *ZENER)
-        assert np.max(np.abs(full_contact.pressure_amplitude(HEIGHT, K, 0.0, modulus))) < MEAN
-
-
-def test_load_rest_slide_table() -> None:
-    """1 ms of rest on a virgin body; by a march in time with an error of 4e-5."""
-    t = 1e-3 * np.array([0, 0.1, 0.2, 0.5, 1, 2, 5, 10])
-    table = [0, -1.20719, -2.35062, -5.32082, -8.62804, -10.6389, -9.73556, -9.77119]
-    modulus = full_contact.load_rest_slide_modulus(t, 1e-3, np.array([1e3]), *ZENER)
-    assert_allclose(signed_friction(modulus), table, rtol=0, atol=4e-5)
-    assert_allclose(np.abs(full_contact.pressure_amplitude(HEIGHT, K, 0.0, modulus[0])), 29794.905, rtol=3e-8)
-
-
-def test_standing_load_relaxes() -> None:
-    t = np.geomspace(1e-6, 1, 13)
-    modulus = full_contact.load_rest_slide_modulus(t, 0.0, 0.0, *TWELVE_DECADES)
-    assert_allclose(modulus, relaxation(t, *TWELVE_DECADES), rtol=1e-14)
-
-
 TWO_TERMS = Prony(0.2e6, np.array([2e6, 1e6]), np.array([1e-3, 3e-4]))
 
 

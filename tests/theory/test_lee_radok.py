@@ -172,11 +172,3 @@ def test_early_and_late_are_elastic() -> None:
         pressures = lee_radok.load_step_pressure(r, time, FORCE, RADIUS, *ZENER)
         peak = float(hertz.peak_pressure(FORCE, RADIUS, modulus))
         assert_allclose(pressures, hertz.pressure(r, FORCE, RADIUS, modulus), rtol=0, atol=1e-6 * peak)
-
-
-def test_scaling() -> None:
-    """Moduli and force times 5, relaxation times times 3: the same shape at 3 times the time, pressures times 5."""
-    other = Prony(5 * ZENER.modulus_inf, 5 * ZENER.moduli, 3 * ZENER.relaxation_times)
-    r = np.linspace(0, 1e-3, 11)
-    one = lee_radok.load_step_pressure(r, 4e-3, FORCE, RADIUS, *ZENER)
-    assert_allclose(lee_radok.load_step_pressure(r, 12e-3, 5 * FORCE, RADIUS, *other), 5 * one, rtol=1e-12)

@@ -138,15 +138,6 @@ def test_kinks() -> None:
     assert_allclose(square, exact, rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("gamma", "mu"), [(0.0, 0.00172), (0.25, 0.00582), (0.5, 0.00991), (0.6, 0.01155), (1.0, 0.0181)]
-)
-def test_gammas(road: Rings, gamma: float, mu: float) -> None:
-    """Printed to 5 decimals. Friction is linear in gamma."""
-    found = persson.friction_coefficient(PRESSURE, road, 0.3, 0.0, steady(road, 0.3), gamma)
-    assert_allclose(found, mu, atol=6e-6)
-
-
 @pytest.mark.parametrize("row", STEP)
 def test_step_of_velocity(long_road: Rings, row: tuple[float, ...]) -> None:
     """The table's panels err by 1e-3 in friction at 3 m/s, and its distances are rounded to 3 digits."""
