@@ -101,6 +101,7 @@ def refuse_beyond_full_contact(scene: Scene, step: Step, d: float, effective: Ar
         rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height
         if d + mean > rounding:
             most = -mean * scene.units.height - datum
+            most = 0.0 if abs(most) <= rounding * scene.units.height else most
             raise StepError(
                 f"step {step.number}: an approach of {step.load:g} m is beyond full contact, which a periodic body "
                 f"reaches at {most:g} m; prescribe a pressure instead"

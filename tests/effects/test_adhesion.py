@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from parcontact.effects.adhesion import law_of
@@ -62,6 +63,39 @@ def test_a_mesh_that_is_too_coarse(reach: float, warned: bool) -> None:
     texts = [text for text in job(adhesion={"work": 0.05, "range": reach}).warnings if text.startswith("adhesion")]
     assert bool(texts) == warned
     assert all("a range of 2.8e-07 m" in text for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("work", "reach", "size", "sentence"),
+    [
+        (1.0, 4e-6, 4e-3, ""),
+        (1.01, 4e-6, 4e-3, "1 J/m^2 at most"),
+        (0.79, 4e-7, 1e-3, ""),
+        (0.81, 4e-7, 1e-3, "some work/(E* range) = 0.51"),
+        (0.05, 7.9e-5, 4e-4, ""),
+        (0.05, 8.1e-5, 4e-4, "more than 0.2 of the box"),
+        (0.05, 4e-7, 3.4e-4, ""),
+        (0.05, 4e-7, 3.3e-4, "use boundary: free, or a box of 0.000337 m"),
+    ],
+)
+def test_magnitudes_that_cannot_be_meant(work: float, reach: float, size: float, sentence: str) -> None:
+    """On both sides of each limit. A contact without load has the radius `(9 pi w R^2/2 E*)^(1/3)`, here 56 um."""
+    scene = job(adhesion={"work": work, "range": reach}, grid={"points": 2048, "size": size})
+    texts = [text for text in scene.warnings if text.startswith("adhesion")]
+    assert [sentence in text for text in texts] == [True] * bool(sentence)
+
+
+@pytest.mark.parametrize(("cell", "wrong"), [(2.0, 0.03), (2.5, 0.17)])
+def test_cells_that_do_not_see_a_sphere(cell: float, wrong: float) -> None:
+    """The attraction of an undeformed sphere, `exp(-r^2/2 R rho)`, summed over cells of so many sqrt(R rho): by
+    Poisson's sum it is wrong by `4 exp(-2 pi^2/cell^2)`, to the next terms."""
+    x = cell * np.arange(-20, 21)
+    total = (np.exp(-(x**2) / 2) * np.exp(-(x[:, None] ** 2) / 2)).sum() * cell**2
+    assert total / (2 * math.pi) - 1 == pytest.approx(wrong, abs=0.01)
+    size, points, radius = 4e-4, 64, 1e-3
+    reach = (size / points / (1.001 * cell)) ** 2 / radius
+    warned = job(material={"model": "elastic", "shear_modulus": 1e11}, adhesion={"work": 0.05, "range": reach}).warnings
+    assert any("times sqrt(radius range)" in text for text in warned) == (1.001 * cell > 2.0)
 
 
 def test_what_check_tells() -> None:

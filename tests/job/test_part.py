@@ -145,8 +145,12 @@ HISTORIES = {
     "history: [{pressure: 1, force: 1}]": (
         "4:11: history.0 needs exactly one of pressure | force | approach, got pressure and force"
     ),
-    "history: [{pressure: -1}]": "4:22: history.0.pressure must be a pressure [Pa] of zero or more, got -1",
-    "history: [{force: -1}]": "4:19: history.0.force must be a force [N] of zero or more, got -1",
+    "history: [{pressure: -1}]": (
+        "4:22: history.0.pressure must be a pressure [Pa] of zero or more, got -1; pulling needs adhesion"
+    ),
+    "history: [{force: -1}]": (
+        "4:19: history.0.force must be a force [N] of zero or more, got -1; pulling needs adhesion"
+    ),
     "history: [{approach: deep}]": "4:22: history.0.approach must be a finite approach [m], got 'deep'",
     "history: [{pressure: 0}, {force: 0}]": (
         "4:22: history.0.pressure must not be zero in every stage: nothing would ever touch"
@@ -156,7 +160,7 @@ HISTORIES = {
         "4:22: history.0.pressure.to is missing; it must be a pressure [Pa] of zero or more"
     ),
     "history: [{pressure: {from: 1, to: -2}, duration: 1, time_step: 1}]": (
-        "4:36: history.0.pressure.to must be a pressure [Pa] of zero or more, got -2"
+        "4:36: history.0.pressure.to must be a pressure [Pa] of zero or more, got -2; pulling needs adhesion"
     ),
     "history: [{pressure: {from: 1, to: 2, at: 3}, duration: 1, time_step: 1}]": (
         "4:39: history.0.pressure.at is not a known key; there are from, to"

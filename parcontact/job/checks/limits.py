@@ -108,7 +108,7 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         least = min(stage.load.start, stage.load.end)
         if least < 0.0:
             ends = () if stage.load.constant else ("from" if stage.load.start == least else "to",)
-            sentence = f"must be {LOADS[stage.control]}, got {least:g}"
+            sentence = f"must be {LOADS[stage.control]}, got {least:g}; pulling needs adhesion"
             yield Fault(sentence, ("history", index, stage.control, *ends))
 
 

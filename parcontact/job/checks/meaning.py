@@ -7,7 +7,7 @@ modulus, and what is isolated has room around it. All is judged by lower bounds,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -44,6 +44,21 @@ def warnings(job: Sections) -> Iterator[str]:
     yield from _imprints(job, material)
     if job.grid.boundary == "free":
         yield from _room(job, material)
+    elif (
+        job.body is None and job.material.hardness is None and all(isinstance(one, Rough | Wave) for one in job.surface)
+    ):
+        yield from _approaches(job.history)
+
+
+def _approaches(history: Sequence[Stage]) -> Iterator[str]:
+    """Yield what to say of approaches beyond full contact: waves alone are there where their mean is that of a body
+    which does not move in the mean, at 0."""
+    for index, stage in enumerate(history):
+        if stage.control == "approach" and (most := max(stage.load.start, stage.load.end)) > 0.0:
+            yield (
+                f"history.{index}: an approach of {most:g} m is beyond full contact, where a periodic body is at 0: the"
+                " run ends when it gets there; stay below, or prescribe a pressure"
+            )
 
 
 def steep(slope: float) -> str:
