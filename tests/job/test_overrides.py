@@ -128,7 +128,8 @@ def test_overrides_reach_a_lone_surface_by_number_and_without() -> None:
          "did you mean history.0.last?")),
         ("history.0.pressure.to=-1", ("history.0.pressure is 100000.0 and no mapping of keys, so it has no to; "
          "give history.0.pressure as a whole")),
-        ("history.0.pressure=-1", "history.0.pressure must be a pressure [Pa] of zero or more, got -1; pulling needs adhesion"),
+        ("history.0.pressure=-1", ("history.0.pressure must be a pressure [Pa] of zero or more, got -1; pulling needs "
+         "adhesion")),
         ("history.0.velocity=[1, x]", ("history.0.velocity.1 must be a velocity [m/s]: a number along x, or [vx, vy], "
          "got 'x'")),
         ("numerics.tolerance=0", "numerics.tolerance must be a tolerance [-] above 0 and below 1, got 0"),
