@@ -30,7 +30,6 @@ class Bar:
             print(text, flush=True)
 
     def close(self) -> None:
-        """Remove the bar."""
         if self._bar is not None:
             self._bar.close()
 

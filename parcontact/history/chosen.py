@@ -93,7 +93,6 @@ class Ladder:
 
     @property
     def count(self) -> int:
-        """The number of steps."""
         if self.seconds <= 0.0:
             return 0
         top = self.first * 2.0**self.doublings
@@ -123,7 +122,6 @@ class ChosenEnds:
 
     @property
     def count(self) -> int:
-        """The number of steps, made and guessed."""
         return len(self.made) + self.ladder.count
 
     def elapsed(self, index: int) -> float:
@@ -179,7 +177,6 @@ class ChosenSteps:
 
     @property
     def count(self) -> int:
-        """The number of steps chosen."""
         return sum(map(len, self.ends.values()))
 
     def of_stage(self, index: int, stage: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:

@@ -63,7 +63,6 @@ class Span:
 
     @property
     def last(self) -> int:
-        """The number of its last step."""
         return self.before + self.jumps + self.count
 
     @property
@@ -189,7 +188,6 @@ class Timeline:
 
     @property
     def count(self) -> int:
-        """The number of steps."""
         return len(self)
 
     def __getitem__(self, number: int) -> Step:
@@ -202,7 +200,6 @@ class Timeline:
         return self.after(0)
 
     def after(self, number: int) -> Iterator[Step]:
-        """Return the steps that follow one."""
         return (self[later] for later in range(number + 1, len(self) + 1))
 
     def span(self, number: int) -> Span:

@@ -90,7 +90,6 @@ class Job(Part):
         return handler(data)
 
     def model_post_init(self, context: Any) -> None:
-        """Keep where the job comes from."""
         if isinstance(context, Origin):
             self._origin = context
 
@@ -107,7 +106,6 @@ class Job(Part):
 
     @property
     def origin(self) -> Origin:
-        """The origin of the job."""
         return self._origin
 
     def of(self, origin: Origin) -> Job:

@@ -99,7 +99,6 @@ class Balance:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The shape of the map."""
         return self._sum.shape
 
     def power(self, pressure: Map) -> float:

@@ -59,7 +59,6 @@ def _reference(found: re.Match[str]) -> str:
 
 
 def contents() -> str:
-    """The list of pages."""
     width = max(map(len, names()))
     lines = [f"  {name:<{width}}  {title(name)}" for name in names()]
     return "\n".join(["parcontact manual PAGE prints a page:", "", *lines])

@@ -47,7 +47,6 @@ class LastObservation:
 
     @classmethod
     def of(cls, step: Step, *observed: float) -> "LastObservation":
-        """Return what was seen in a step."""
         return cls(float(step.stage), step.dt, 1.0, observed)
 
 

@@ -32,7 +32,6 @@ class March:
 
     @property
     def row(self) -> Row:
-        """The record of the last step."""
         return self.state.row
 
     @property

@@ -50,7 +50,6 @@ class StepTolerance:
         return float(min(own * 2.0 ** (0.5 * round(2.0 * self.mean)), max(LOOSEST, own), most))
 
     def after(self, scene: Scene, contact: Contact, budget: ErrorBudget | None) -> "StepTolerance":
-        """Return the memory after a step."""
         numerics, reached = scene.choices.numerics, contact.certificate.worst
         if not follows(scene) or budget is None or reached <= 0.0:
             return self

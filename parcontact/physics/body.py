@@ -131,11 +131,9 @@ class ElasticBody:
         return memory.displacement
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
-        """Return no entry: nothing is remembered."""
         return {}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
-        """Return the memory without a displacement."""
         return replace(memory, displacement=None)
 
 
@@ -181,7 +179,6 @@ class ZenerBody:
 
     @property
     def branched(self) -> "ZenerBody":
-        """The body as one that has branches."""
         return self
 
     def warm(self, factor: float) -> None:
@@ -237,7 +234,6 @@ class ZenerBody:
         return BodyMemory(out, memory.branches, memory.increment, trial.advance)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
-        """Return the displacement, which is remembered."""
         return surface_of(memory)
 
     def settle(self, memory: BodyMemory) -> None:

@@ -72,7 +72,6 @@ class Parts:
 
     @property
     def total(self) -> float:
-        """The sum of all."""
         return self.solver + self.time + self.folded + self.mesh
 
     @property
@@ -228,7 +227,6 @@ class ErrorSums:
 
     @classmethod
     def restored(cls, saved: Saved) -> "ErrorSums":
-        """Return the sums of a checkpoint."""
         if SUMS not in saved:
             return cls()
         found = np.reshape(saved[SUMS], (2, -1))

@@ -155,7 +155,6 @@ class ElasticPressure:
         return ZenerBody.count_maps(branches)
 
     def at_rest(self) -> BodyMemory:
-        """Return the memory of that body."""
         return self.body.at_rest()
 
     def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array) -> tuple[Array, BodyMemory]:

@@ -37,7 +37,6 @@ class Entry:
 
     @property
     def is_map(self) -> bool:
-        """Whether it is a map."""
         return np.ndim(self.value) == 2
 
     @property

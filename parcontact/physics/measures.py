@@ -45,7 +45,6 @@ class Measures:
 
     @property
     def finite(self) -> bool:
-        """True if all of them are finite."""
         return all(map(math.isfinite, astuple(self)))
 
     @property

@@ -77,7 +77,6 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
 
 
 def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
-    """Bytes of all of them."""
     return sum(holdings(job, ranks, rank).values())
 
 

@@ -45,7 +45,6 @@ class StageCost:
     later: dict[str, float] = field(default_factory=dict)
 
     def add(self, cost: dict[str, float]) -> None:
-        """Count a step that was tried."""
         sums = self.first if self.tried < FIRST else self.later
         self.tried += 1
         for name, value in cost.items():

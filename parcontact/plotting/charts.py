@@ -194,7 +194,6 @@ def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: 
 
 
 def _panels_beside(axes: Axes) -> int:
-    """Return the number of panels in the row of one."""
     place = axes.get_subplotspec()
     return place.get_gridspec().ncols if place else 1
 

@@ -132,7 +132,6 @@ def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
 
 
 def _draw_directory(directory: Path, options: Options) -> Figure:
-    """Draw all that there is in a directory."""
     has_run, has_curve, has_sweep = ((directory / name).is_file() for name in (MEASURES, steady.TABLE, sweep.TABLE))
     groups: list[Sequence[style.Panel]] = []
     titles = []

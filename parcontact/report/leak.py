@@ -117,7 +117,6 @@ class Gaps:
         return Solved(Leak(*flows), (errors[0], errors[1])), shown
 
     def row(self, index: int, solved: Solved, bare: Leak | None) -> Instant:
-        """Return the row of a saved instant."""
         found = solved.leak
         rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
         row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in Instant._fields[1:3]}

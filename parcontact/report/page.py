@@ -48,7 +48,6 @@ def _refuse_links(directory: Path) -> None:
 
 
 def render(directories: Sequence[Path]) -> str:
-    """Return the text of the page."""
     each = [describe_directory(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
     chapters = [*compare(directories), *each]
     loader = PackageLoader("parcontact", "report")

@@ -56,7 +56,6 @@ class Chapter:
 
 
 def draw_chart(chart: charts.Chart) -> Picture:
-    """Return a picture of one chart."""
     return draw_panel(partial(charts.draw, chart), f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
 
 

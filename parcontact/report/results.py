@@ -97,7 +97,6 @@ def describe_curve(directory: Path) -> Section:
 
 
 def describe_sweep(directory: Path) -> Section:
-    """Return what the cases have come to."""
     rows = sweep_table.read(sweep_table.results(directory))
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(used, [[row[name] for name in used] for row in rows])

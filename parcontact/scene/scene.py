@@ -249,7 +249,6 @@ def describe_scene(scene: Scene) -> Iterator[str]:
 
 
 def _motion(setup: Setup) -> Motion:
-    """Make the motion of the surface."""
     if not setup.choices.part_cells.on:
         return AlongX(setup.surface)
     return AlongX(setup.surface, PARTS) if setup.choices.slides_along_x else AnyFraction(setup.surface)

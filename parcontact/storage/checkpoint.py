@@ -246,7 +246,6 @@ def read(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
 
 
 def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
-    """Return all datasets by their names."""
     names: list[str] = []
     file.visit(names.append)
     return {name: file[name] for name in sorted(names) if isinstance(file[name], h5py.Dataset)}

@@ -114,7 +114,6 @@ class Console:
             self._bar.total = total
 
     def close(self) -> None:
-        """End the bar and the log."""
         if self._bar is not None:
             self._bar.close()
         if self._log is not None:

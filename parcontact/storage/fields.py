@@ -80,7 +80,6 @@ class FieldsFile:
         hdf5.change(self.path, self.slab, provenance.renew)
 
     def save(self, step: int, time: float, maps: Mapping[str, Array]) -> None:
-        """Put the maps of one instant into their place."""
         hdf5.save_maps(self.path, self.slab, self.steps[step], {name: maps[name] for name in self.names}, {"t": time})
         if self.slab.agree(clock.monotonic() - self._drawn > XDMF_SECONDS):
             self._draw()

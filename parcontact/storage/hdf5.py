@@ -59,7 +59,6 @@ def sync(path: Path, slab: Slab) -> None:
 
 
 def sync_one(path: Path) -> None:
-    """Wait until a file or directory is on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -239,7 +238,6 @@ def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) 
 
 
 def add_coordinate(file: h5py.File, name: str, values: Array, unit: str) -> None:
-    """Add a coordinate of the maps of a file."""
     dataset = fixed(file, name, values.shape, np.float64)
     dataset[...] = values
     dataset.make_scale(name)

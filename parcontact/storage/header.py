@@ -30,7 +30,6 @@ def lines(comm: MPI.Intracomm) -> Iterator[str]:
 
 
 def processor() -> str:
-    """Return the name of the processor."""
     try:
         with open("/proc/cpuinfo") as file:
             return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))

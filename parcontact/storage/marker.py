@@ -72,7 +72,6 @@ def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:
 
 
 def write(directory: Path, claims: Mapping[str, Claim]) -> None:
-    """Replace the marker."""
     data = {"format": FORMAT, **{verb: asdict(claim) for verb, claim in claims.items()}}
     files.write(directory / MARKER, json.dumps(data, indent=1) + "\n")
 

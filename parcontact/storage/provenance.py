@@ -97,7 +97,6 @@ def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
 
 
 def read_chain(file: h5py.File) -> tuple[Link, ...]:
-    """Return the chain of runs that made the file."""
     links = json.loads(bytes(file.attrs["chain"]))
     return tuple(Link(**{**link, "job": link["job"] or file.attrs["job"]}) for link in links)
 

@@ -28,7 +28,6 @@ class StopFile:
 
     @property
     def asks(self) -> bool:
-        """True if the program is to stop."""
         return self.own.exists() or _touched(self.path) not in (0, self.before)
 
     def ask_own(self) -> None:

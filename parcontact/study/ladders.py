@@ -44,7 +44,6 @@ class Settings:
 
     @property
     def steps(self) -> str:
-        """Their length in words."""
         if self.cells_per_step is None:
             return "auto steps"
         return f"{self.cells_per_step:.4g} cell{'s' if self.cells_per_step > 1.0 else ''} per step"

@@ -180,7 +180,6 @@ def _means(
 
 
 def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
-    """Replace a table by these rows."""
     text = StringIO()
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()

@@ -63,12 +63,10 @@ class Grid(Part):
 
     @property
     def nx(self) -> int:
-        """Points along x."""
         return self.points[0]
 
     @property
     def ny(self) -> int:
-        """Points along y."""
         return self.points[1]
 
     @property
@@ -117,7 +115,6 @@ class Accuracy(Part):
 
     @property
     def strictest(self) -> float:
-        """The smaller of both."""
         return min(self.friction, self.area)
 
     @property

@@ -193,7 +193,6 @@ class Dma(Part):
     _doubts: tuple[str, ...] = PrivateAttr(default=())
 
     def model_post_init(self, context: Any) -> None:
-        """Fit the compound."""
         try:
             found = compound.fitted(self.path, self.poisson, self.reference, self.shift, self.error, self.weight)
         except InputError as error:

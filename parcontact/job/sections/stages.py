@@ -43,7 +43,6 @@ class Ramp:
 
     @property
     def constant(self) -> bool:
-        """True if the load does not change."""
         return self.start == self.end
 
     def at(self, fraction: float) -> float:

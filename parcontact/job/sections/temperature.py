@@ -30,7 +30,6 @@ class ShiftLaw(Part):
 
     @property
     def made(self) -> Law:
-        """The law itself."""
         return self.kind(**self.model_dump(exclude={"law"}))
 
 

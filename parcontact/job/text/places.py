@@ -63,7 +63,6 @@ class Source:
     places: dict[Key, tuple[Place, Place]] = field(default_factory=dict)
 
     def note(self, place: Place, sentence: str) -> None:
-        """Add a mistake."""
         self.mistakes.append(Mistake(place, sentence))
 
     def put(self, path: Key, value: Any, key_place: Place, place: Place) -> None:

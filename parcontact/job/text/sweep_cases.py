@@ -30,7 +30,6 @@ class Setting(NamedTuple):
 
     @property
     def path(self) -> Key:
-        """The way to the key."""
         return tuple(self.name.split("."))
 
     def __str__(self) -> str:
