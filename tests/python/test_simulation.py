@@ -9,24 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import short_job
 import yaml
 from mpi4py import MPI
+from short_job import STEPS
 
 import parcontact as pc
 from parcontact.__main__ import main
 
 ROOT = Path(__file__).parents[2]
-JOB: dict[str, Any] = {
-    "grid": {"points": [16, 12], "size": [1e-3, 7.5e-4]},
-    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
-    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
-    "history": [
-        {"name": "press", "pressure": 1e4, "duration": 1e-3, "time_step": 2.5e-4},
-        {"name": "slide", "pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4, "cells_per_step": 1},
-    ],
-    "numerics": {"tolerance": 1e-8},
-}
-STEPS = 9
+JOB: dict[str, Any] = {**short_job.JOB, "numerics": {"tolerance": 1e-8}}
 WORLD = MPI.COMM_WORLD
 
 

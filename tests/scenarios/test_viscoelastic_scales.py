@@ -1,4 +1,4 @@
-"""A viscoelastic body in other forms of its material, in other units, and its energies."""
+"""A viscoelastic body with branches far from its time steps, and its energies."""
 
 from typing import Any
 
@@ -12,8 +12,6 @@ from parcontact.physics.body import BodyMemory, ZenerBody, surface_of
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
 
 Json = dict[str, Any]
-
-# -- branches and scales -----------------------------------------------------------------------------------------------
 
 
 def bumps(**changes: Any) -> Json:
@@ -46,26 +44,6 @@ def numbers(data: Json) -> dict[str, np.ndarray]:
     return {name: column(rows, name) for name in ("time", *MEASURES, *ENERGIES)}
 
 
-def zener(*branches: Json, modulus_inf: float = 0.0) -> Json:
-    return bumps(material={"model": "zener", "modulus_inf": modulus_inf, "branches": list(branches)})
-
-
-def test_forms_of_one_material() -> None:
-    """The paper's branch; the Maxwell branch and spring that it is; with useless branches beside it. To 1e-9.
-
-    G1 = 0 is a Maxwell branch, eta1 = 0 leaves two springs in series, eta1 = inf the spring G0.
-    """
-    maxwell = {"G0": 2.475e6, "G1": 0.0, "eta1": 2475.0}
-    zeners = [{"G0": 2.75e6, "G1": 2.75e6 / 9, "eta1": 2.75e4 / 9}]
-    series = {"G0": 0.2e6, "G1": 0.2e6, "eta1": 0.0}
-    spring = {"G0": 0.175e6, "G1": 1e6, "eta1": np.inf}
-    reference = numbers(bumps())
-    for same in (zener(*zeners), zener(maxwell, modulus_inf=0.275e6), zener(maxwell, series, spring)):
-        for name, values in numbers(same).items():
-            scale = np.abs(reference[name]).max()
-            assert_allclose(values, reference[name], rtol=0, atol=1e-9 * scale, err_msg=name)
-
-
 @pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
 def test_branches_far_from_the_time_steps(integrator: str) -> None:
     """A relaxation time of 1e9 s is a spring, one of 1e-15 s nothing (after a jump it would be felt). To 1e-8."""
@@ -82,39 +60,6 @@ def test_branches_far_from_the_time_steps(integrator: str) -> None:
         for name in MEASURES:
             scale = np.abs(expected[name]).max()
             assert_allclose(found[name], expected[name], rtol=0, atol=1e-8 * scale, err_msg=name)
-
-
-def scaled(pressure: float, length: float, time: float) -> Json:
-    """`bumps` with all pressures and moduli, all lengths and all times multiplied."""
-    data = bumps()
-    data["grid"]["size"] = [length * size for size in data["grid"]["size"]]
-    for shape in data["surface"]:
-        for name in {"amplitude", "radius"} & shape.keys():
-            shape[name] *= length
-    branches = [{"modulus": pressure * b["modulus"], "relaxation_time": time * b["relaxation_time"]} for b in BRANCHES]
-    data["material"] = {"model": "zener", "modulus_inf": pressure * 0.275e6, "branches": branches}
-    for stage in data["history"]:
-        ramp = stage["pressure"]
-        stage["pressure"] = {k: pressure * v for k, v in ramp.items()} if isinstance(ramp, dict) else pressure * ramp
-        stage["duration"] *= time
-        step = stage["time_step"]
-        stage["time_step"] = {**step, "first": time * step["first"]} if isinstance(step, dict) else time * step
-        if "velocity" in stage:
-            stage["velocity"] = (np.array(stage["velocity"]) * (length / time)).tolist()
-    return data
-
-
-@pytest.mark.parametrize(("pressure", "length", "time"), [(1e6, 1.0, 1.0), (1.0, 1e-6, 1.0), (1.0, 1.0, 1e3)])
-def test_scales(pressure: float, length: float, time: float) -> None:
-    """Results scale with the units of pressure, length and time to the rounding of solves at 1e-9."""
-    plain, other = numbers(bumps()), numbers(scaled(pressure, length, time))
-    powers = {"pressure": (1, 0), "max_pressure": (1, 0), "force_x": (1, 2), "force_y": (1, 2)}
-    powers |= {"friction": (0, 0), "contact_area": (0, 0), "approach": (0, 1), "mean_gap": (0, 1)}
-    powers |= dict.fromkeys(ENERGIES, (1, 3))
-    assert_allclose(other["time"], time * plain["time"], rtol=1e-12)
-    for name, (of_pressure, of_length) in powers.items():
-        expected = plain[name] * pressure**of_pressure * length**of_length
-        assert_allclose(other[name], expected, rtol=0, atol=1e-11 * np.abs(expected).max(), err_msg=name)
 
 
 # -- energy ------------------------------------------------------------------------------------------------------------

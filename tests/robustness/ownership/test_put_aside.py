@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from restarting import ROUGH
 
 import parcontact as pc
 from parcontact import __main__
@@ -12,14 +13,6 @@ from parcontact import __main__
 from .jobs import DONE, JOB, write_job
 
 MINE = "mine\n"
-ROUGH = {
-    "shape": "rough",
-    "hurst": 0.8,
-    "long_wavelength": 5e-4,
-    "short_wavelength": 2e-4,
-    "rms_slope": 0.02,
-    "seed": 1,
-}
 COMMANDS: dict[str, Sequence[str]] = {  # by the file that each of them writes
     "out/picture.png": ("plot", "out"),
     "mine.pdf": ("plot", "out", "--out", "mine.pdf"),
