@@ -202,8 +202,8 @@ class HalfSpace:
         """
         if self.free:
             table = tabulate(fft, self.size, self._coefficient, self.layer is None).real
-            mean = self._mean_of(table, fft)
-            least = mean
+            owns_mean = fft.columns.start == 0 < fft.columns.stop
+            least = mean = fft.slab.sum(float(table[0, 0]) if owns_mean else 0.0)[0]
         else:
             table, mean = self.symbol(fft), 0.0 if self.layer is None else self.layer.mean_compliance
             least = mean or self.largest_compliance
@@ -213,11 +213,6 @@ class HalfSpace:
         operator = Convolution(fft, lambda rows: table[rows], fft.dtype)
         inverse = Convolution(fft, lambda rows: np.where(zero[rows], 0.0, 1.0 / table[rows]), fft.dtype)
         return operator, inverse, mean, least
-
-    def _mean_of(self, table: Array, fft: FFT) -> float:
-        """The first number of a spectrum; collective."""
-        first = float(table[0, 0]) if fft.columns.start == 0 < fft.columns.stop else 0.0
-        return fft.slab.sum(first)[0]
 
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 

@@ -150,7 +150,7 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm) -> Iterator[
         return
     bare, missing = _bare_flow(gaps)
     rows = [gaps.row(index, leaks[index], bare) for index in gaps.shown]
-    lines = [",".join(Instant._fields), *(",".join(_cell(value) for value in row) for row in rows)]
+    lines = [",".join(Instant._fields), *(",".join(tables.texts(row)) for row in rows)]
     name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
     files.write(table, "\n".join(lines) + "\n")
@@ -232,7 +232,3 @@ def _describe_closure(rows: Sequence[Instant], axis: str) -> str:
     where = f", {under}" if known else ""
     found = f"closes the gap at {sum(closed)} of {len(rows)} instants, first at t = {quantity(first.time, 's')}"
     return f"along {axis} contact {found}{where}"
-
-
-def _cell(value: float) -> str:
-    return "" if value != value else repr(value)

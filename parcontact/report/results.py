@@ -93,7 +93,8 @@ def describe_curve(directory: Path) -> Section:
     head = [f"{_to_words(name)} [{known[name]}]" if name in known else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_chart(chart) for chart in steady.charts(directory)]
-    return Section("Friction curve", (), [table], pictures, _browse_curve(directory))
+    states = partial(_label_states, find_free_area(directory))
+    return Section("Friction curve", (), [table], pictures, _browse_file(directory / "steady.h5", states))
 
 
 def describe_sweep(directory: Path) -> Section:
@@ -147,11 +148,6 @@ def _parse_number(text: str) -> object:
 def browse_run(run: Run) -> list[Browser]:
     """Return all maps that a run has saved, over time."""
     return _browse_file(run.directory / "fields.h5", partial(label_frames, run))
-
-
-def _browse_curve(directory: Path) -> list[Browser]:
-    """Return all maps that a friction curve has saved in a directory, over velocity and load."""
-    return _browse_file(directory / "steady.h5", partial(_label_states, find_free_area(directory)))
 
 
 def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[Browser]:

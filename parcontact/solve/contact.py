@@ -39,6 +39,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..parallel.slab import Array, reused
+from ..physics import loops
 from ..physics.layer import LongWaves
 from . import kernels
 from .certificate import Certificate
@@ -266,7 +267,7 @@ class ContactSolver:
         """The step that makes f the smallest, for a slope along the direction; by one more application of the
         operator."""
         t, image = self.workspace.direction, self.workspace.other_displacement
-        curvature = self.slab.sum(kernels.dot(t, problem.operator.apply(t, image)))[0]
+        curvature = self.slab.sum(loops.dot(t, problem.operator.apply(t, image)))[0]
         return slope / curvature if curvature > 0.0 else 0.0
 
     def _separate(self, problem: Problem, p: Array) -> Contact:

@@ -69,18 +69,6 @@ def turn(working, z, beta, mean, t):
 
 
 @loop
-def dot(a, b):
-    """Sum of a b."""
-    total = 0.0
-    for j in range(a.shape[0]):
-        row = 0.0
-        for i in range(a.shape[1]):
-            row += a[j, i] * b[j, i]
-        total += row
-    return total
-
-
-@loop
 def total(a):
     """Sum of a."""
     result = 0.0

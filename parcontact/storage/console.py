@@ -32,15 +32,15 @@ def line(row: Row) -> str:
 
 def warnings_of(log: Path) -> list[str]:
     """Return the warnings in a log, each once and in their order; none where there is no log."""
-    return list(dict.fromkeys(line.removeprefix(WARNING) for line in _lines(log) if line.startswith(WARNING)))
+    return list(dict.fromkeys(line.removeprefix(WARNING) for line in lines_of(log) if line.startswith(WARNING)))
 
 
 def meshes_of(log: Path) -> list[str]:
     """Return what a log says of meshes that were chosen (`job.chosen_mesh`), the last of it; nothing as a rule."""
-    return [line for line in _lines(log) if line.startswith(MESH)][-1:]
+    return [line for line in lines_of(log) if line.startswith(MESH)][-1:]
 
 
-def _lines(log: Path) -> list[str]:
+def lines_of(log: Path) -> list[str]:
     """Return the lines of a log without their stamps; none where there is no log."""
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 

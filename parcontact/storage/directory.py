@@ -80,7 +80,7 @@ class Directory:
         def look() -> None:
             if not self.claims and not afresh and not self._has_checkpoints():
                 hint = ", or --restart never to write here and put files of these names aside"
-                refuse_files(self.path, self._foreign(job), hint)
+                refuse_files(self.path, (path.name for path in self.path.iterdir() if not _same(path, job)), hint)
             refuse_other_jobs(self.path, {v: claim for v, claim in self.claims.items() if v != self.verb}, data)
 
         self._on_root(look)
@@ -156,10 +156,6 @@ class Directory:
         return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
 
     # -- whose it is --------------------------------------------------------------------------------------------------
-
-    def _foreign(self, job: Path) -> Iterator[str]:
-        """Yield what is here beside the job that is to run."""
-        return (path.name for path in self.path.iterdir() if not _same(path, job))
 
     def _has_checkpoints(self) -> bool:
         """Return whether the directory proves to be ours, as a copy that has lost its marker does."""

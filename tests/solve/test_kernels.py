@@ -7,6 +7,7 @@ precision the terms themselves are rounded, 1e-6.
 import numpy as np
 import pytest
 
+from parcontact.physics import loops
 from parcontact.solve import kernels
 
 from .random_maps import ROUNDING, SHAPES, Maps
@@ -58,7 +59,7 @@ def test_dot_and_total(shape: tuple[int, int], dtype: type[np.floating]) -> None
     maps = Maps(shape, dtype)
     u, t = maps.wide("u"), maps.wide("t")
     assert maps.close(kernels.total(maps.u), u)
-    assert maps.close(kernels.dot(maps.u, maps.t), u * t)
+    assert maps.close(loops.dot(maps.u, maps.t), u * t)
 
 
 @SHAPES
@@ -86,4 +87,4 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
         assert np.isnan(kernels.weigh(maps.p, maps.u, maps.h, 0.0)[2])
     maps = Maps((5, 32), dtype)
     maps.t[2, 3] = np.nan
-    assert np.isnan(kernels.dot(maps.t, maps.t))
+    assert np.isnan(loops.dot(maps.t, maps.t))

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...parallel.slab import Array
+from ...physics import loops
 from .. import kernels
 from ..contact import Contact, ContactSolver
 from ..problem import Problem
@@ -79,7 +80,7 @@ class _Search:
             mean = (sum_z + beta * sum_t) / self.members if self.load is not None else 0.0
             kernels.turn(working, z, beta, mean, t)
             change = problem.operator.apply(t, w)
-            slope, curvature = slab.sum(kernels.dot(r, t), kernels.dot(t, change))
+            slope, curvature = slab.sum(loops.dot(r, t), loops.dot(t, change))
             if not (slope > 0.0 and curvature > 0.0):
                 break
             step = np.float64(slope / curvature)  # whose products with t are not rounded to its precision
