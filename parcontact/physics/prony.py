@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Integrator = Literal["backward-euler", "exponential"]
+Moduli = tuple[float, ArrayLike, ArrayLike]  # long-term modulus (Pa), moduli (Pa), relaxation times (s); a Prony is one
 
 
 class Prony(NamedTuple):
@@ -94,38 +95,31 @@ def zener_to_prony(
     return Prony(float(modulus_inf + np.sum(g0 * g1 / both)), g0 * g0 / both, eta1 / both)
 
 
-def relaxation(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
+def relaxation(t: ArrayLike, *material: *Moduli) -> Array:
     """G(t) in Pa for times t >= 0 (s, any shape); t = 0 is the instant after the step."""
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     return np.asarray(spring + np.exp(-np.asarray(t, float)[..., None] / times) @ terms)
 
 
-def relaxation_integral(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
+def relaxation_integral(t: ArrayLike, *material: *Moduli) -> Array:
     """The integral of G from 0 to t, in Pa s: the stress after time t (s, any shape) of straining at unit rate."""
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     t = np.asarray(t, float)
     return np.asarray(spring * t - np.expm1(-t[..., None] / times) @ (terms * times))
 
 
-def complex_modulus(
-    omega: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> ComplexArray:
+def complex_modulus(omega: ArrayLike, *material: *Moduli) -> ComplexArray:
     """G* = G' + i G'' in Pa at angular frequencies omega (rad/s, any shape and sign), for strains exp(+i omega t).
 
     G*(omega) = G_inf + sum_j G_j i omega tau_j / (1 + i omega tau_j)
     """
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     phase = 1j * np.asarray(omega, float)[..., None] * times
     return np.asarray(spring + (phase / (1 + phase)) @ terms)
 
 
 def discrete_modulus(
-    omega: ArrayLike,
-    dt: ArrayLike,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-    integrator: Integrator = "exponential",
+    omega: ArrayLike, dt: ArrayLike, *material: *Moduli, integrator: Integrator = "exponential"
 ) -> ComplexArray:
     """The complex modulus (Pa) that time steps dt > 0 (s) give to a displacement sampled from exp(i omega t).
 
@@ -135,7 +129,7 @@ def discrete_modulus(
     (z-transforms of the two one-step recursions, the latter being exact for piecewise linear displacement.)
     N steps per period is dt = 2 pi/(N omega). omega and dt broadcast.
     """
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     omega, dt = (np.asarray(value, float)[..., None] for value in (omega, dt))
     ratio, turn = dt / times, 1j * omega * dt
     if integrator == "backward-euler":
@@ -161,7 +155,7 @@ def coefficients(prony: Prony, integrator: str, dt: float) -> tuple[Array, Array
     return np.exp(-z), prony.moduli * phi
 
 
-def creep_spectrum(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> CreepSpectrum:
+def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
     """The creep compliance that belongs to a relaxation function, by partial fractions of 1/Gbar.
 
     Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, one lambda_i above every relaxation
@@ -169,7 +163,7 @@ def creep_spectrum(modulus_inf: float, moduli: ArrayLike, relaxation_times: Arra
     logarithm of its distance to the nearer pole, so that no digits are lost however close they are or however many
     decades the times span.
     """
-    series = normal_form(modulus_inf, moduli, relaxation_times)
+    series = normal_form(*material)
     spring, terms, times = series
     zeros = [_zero_above(index, series) for index in range(times.size - (spring == 0))]
     slopes = np.array([np.sum(terms * times / distances**2) for _, distances in zeros])
@@ -178,9 +172,9 @@ def creep_spectrum(modulus_inf: float, moduli: ArrayLike, relaxation_times: Arra
     return CreepSpectrum(1 / float(spring + terms.sum()), 1 / (retardation_times * slopes), retardation_times, fluidity)
 
 
-def creep(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
+def creep(t: ArrayLike, *material: *Moduli) -> Array:
     """The creep compliance J(t) in 1/Pa for times t >= 0 (s, any shape): the strain after a unit step of stress."""
-    return creep_spectrum(modulus_inf, moduli, relaxation_times).compliance(t)
+    return creep_spectrum(*material).compliance(t)
 
 
 def _zero_above(index: int, series: Prony) -> tuple[float, Array]:

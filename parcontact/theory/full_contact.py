@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..physics.prony import Integrator, complex_modulus, discrete_modulus, normal_form
+from ..physics.prony import Integrator, Moduli, complex_modulus, discrete_modulus, normal_form
 from .arrays import Array, ComplexArray, ComplexValues, Values
 
 
@@ -78,18 +78,10 @@ def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexV
 
 
 def friction_coefficient(
-    mean_pressure: Values,
-    amplitude: ComplexValues,
-    kx: Values,
-    ky: Values,
-    vx: float,
-    vy: float,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
+    mean_pressure: Values, amplitude: ComplexValues, kx: Values, ky: Values, vx: float, vy: float, *material: *Moduli
 ) -> Array:
     """mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves together in steady sliding at (vx, vy) m/s, not 0."""
-    modulus = complex_modulus(frequency(kx, ky, vx, vy), modulus_inf, moduli, relaxation_times)
+    modulus = complex_modulus(frequency(kx, ky, vx, vy), *material)
     return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
 
 
@@ -101,9 +93,7 @@ def discrete_friction_coefficient(
     vx: float,
     vy: float,
     dt: float,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
+    *material: *Moduli,
     integrator: Integrator = "exponential",
 ) -> Array:
     """The mu that a code with exact derivatives and Fourier kernel finds in steady sliding with time steps dt (s).
@@ -111,7 +101,7 @@ def discrete_friction_coefficient(
     The surface goes by n cells of size c per step when dt = n c/|v|.
     """
     omega = frequency(kx, ky, vx, vy)
-    modulus = discrete_modulus(omega, dt, modulus_inf, moduli, relaxation_times, integrator)
+    modulus = discrete_modulus(omega, dt, *material, integrator=integrator)
     return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
 
 
@@ -119,12 +109,7 @@ def discrete_friction_coefficient(
 
 
 def velocity_step_modulus(
-    t: ArrayLike,
-    omega_before: ComplexValues,
-    omega_after: ArrayLike,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
+    t: ArrayLike, omega_before: ComplexValues, omega_after: ArrayLike, *material: *Moduli
 ) -> ComplexArray:
     """M(t) in Pa at times t >= 0 (s) after steady sliding at omega_before became sliding at omega_after.
 
@@ -132,31 +117,22 @@ def velocity_step_modulus(
     before (a) and after (b). The frequencies (rad/s, one per wave) are those of `frequency`. The shape is that of t
     followed by that of the frequencies.
     """
-    before = _memory(omega_before, normal_form(modulus_inf, moduli, relaxation_times).relaxation_times)
-    return _modulus_after(t, before, omega_after, modulus_inf, moduli, relaxation_times)
+    before = _memory(omega_before, normal_form(*material).relaxation_times)
+    return _modulus_after(t, before, omega_after, *material)
 
 
-def load_rest_slide_modulus(
-    t: ArrayLike, rest: float, omega: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> ComplexArray:
+def load_rest_slide_modulus(t: ArrayLike, rest: float, omega: ArrayLike, *material: *Moduli) -> ComplexArray:
     """M(t) in Pa at times t >= 0 (s) of sliding at omega (rad/s) after `rest` (s) in full contact of a virgin body.
 
     As `velocity_step_modulus` with a_j = exp(-rest/tau_j). The shape is that of t followed by that of omega.
     """
-    before = np.exp(-rest / normal_form(modulus_inf, moduli, relaxation_times).relaxation_times)
-    return _modulus_after(t, before, omega, modulus_inf, moduli, relaxation_times)
+    before = np.exp(-rest / normal_form(*material).relaxation_times)
+    return _modulus_after(t, before, omega, *material)
 
 
-def _modulus_after(
-    t: ArrayLike,
-    before: ComplexValues,
-    omega: ArrayLike,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-) -> ComplexArray:
+def _modulus_after(t: ArrayLike, before: ComplexValues, omega: ArrayLike, *material: *Moduli) -> ComplexArray:
     """M(t), given by the shares of the moduli that are `before` in memory at t = 0 (last axis: terms of the series)."""
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     t, omega = np.asarray(t, float), np.asarray(omega, float)
     t = t.reshape(t.shape + (1,) * (omega.ndim + 1))
     after = _memory(omega, times)

@@ -18,37 +18,27 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import hyp1f1
 
-from ..physics.prony import CreepSpectrum, creep_spectrum, normal_form, relaxation, relaxation_integral
+from ..physics.prony import CreepSpectrum, Moduli, creep_spectrum, normal_form, relaxation, relaxation_integral
 from .arrays import Array
 from .quadrature import graded_rule
 
 # a force put on at t = 0 and held
 
 
-def load_step_contact_radius(
-    t: ArrayLike, force: float, radius: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> Array:
+def load_step_contact_radius(t: ArrayLike, force: float, radius: float, *material: *Moduli) -> Array:
     """a(t) = (3 R W J(t)/16)^(1/3) in m at times t >= 0 (s, any shape)."""
-    compliance = creep_spectrum(modulus_inf, moduli, relaxation_times).compliance(t)
+    compliance = creep_spectrum(*material).compliance(t)
     return np.cbrt(3 * radius * force * compliance / 16)
 
 
-def load_step_pressure(
-    r: ArrayLike,
-    t: ArrayLike,
-    force: float,
-    radius: float,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-) -> Array:
+def load_step_pressure(r: ArrayLike, t: ArrayLike, force: float, radius: float, *material: *Moduli) -> Array:
     """p(r, t) in Pa at distances r (m) from the axis and times t >= 0 (s), which broadcast, for a force > 0.
 
     With f(s) = sqrt(a^2(s) - r^2)_+ and the time t_r at which the edge of the contact passes r, the history integral is
     G(t - t_r) f(t) + int_{t_r}^t (f(t) - f(s)) sum_j G_j/tau_j exp(-(t-s)/tau_j) ds, all of it positive. It is computed
     by Gauss rules on panels that shrink towards both ends; the relative error is about 1e-13 G(0)/G(t).
     """
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     spectrum = creep_spectrum(spring, terms, times)
 
     def pressure(r: float, t: float) -> float:
@@ -65,11 +55,9 @@ def load_step_pressure(
 # an approach put on at t = 0 and held
 
 
-def displacement_step_force(
-    t: ArrayLike, approach: float, radius: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> Array:
+def displacement_step_force(t: ArrayLike, approach: float, radius: float, *material: *Moduli) -> Array:
     """W(t) = (16/3) sqrt(R) d^(3/2) G(t) in N at times t >= 0 (s, any shape)."""
-    modulus = relaxation(t, modulus_inf, moduli, relaxation_times)
+    modulus = relaxation(t, *material)
     return np.asarray(16 / 3 * np.sqrt(radius * approach) * approach * modulus)
 
 
@@ -77,34 +65,20 @@ def displacement_step_force(
 
 
 def triangle_contact_radius(
-    t: ArrayLike,
-    peak_approach: float,
-    rise_time: float,
-    radius: float,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
+    t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli
 ) -> Array:
     """a(t) in m at times t >= 0 (s, any shape); zero from lift-off on."""
-    earlier = _time_of_equal_radius(t, rise_time, modulus_inf, moduli, relaxation_times)
+    earlier = _time_of_equal_radius(t, rise_time, *material)
     return np.sqrt(radius * peak_approach / rise_time * earlier)
 
 
-def triangle_force(
-    t: ArrayLike,
-    peak_approach: float,
-    rise_time: float,
-    radius: float,
-    modulus_inf: float,
-    moduli: ArrayLike,
-    relaxation_times: ArrayLike,
-) -> Array:
+def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli) -> Array:
     """W(t) in N at times t >= 0 (s, any shape); zero from lift-off on.
 
     W = 8 sqrt(R) (peak_approach/rise_time)^(3/2) int_0^{t1} G(t-s) sqrt(s) ds, where every term of the Prony series
     gives (2/3) t1^(3/2) exp(-(t - t1)/tau) M(1, 5/2, -t1/tau) with Kummer's function M.
     """
-    spring, terms, times = normal_form(modulus_inf, moduli, relaxation_times)
+    spring, terms, times = normal_form(*material)
     earlier = _time_of_equal_radius(t, rise_time, spring, terms, times)
     since = np.asarray(t, float) - earlier
     memory = np.exp(-since[..., None] / times) * hyp1f1(1.0, 2.5, -earlier[..., None] / times)
@@ -112,34 +86,30 @@ def triangle_force(
     return np.asarray(stiffness * earlier**1.5 * (spring + memory @ terms))
 
 
-def triangle_lift_off_time(
-    rise_time: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> float:
+def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
     """When contact is lost, in s: int_0^t G = 2 int_0^{t - rise_time} G, whatever the sphere and the depth."""
-    material = normal_form(modulus_inf, moduli, relaxation_times)
+    series = normal_form(*material)
 
     def excess(t: float) -> float:
-        return float(relaxation_integral(t, *material) - 2 * relaxation_integral(t - rise_time, *material))
+        return float(relaxation_integral(t, *series) - 2 * relaxation_integral(t - rise_time, *series))
 
     # an elastic body lets go at 2 rise_time exactly, where rounding must not hide the change of sign
     return float(brentq(excess, rise_time, 2 * rise_time * (1 + 1e-12), xtol=1e-15 * rise_time))
 
 
-def _time_of_equal_radius(
-    t: ArrayLike, rise_time: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike
-) -> Array:
+def _time_of_equal_radius(t: ArrayLike, rise_time: float, *material: *Moduli) -> Array:
     """The time during the rise at which the contact was as large as at t; 0 after lift-off.
 
     After the rise it is t minus the age x that solves int_0^x G = 2 int_0^{t - rise_time} G.
     """
-    material = normal_form(modulus_inf, moduli, relaxation_times)
-    lift_off = triangle_lift_off_time(rise_time, *material)
+    series = normal_form(*material)
+    lift_off = triangle_lift_off_time(rise_time, *series)
 
     def earlier(t: float) -> float:
         if t <= rise_time or t >= lift_off:
             return t if t <= rise_time else 0.0
-        target = 2 * relaxation_integral(t - rise_time, *material)
-        age = brentq(lambda x: relaxation_integral(x, *material) - target, t - rise_time, t, xtol=1e-15 * rise_time)
+        target = 2 * relaxation_integral(t - rise_time, *series)
+        age = brentq(lambda x: relaxation_integral(x, *series) - target, t - rise_time, t, xtol=1e-15 * rise_time)
         return t - float(age)
 
     return np.asarray(np.vectorize(earlier, otypes=[float])(t))

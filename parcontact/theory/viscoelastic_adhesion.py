@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from ..physics.prony import creep_spectrum, normal_form
+from ..physics.prony import Moduli, creep_spectrum
 from .arrays import Array
 from .quadrature import graded_rule
 
 
-def opening_crack(velocity: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> float:
+def opening_crack(velocity: float, *material: *Moduli) -> float:
     """G/w of a crack that opens with `velocity` = V/c0 (1/s), from 1 at rest to k = G(0)/G(inf)."""
-    creep = _relative_creep(modulus_inf, moduli, relaxation_times)
+    creep = _relative_creep(*material)
     _, rest, weights, rate = _rule()
 
     def strength(length: float) -> float:
@@ -35,9 +35,9 @@ def opening_crack(velocity: float, modulus_inf: float, moduli: ArrayLike, relaxa
     return _solve(lambda length: strength(length) - length, creep)
 
 
-def closing_crack(velocity: float, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> float:
+def closing_crack(velocity: float, *material: *Moduli) -> float:
     """G/w of a crack that closes with `velocity` = V/c0 (1/s), from 1 at rest to 1/k."""
-    creep = _relative_creep(modulus_inf, moduli, relaxation_times)
+    creep = _relative_creep(*material)
     x, rest, weights, rate = _rule()
 
     def relative_work(length: float) -> float:
@@ -48,12 +48,12 @@ def closing_crack(velocity: float, modulus_inf: float, moduli: ArrayLike, relaxa
     return float(length * intensity**2)
 
 
-def _relative_creep(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Callable[[ArrayLike], Array]:
+def _relative_creep(*material: *Moduli) -> Callable[[ArrayLike], Array]:
     """e(t) = C(t)/C(inf); the body must be a solid."""
-    if not modulus_inf > 0:
+    if not material[0] > 0:
         raise ValueError("The modulus at infinite times must be positive: a crack in a liquid does not rest.")
-    spectrum = creep_spectrum(*normal_form(modulus_inf, moduli, relaxation_times))
-    return lambda t: modulus_inf * spectrum.compliance(t)
+    spectrum = creep_spectrum(*material)
+    return lambda t: material[0] * spectrum.compliance(t)
 
 
 def _rule() -> tuple[Array, Array, Array, Array]:

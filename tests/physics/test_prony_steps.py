@@ -50,7 +50,9 @@ def test_discrete_modulus_is_that_of_a_march(integrator: Integrator, omega: floa
     for displacement in (phase.real, phase.imag):
         point = body(ZENER, integrator)
         parts.append([push(point, now, dt) for now in displacement][-1])
-    assert_allclose((parts[0] + 1j * parts[1]) / phase[-1], discrete_modulus(omega, dt, *ZENER, integrator), rtol=1e-10)
+    assert_allclose(
+        (parts[0] + 1j * parts[1]) / phase[-1], discrete_modulus(omega, dt, *ZENER, integrator=integrator), rtol=1e-10
+    )
 
 
 @pytest.mark.parametrize("integrator", ["backward-euler", "exponential"])
@@ -58,9 +60,9 @@ def test_limits_of_discrete_modulus(integrator: Integrator) -> None:
     """Short steps give the complex modulus (at first and second order), long ones the long-term spring."""
     order = {"backward-euler": 1, "exponential": 2}[integrator]
     exact = complex_modulus(1e3, *ZENER)
-    errors = [abs(discrete_modulus(1e3, dt, *ZENER, integrator) - exact) for dt in (1e-5, 5e-6)]
+    errors = [abs(discrete_modulus(1e3, dt, *ZENER, integrator=integrator) - exact) for dt in (1e-5, 5e-6)]
     assert_allclose(errors[0] / errors[1], 2**order, rtol=0.01)
     for dt in (1e6, 1e300):
-        lasting = discrete_modulus(1.0 / dt, dt, *ZENER, integrator)
+        lasting = discrete_modulus(1.0 / dt, dt, *ZENER, integrator=integrator)
         assert_allclose(lasting, ZENER.modulus_inf, rtol=10 * 1e-3 / dt + 1e-15)
-    assert_allclose(discrete_modulus(1e3, 1e-13, *ZENER, integrator), exact, rtol=1e-9)
+    assert_allclose(discrete_modulus(1e3, 1e-13, *ZENER, integrator=integrator), exact, rtol=1e-9)

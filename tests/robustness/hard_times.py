@@ -175,7 +175,9 @@ def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Inte
     spring, moduli, times = TYRE
     total = complex(spring)
     for modulus, time in zip(moduli, times, strict=True):
-        share = complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator)) / modulus
+        share = (
+            complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator=integrator)) / modulus
+        )
         z = dt / time
         decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
         total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)

@@ -44,7 +44,7 @@ def test_steady_friction(integrator: Integrator, velocity: float, exponential: f
     found = rows[-1].measures.friction
     assert found == pytest.approx(exponential if integrator == "exponential" else euler, rel=3e-7)
     waves = (MEAN, HEIGHT, np.array([K]), np.array([0.0]), velocity, 0.0)
-    exact = full_contact.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator)
+    exact = full_contact.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator=integrator)
     assert found == pytest.approx(float(exact), rel=1e-9)
     assert rows[-1].measures.force_x < 0.0
     assert rows[-1].operator_calls <= 4
