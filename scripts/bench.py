@@ -8,7 +8,8 @@
     free     operator calls of cold solves in free boxes at 0.2 to 35 % contact to a pressure error of 1e-5: on
              512 x 512 points, and on ever finer grids
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
-    sticking operator calls of steps with adhesion over those of the same steps without, in nine scenes
+    sticking operator calls of steps with adhesion over those of the same steps without, in nine scenes, to the same
+             tolerance and to the same errors
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade

@@ -44,15 +44,22 @@ def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
     assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load
 
 
-@pytest.mark.parametrize("name", ["rough, elastic, middle", "rough, rubber, middle"])
-def test_a_resolved_step_with_adhesion(name: str) -> None:
-    """It takes at most three times the operator calls of the same step without, and more than half of them: both are
-    solved to the same tolerance."""
+@pytest.mark.parametrize(
+    ("name", "most"), [("rough, elastic, middle", 3.0), ("rough, elastic, strong", 4.0), ("rough, rubber, middle", 3.0)]
+)
+def test_a_resolved_step_with_adhesion(name: str, most: float) -> None:
+    """It takes at most three times the operator calls of the same step without, if that is solved to errors that are no
+    larger, and more than half of them; to the same tolerance, to which it is more exact, it may take more."""
     sticking = load_script("bench.sticking")
     job = sticking.job_of(sticking.SCENES[name], 128)
-    calls, front = sticking.count(job)
-    without, still = sticking.count({key: value for key, value in job.items() if key != "adhesion"})
-    resolved = front <= 1.0
+    plain = {key: value for key, value in job.items() if key != "adhesion"}
+    steps, without = sticking.count(job), sticking.count(plain)
+    exact = sticking.as_exact(job, plain, steps)
+    resolved = steps.front <= 1.0
     assert resolved.sum() >= 5
-    assert not still.any()
-    assert 0.5 < calls[resolved].sum() / without[resolved].sum() < 3.0
+    assert not without.front.any()
+    for others, limit in ((exact, 3.0), (without, most)):
+        assert 0.5 < steps.calls[resolved].sum() / others.calls[resolved].sum() < limit
+    own, allowed = (one.errors(sticking.count(each, 2e-5)) for one, each in ((exact, plain), (steps, job)))
+    assert own[0] <= allowed[0]
+    assert own[1] <= allowed[1]
