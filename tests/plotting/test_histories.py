@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from drawing import ELASTIC, KINDS, LOADS, SLIDE, SPHERE, WAVE, ZENER, panels, ran
+from drawing import ELASTIC, KINDS, SLIDE, SPHERE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
@@ -94,16 +94,6 @@ def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:
     (out / "fields.h5").write_bytes(b"")
     plots.plot([out])
     assert panels(drawn[1]) == KINDS["creep"][1][:-3]
-
-
-def test_moved_heights_are_not_needed(tmp_path: Path) -> None:
-    np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(32, 32)))
-    surface = WAVE.replace(
-        "{shape: wave, amplitude: 1.0e-6, waves: [1, 1]}", "{shape: file, path: road.npy, scale: 1.0e-7}"
-    )
-    out = ran(tmp_path, surface + ELASTIC + LOADS)
-    (tmp_path / "road.npy").unlink()
-    assert plots.plot([out])[0].exists()
 
 
 def test_directory_without_a_run(tmp_path: Path) -> None:

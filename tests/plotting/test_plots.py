@@ -12,7 +12,6 @@ from drawing import (
     FRACTION,
     FRICTION,
     KINDS,
-    LOADS,
     PEAK,
     SLIDE,
     SPHERE,
@@ -254,17 +253,6 @@ def test_cases_of_a_sweep_are_told_apart_by_their_keys(tmp_path: Path, drawn: li
         assert asked(*chosen, "--compare", "--out", tmp_path / "both.png") == 0
         texts = drawn.pop().legends[0].get_texts()
         assert [text.get_text() for text in texts] == [f"{name}, 1.04 kPa" for name in expected]
-
-
-def test_all_maps_that_were_saved(tmp_path: Path, drawn: list[Figure]) -> None:
-    """The heights too; their mean is part of them."""
-    fields = "output: {fields: [pressure, displacement, gap, height]}\n"
-    assert asked(ran(tmp_path, WAVE + ELASTIC + LOADS + fields), "--panels", "maps") == 0
-    assert [axes.get_title().split("\n")[0] for axes in drawn[0].axes if axes.get_xlabel()] == [
-        "pressure",
-        "gap (contact black)",
-        "height (up is into the body)",
-    ]
 
 
 def test_table_without_a_column(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -162,14 +162,6 @@ def test_a_saved_state_is_a_checkpoint(nowhere: Path) -> None:
         pc.Simulation.restore("job.yaml", comm=MPI.COMM_SELF)
 
 
-def test_run_in_memory(nowhere: Path) -> None:
-    run = pc.Simulation(JOB, comm=MPI.COMM_SELF)
-    assert run.run().step == STEPS
-    assert run.finished
-    assert list(nowhere.iterdir()) == []
-    assert list(run.steps()) == []
-
-
 def test_run_with_files(nowhere: Path) -> None:
     """A job that names a directory runs as on the command line; run again it has nothing to do, and knows the end."""
     job = JOB | {"output": {"directory": "here", "fields": ["pressure"]}}

@@ -46,16 +46,6 @@ def test_pressure_force_and_approach_agree(bumps: Path, boundary: str) -> None:
     assert_allclose(moved.measures.pressure, 5e3, rtol=1e-7)
 
 
-def test_approach_out_of_reach_leaves_no_contact(bumps: Path) -> None:
-    """Pressed, then lifted by more than the surface is high."""
-    pressed, lifted = run(bumps, "history=[{pressure: 5.0e3}, {approach: -1.0e-5}]")
-    assert pressed[0].measures.contact_area > 0.1
-    assert lifted[0].measures.contact_area == 0.0
-    assert lifted[0].measures.pressure == 0.0
-    assert lifted[0].measures.friction == 0.0
-    assert lifted[1]["gap"].min() > 0.0
-
-
 def test_zero_load_after_contact(bumps: Path) -> None:
     """The surface just touches: no pressure, and the smallest gap is 0."""
     steps = run(bumps, "history=[{pressure: 5.0e3}, {pressure: 0.0}]")

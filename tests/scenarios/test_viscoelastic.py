@@ -98,61 +98,6 @@ def test_retraction(rise: float) -> None:
     assert column(rows, "approach")[t > lift_off].max() > 0.05 * depth  # no contact, and yet below the surface
 
 
-# time [ms], whether after a jump, force [N], approach [um], radius [mm], pressure [kPa] and displacement [um] in the
-# middle; computed with axisymmetric rings, good to 1e-3 and, the radius, to 5 um
-UNLOADED = [
-    (0.0, True, 0.15, 21.869, 0.470, 327.5, 21.869),
-    (10.0, False, 0.15, 77.618, 0.882, 72.39, 77.618),
-    (10.0, True, 0.0, None, 0.0, 0.0, 67.231),
-    (11.97, False, 0.0, None, 0.0, 0.0, 55.219),
-    (14.98, False, 0.0, None, 0.0, 0.0, 40.852),
-    (20.0, False, 0.0, None, 0.0, 0.0, 24.754),
-    (20.0, True, 0.15, 43.877, 0.537, 250.4, 43.877),
-    (20.97, False, 0.15, 51.531, 0.647, 153.4, 51.530),
-    (30.22, False, 0.15, 83.887, 0.915, 71.45, 83.887),
-    (50.0, False, 0.15, 99.10, 0.997, 70.57, 99.10),
-]
-HALVED = [
-    (10.0, True, 0.075, 73.630, 0.795, 56.04, 73.630),
-    (14.98, False, 0.075, 69.831, 0.800, 56.00, 69.830),
-    (20.0, False, 0.075, 67.512, 0.800, 56.00, 67.512),
-    (20.0, True, 0.15, 71.678, 0.839, 73.83, 71.678),
-    (30.22, False, 0.15, 91.347, 0.958, 70.81, 91.347),
-    (50.0, False, 0.15, 100.1, 1.000, 70.56, 100.09),
-]
-
-
-@pytest.mark.parametrize(("between", "table"), [(0.0, UNLOADED), (0.075, HALVED)])
-def test_unloading_and_loading_again(between: float, table: list[tuple[Any, ...]]) -> None:
-    """No load at all is a state in which the body recovers; all within 1 %."""
-    steps = {"first": 1e-4, "growth": 1.05}
-    loads = [(0.15, 1e-2), (between, 1e-2), (0.15, 3e-2)]
-    history = [{"force": load, "duration": duration, "time_step": steps} for load, duration in loads]
-    found: list[tuple[float, ...]] = []
-
-    def keep(march: March) -> None:
-        m, middle = march.row.measures, (64, 64)
-        radius = float(contact_radius(march, np.array(m.contact_area)))
-        fields = (float(march.field(name)[middle]) if march.row.step else 0.0 for name in ("pressure", "displacement"))
-        load = float(force(march, np.array(m.pressure)))
-        found.append((1e3 * march.row.time, load, 1e6 * m.approach, 1e3 * radius, *fields))
-
-    marched(sphere(128, 3e-3, history), [keep])
-    numbers = np.array(found)[1:] * [1, 1, 1, 1, 1e-3, 1e6]
-    for t, after_jump, *expected in table:
-        there = np.flatnonzero(np.abs(numbers[:, 0] - t) < 1e-6)
-        if there.size:
-            row = numbers[there[-1 if after_jump else 0]]
-        else:
-            row = np.array([np.interp(t, numbers[:, 0], values) for values in numbers.T])
-        for value, wanted in zip(row[1:], expected, strict=True):
-            assert wanted is None or value == pytest.approx(wanted, rel=1e-2, abs=1e-9)
-    recovery = numbers[(numbers[:, 0] > 10.01) & (numbers[:, 0] < 20.0)]
-    if between == 0.0:  # every point decays with the creep time
-        decay = recovery[:, -1] * np.exp(recovery[:, 0] / (1e3 * LONG))
-        assert_allclose(decay, decay[0], rtol=2e-3)
-
-
 def test_no_load_on_a_body_at_rest() -> None:
     """Nothing happens, and nothing is undefined."""
     history = [{"force": 0.0, "duration": 1e-3, "time_step": 5e-4}, {"force": FORCE}]

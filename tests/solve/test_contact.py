@@ -166,14 +166,6 @@ def test_no_load() -> None:
     assert touching.iterations == 0
 
 
-def test_flat_surface() -> None:
-    h = np.full((12, 16), 3.0)
-    flat = solve(h, 0.7, tolerance=TIGHT)
-    assert flat.iterations == 0
-    assert_allclose(flat.p, 0.7, rtol=1e-15)
-    assert_allclose(flat.d, -3.0, rtol=1e-15)
-
-
 def test_periodic_approach_beyond_full_contact_fails() -> None:
     """There is no such state of a periodic body (a march refuses it before); the solver ends and says so."""
     h = rough(48)

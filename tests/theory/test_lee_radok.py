@@ -71,18 +71,6 @@ def test_load_step_pressure_carries_the_force_over_twelve_decades(time: float) -
     assert_allclose(carried(time, TWELVE_DECADES), FORCE, rtol=2e-3)
 
 
-def test_load_step_pressure_by_small_steps() -> None:
-    """The history integral as a plain sum over small rises, each relaxing: second order in their size."""
-    time, r = 4e-3, np.array([0.0, 0.5, 1.0, 1.3]) * HERTZ_RADIUS
-    s = np.linspace(0, time, 20001)
-    radii = lee_radok.load_step_contact_radius(s, FORCE, RADIUS, *ZENER)
-    chords = np.sqrt(np.maximum(radii**2 - r[:, None] ** 2, 0))
-    rises = np.diff(chords, axis=1, prepend=0)
-    moduli = relaxation(time - np.append(0, (s[1:] + s[:-1]) / 2), *ZENER)
-    summed = 8 / (np.pi * RADIUS) * rises @ moduli
-    assert_allclose(lee_radok.load_step_pressure(r, time, FORCE, RADIUS, *ZENER), summed, rtol=1e-5)
-
-
 def test_displacement_step() -> None:
     """50 um held; printed to 6 digits."""
     times = np.array([0, 1e-3, 1.0])

@@ -33,20 +33,6 @@ PRESSURES = [  # p0 (Pa), A/A0 and mu for gamma 0.45 and 1, at 0.3 m/s
     (3.0e6, 0.85144, 0.0054949, 0.0057069),
     (10.0e6, 1.0, 0.0017788, 0.0017788),
 ]
-# distance (um), mu, A/A0 after a step of velocity from 0.01 to 3 m/s; distances are printed to three digits
-STEP = [
-    (0.0, 0.0073373, 0.18829),
-    (0.0264, 0.0095681, 0.14134),
-    (0.079, 0.01155, 0.097411),
-    (0.236, 0.013674, 0.055262),
-    (0.705, 0.015097, 0.029297),
-    (2.1, 0.015357, 0.0158),
-    (6.28, 0.013357, 0.012129),
-    (18.8, 0.010694, 0.012941),
-    (56.1, 0.0086632, 0.013386),
-    (167.0, 0.0079, 0.013591),
-    (500.0, 0.0083505, 0.01363),
-]
 
 
 def spectrum(k: np.ndarray) -> np.ndarray:
@@ -57,12 +43,6 @@ def spectrum(k: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def road() -> Rings:
     return rings_of_spectrum(spectrum, K_LONG, K_SHORT)
-
-
-@pytest.fixture(scope="module")
-def long_road() -> Rings:
-    """For slides of 0.5 mm."""
-    return rings_of_spectrum(spectrum, K_LONG, K_SHORT, 5e-4)
 
 
 def steady(rings: Rings, v: float) -> np.ndarray:
@@ -136,16 +116,6 @@ def test_kinks() -> None:
     exact = 1e-21 * (plateau + k_rolloff**4 * ((K_SHORT / k_rolloff) ** 0.2 - 1) / 0.2) / (2 * np.pi)
     square = np.sum(np.abs(rings.waves.amplitude) ** 2 * (rings.waves.kx**2 + rings.waves.ky**2)) / 2
     assert_allclose(square, exact, rtol=1e-9)
-
-
-@pytest.mark.parametrize("row", STEP)
-def test_step_of_velocity(long_road: Rings, row: tuple[float, ...]) -> None:
-    """The table's panels err by 1e-3 in friction at 3 m/s, and its distances are rounded to 3 digits."""
-    distance, mu, area = row
-    before, after = (full_contact.frequency(long_road.waves.kx, long_road.waves.ky, v, 0.0) for v in (0.01, 3.0))
-    modulus = full_contact.velocity_step_modulus([1e-6 * distance / 3.0], before, after, *TWELVE_DECADES)
-    assert_allclose(persson.friction_coefficient(PRESSURE, long_road, 3.0, 0.0, modulus), [mu], rtol=2e-3)
-    assert_allclose(persson.contact_area(PRESSURE, long_road, modulus), [area], rtol=2e-3)
 
 
 @pytest.mark.parametrize("pressure", [1e3, 1e4, 1e5])

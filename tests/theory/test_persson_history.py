@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER
 
-from parcontact.theory import full_contact, persson
+from parcontact.theory import full_contact
 from parcontact.theory.full_contact import Waves
 from parcontact.theory.persson_history import CHUNK, Leg, Memory, Outcome, follow
 from parcontact.theory.persson_rings import Rings, rings_of_spectrum, rings_of_surface
@@ -166,19 +166,3 @@ def test_tyre(small_road: Rings, velocity: float, highest: float, where: float) 
     friction = sliding.friction(np.full(41, PRESSURE))
     assert_allclose(friction.max(), highest, rtol=2e-3)
     assert_allclose(1e6 * distances[friction.argmax()], where, atol=0.1)
-
-
-@pytest.mark.parametrize(("velocity", "end"), [(1.0, 0.00869), (3.0, 0.00836)])
-def test_tyre_at_the_end_of_its_slide(road: Rings, velocity: float, end: float) -> None:
-    sliding = tyre(road, velocity, np.array([5e-4]))[1]
-    assert_allclose(sliding.friction(np.array([PRESSURE])), end, rtol=2e-3)
-
-
-def test_persson_of_a_step_is_that_of_full_contacts_modulus(small_road: Rings) -> None:
-    memory = Memory(small_road, TWELVE_DECADES)
-    memory.slide_for_ever((0.01, 0.0))
-    before, after = (full_contact.frequency(small_road.waves.kx, 0.0, v, 0.0) for v in (0.01, 3.0))
-    (found,) = follow(memory, [at((3.0, 0.0), np.array([5e-7]), PRESSURE)])
-    modulus = full_contact.velocity_step_modulus([5e-7], before, after, *TWELVE_DECADES)
-    assert_allclose(found.traction, persson.traction(PRESSURE, small_road, modulus), rtol=1e-9, atol=1e-9)
-    assert_allclose(found.contact_area, persson.contact_area(PRESSURE, small_road, modulus), rtol=1e-10)
