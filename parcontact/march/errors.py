@@ -109,27 +109,27 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
     points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
     prony = None if branches is None else branches.prony
     run = properties_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
-    pair, look = _look(scene, observations.pair, solved)
+    pair, integrators = _compare_integrators(scene, observations.pair, solved)
     views, apart = _compare_views(scene, observations.views, solved)
     observations = Observations(pair, views)
     if measures.contact_area == 0.0:
-        still = StepObservation(0.0, look.difference, look.order, 0.0, 0.0, 0.0, 0.0)
+        still = StepObservation(0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0)
         return Estimate(None, time_error(run, still, points), observations)
     observed = StepObservation(
-        certificate.complementarity,
-        look.difference,
-        look.order,
-        look.slope * (scene.units.height / scene.units.length),
-        measures.friction,
-        measures.contact_area,
-        measures.contact_area_corrected,
-        _cells_slid(run, step, (grid.dx, grid.dy)),
-        step.dt,
-        max(certificate.members / measures.contact_area - 1.0, 0.0),
-        look.angle,
-        apart,
-        measures.friction_interface,
-        step.velocity,
+        complementarity=certificate.complementarity,
+        difference=integrators.difference,
+        order=integrators.order,
+        slope=integrators.slope * (scene.units.height / scene.units.length),
+        friction=measures.friction,
+        area=measures.contact_area,
+        corrected=measures.contact_area_corrected,
+        slid=_cells_slid(run, step, (grid.dx, grid.dy)),
+        seconds=step.dt,
+        penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
+        angle=integrators.angle,
+        views_apart=apart,
+        interface=measures.friction_interface,
+        way=step.velocity,
     )
     time = time_error(run, observed, points)
     return Estimate(estimate(run, observed, points, time), time, observations)
@@ -141,7 +141,9 @@ def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> fl
     return math.hypot(step.velocity[0] / dx, step.velocity[1] / dy) * step.dt
 
 
-def _look(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObservation, IntegratorDifference]:
+def _compare_integrators(
+    scene: Scene, last: LastObservation, solved: Solved
+) -> tuple[LastObservation, IntegratorDifference]:
     """Return what the pair shows of a step, or of the one like it that was looked at last; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
     branches = scene.material.branched
@@ -158,8 +160,8 @@ def _look(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObse
         if solved.stuck is not None:  # tension counts as pressure does
             pressure = np.abs(contact.p)
             load = scene.slab.sum(float(pressure.sum()))[0]
-        look = pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
-        now = LastObservation.of(step, *astuple(look))
+        found = pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
+        now = LastObservation.of(step, *astuple(found))
     return now, IntegratorDifference(*now.observed)
 
 

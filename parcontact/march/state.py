@@ -189,20 +189,20 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         of_stuck = part_of("sticking", saved)
         row = replace(row, measures=sticking.restored_measures(of_stuck))
         stuck = sticking.restored(stuck, of_stuck, sticking.came_off(contents, scene.job))
-    found = State(
-        row,
-        _restored_pasts(state.pasts, saved),
-        state.spare,
-        scene.material.restored(state.body, part_of("material", saved)),
-        energy,
-        float(saved["contact/approach"]),
-        StartStatistics.restored(saved),
-        Observations.restored(saved),
-        ErrorSums.restored(saved),
-        None if state.chosen is None else ChosenSteps.of(scene.job, saved),
-        stuck,
-        StepTolerance.restored(saved),
-        rounding.restored(saved),
+    found = replace(
+        state,
+        row=row,
+        pasts=_restored_pasts(state.pasts, saved),
+        body=scene.material.restored(state.body, part_of("material", saved)),
+        energy=energy,
+        approach=float(saved["contact/approach"]),
+        starts=StartStatistics.restored(saved),
+        observations=Observations.restored(saved),
+        errors=ErrorSums.restored(saved),
+        chosen=None if state.chosen is None else ChosenSteps.of(scene.job, saved),
+        sticking=stuck,
+        tolerance=StepTolerance.restored(saved),
+        rounding=rounding.restored(saved),
     )
     return completed(scene, found)
 

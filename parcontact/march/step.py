@@ -62,20 +62,19 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         errors=errors.budget,
         added=values_of(scene.followers),
     )
-    return State(
-        row,
-        (Past(contact.p, solved.trial.alpha, step.position), *state.pasts[:-1]),
-        state.pasts[-1].pressure,
-        solved.body,
-        energy,
-        contact.d,
-        state.starts.after(solved.moved_start, contact.iterations),
-        errors.observations,
-        state.errors,
-        state.chosen,
-        None if solved.stuck is None else solved.stuck.memory,
-        state.tolerance.after(scene, contact, errors.budget),
-        solved.rounding,
+    return replace(
+        state,
+        row=row,
+        pasts=(Past(contact.p, solved.trial.alpha, step.position), *state.pasts[:-1]),
+        spare=state.pasts[-1].pressure,
+        body=solved.body,
+        energy=energy,
+        approach=contact.d,
+        starts=state.starts.after(solved.moved_start, contact.iterations),
+        observations=errors.observations,
+        sticking=None if solved.stuck is None else solved.stuck.memory,
+        tolerance=state.tolerance.after(scene, contact, errors.budget),
+        rounding=solved.rounding,
     )
 
 
