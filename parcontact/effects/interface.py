@@ -52,15 +52,17 @@ def interface_of(section: Interface | None, time_factor: float) -> InterfaceFric
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
-    """Return the friction of the body, along the velocity, and that of the interface."""
-    speed = math.hypot(*velocity)
-    opposing = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / speed if speed else 0.0
-    whole = opposing / measures.normal_force if measures.normal_force > 0.0 else 0.0
-    return whole - measures.friction_interface, measures.friction_interface
+    """Return what the body and the interface make of friction: their forces in the direction of both together, over the
+    normal force. The part of one is negative where its force is against the whole, as the interface's may be after a
+    reversal."""
+    scale = math.hypot(measures.force_x, measures.force_y) * math.hypot(*velocity)
+    along = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / scale if scale else 0.0
+    own = along * measures.friction_interface
+    return measures.friction - own, own
 
 
 class InterfaceColumns(Effect):
-    """Columns of the friction of the body, along the velocity (positive where it opposes it), and of the interface."""
+    """Columns of the parts of friction that the body and the interface make, which add up to it."""
 
     section: ClassVar[type[Part]] = Interface
     columns: ClassVar[tuple[str, ...]] = ("friction_viscous", "friction_interface")

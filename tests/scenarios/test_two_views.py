@@ -44,13 +44,14 @@ def test_friction_by_energy_on_coarse_meshes(
     hurst: float, slope: float, body: Json, pressure: float, velocity: float
 ) -> None:
     """Within 3 % with 4 cells per shortest wave, 1 % with 8, of that with 32; its estimate is at least half of its
-    error, beside what the solver may make of both (2e-4)."""
+    error, beside what the solver may make of both (2e-4). The force across is small: `friction_slopes` counts it."""
     exact = steady(scene(32, body, hurst, slope), velocity, pressure).friction[0]
     for cells, bound in ((4, 3e-2), (8, 1e-2)):
         found = steady(scene(cells, body, hurst, slope), velocity, pressure)
         error = abs(found.friction[0] / exact - 1.0)
         assert error < bound
         assert found.error_friction[0] > 0.5 * error - 2e-4
+        assert 0.97 < abs(found.force_x[0]) / np.hypot(found.force_x[0], found.force_y[0])
 
 
 @pytest.mark.parametrize("direction", [[1.0, 0.0], [0.6, 0.8]])
@@ -61,6 +62,16 @@ def test_it_is_the_power_over_the_velocity(direction: list[float]) -> None:
     found = pc.steady(scene(8, ONE, steady=section, numerics={"accuracy": 0.1}))
     friction = found.power[0].sum() / (0.2 * 1e5 * 1e-6)
     assert found.friction[0] == pytest.approx(friction, rel=1e-12 if direction[1] == 0.0 else 1e-3)
+
+
+@pytest.mark.parametrize("across", [0, 1, 4])
+def test_only_friction_by_slopes_counts_the_force_across(across: int) -> None:
+    """In full contact the force is along the waves, at an angle with the sliding; that by energy has its cosine."""
+    wave = {"shape": "wave", "amplitude": 1e-6, "waves": [2, across]}
+    found = steady({**scene(1, ONE), "surface": wave}, 0.1, 5e5)
+    assert found.contact_area[0] == 1.0
+    cosine = 2.0 / np.hypot(2.0, across)
+    assert found.friction[0] / found.friction_slopes[0] == pytest.approx(cosine, rel=1e-9)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
