@@ -28,10 +28,6 @@ def _floats(text: str) -> tuple[float, ...]:
     return tuple(map(float, text.split(",")))
 
 
-def _counts(text: str) -> tuple[int, ...]:
-    return tuple(map(int, text.split(",")))
-
-
 def wall_seconds(text: str) -> float:
     """Seconds of [[HH:]MM:]SS, or with days in front as in Slurm, D-HH:MM:SS; 0 for other text."""
     days, dash, rest = text.rpartition("-")
@@ -48,7 +44,9 @@ def wall_seconds(text: str) -> float:
 seconds = checked(float, lambda value: 0.0 <= value < INFINITE, "a time [s] of zero or more")
 wall = checked(wall_seconds, lambda value: 0.0 < value < INFINITE, "a wall time HH:MM:SS")
 natural = checked(int, lambda value: value >= 0, "a whole number of zero or more")
-counts = checked(_counts, lambda values: min(values) > 0, "positive whole numbers")
+counts = checked(
+    lambda text: tuple(map(int, text.split(","))), lambda values: min(values) > 0, "positive whole numbers"
+)
 positive = checked(float, lambda value: 0.0 < value < INFINITE, "a positive number")
 share = checked(float, lambda value: 0.0 <= value <= 1.0, "a number from 0 to 1")
 poisson = checked(float, lambda value: -1.0 < value <= 0.5, "a Poisson ratio above -1 and up to 0.5")

@@ -1,7 +1,6 @@
 """The job that a run has left in its directory with every default: as far as pictures and texts show it."""
 
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
 
@@ -20,12 +19,10 @@ def shown_job(path: Path) -> Job:
     try:
         data = yamltext.parse(path.read_bytes(), str(path)).data
         data = {name: data[name] for name in SHOWN if name in data}
-        data["surface"] = [{"shape": "flat"} if _comes_from_a_file(shape) else shape for shape in data["surface"]]
+        data["surface"] = [
+            {"shape": "flat"} if shape["shape"] in FILES or "spectrum" in shape else shape for shape in data["surface"]
+        ]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
         raise InputError(f"{path} cannot be read: {reason}") from error
-
-
-def _comes_from_a_file(shape: dict[str, Any]) -> bool:
-    return shape["shape"] in FILES or "spectrum" in shape

@@ -55,7 +55,7 @@ def _public(kind: type) -> list[str]:
 
 def _parameters(found: Any) -> str:
     """Return parameters as in a call: `(job, set=None)`; '' of attributes, results and errors, which nobody calls."""
-    if not callable(found) or is_dataclass(found) or _is(found, Exception):
+    if not callable(found) or is_dataclass(found) or (isinstance(found, type) and issubclass(found, Exception)):
         return ""
     signature = inspect.signature(found)
     plain = [
@@ -64,7 +64,3 @@ def _parameters(found: Any) -> str:
         if name not in ("self", "cls")
     ]
     return str(signature.replace(parameters=plain, return_annotation=signature.empty))
-
-
-def _is(found: Any, kind: type) -> bool:
-    return isinstance(found, type) and issubclass(found, kind)

@@ -40,7 +40,7 @@ def heading(section: Section) -> str:
 
 def _section(section: Section) -> Iterator[str]:
     yield f"\n## {heading(section)}\n"
-    yield f"{_formatted(section.part.__doc__)}\n"
+    yield f"{' '.join((section.part.__doc__ or '').split())}\n"
     for word in section.part.one_of:
         yield f"Exactly one of {_words(word)} is given.\n"
     for word in section.part.at_most_one:
@@ -65,7 +65,3 @@ def _words(words: tuple[str, ...]) -> str:
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _formatted(text: str | None) -> str:
-    return " ".join((text or "").split())

@@ -16,7 +16,6 @@ Only stages whose time steps grow are ended so: who gives one time step asks for
 import math
 
 from ..history.timeline import Span, Step, Timeline
-from ..parallel.slab import Array
 from ..physics.body import ZenerBody, surface_of
 from ..scene import Scene
 from .choosing import StepChooser
@@ -62,14 +61,11 @@ def remaining(scene: Scene, state: State, body: ZenerBody, seconds: float) -> fl
     and the surface's height; over the latter where nothing is pressed; collective."""
     body.settle(state.body)
     share, modulus = body.relaxation_in(seconds)
-    sizes = [_largest(field) for field in (*state.body.branches, surface_of(state.body), state.pressure)]
+    fields = *state.body.branches, surface_of(state.body), state.pressure
+    sizes = [max(float(field.max(initial=0.0)), -float(field.min(initial=0.0))) for field in fields]
     *branches, u, p = scene.slab.reduce((), sizes)
     lacking, height = float(share @ branches), scene.solver.height
     if lacking == 0.0:
         return 0.0
     scale = modulus * (min(u, height) if p > 0.0 else height)
     return lacking / scale if scale > 0.0 else math.inf
-
-
-def _largest(field: Array) -> float:
-    return max(float(field.max(initial=0.0)), -float(field.min(initial=0.0)))

@@ -114,25 +114,20 @@ def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
 
 def _scaled(sample: Sample, own: Job, job: Job) -> Sample:
     """A sample of the own job as one of the job at another accuracy."""
-    times = _calls(own, job)
+    times = float(CALLS_PER_DECADE ** math.log10(own.numerics.tolerance / job.numerics.tolerance))
     if not own.history:
         return replace(sample, stages=tuple(_with_calls(stage, times) for stage in sample.stages))
     order = TIME_ORDER if own.numerics.integrator == "exponential" else 1.0
     waves = (shortest_wave(sample.job) or 1.0) / (shortest_wave(own) or 1.0)
     stages = []
-    for cost, tried, span in zip(sample.stages, _tried_counts(sample, own), Timeline.of(own).spans, strict=True):
+    spans = Timeline.of(sample.job).spans, Timeline.of(own).spans
+    for cost, tried, span in zip(sample.stages, *spans, strict=True):
         share = CHOSEN_SHARE if isinstance(span.ends, ChosenEnds) else TIME_SHARE
         error = time_error(cost, sample) / (share * job.numerics.asked.of_steps)
-        more = max(error ** (1.0 / order) * tried * waves, 1.0 / LONGER)
+        more = max(error ** (1.0 / order) * (tried.count / max(span.count, 1)) * waves, 1.0 / LONGER)
         count, between = steps_of(span.stage, cost.steps - span.jumps, more, own, job)
         stages.append(_with_calls(replace(cost, steps=count + span.jumps), times * between))
     return replace(sample, stages=tuple(stages))
-
-
-def _tried_counts(sample: Sample, own: Job) -> Iterator[float]:
-    """Steps of each stage on the grid of the sample, over those on the own one."""
-    for tried, span in zip(Timeline.of(sample.job).spans, Timeline.of(own).spans, strict=True):
-        yield tried.count / max(span.count, 1)
 
 
 def time_error(cost: StageCost, sample: Sample) -> float:
@@ -158,11 +153,6 @@ def steps_of(stage: Stage, count: int, more: float, own: Job, job: Job) -> tuple
     cells = 1.0 / math.ceil(max(1.0, cell / (longest * stage.speed)) * (1.0 - SAME))
     whole = way >= count * before * (1.0 - SAME)
     return math.ceil(way / (cells * cell) * (1.0 - SAME)), BETWEEN_CELLS if cells < 1.0 and whole else 1.0
-
-
-def _calls(own: Job, job: Job) -> float:
-    """Return the calls of a solve to the tolerance of a job over those of the own one."""
-    return float(CALLS_PER_DECADE ** math.log10(own.numerics.tolerance / job.numerics.tolerance))
 
 
 def _with_calls(cost: StageCost, times: float) -> StageCost:

@@ -117,7 +117,7 @@ def _draw_moduli(top: Axes, bottom: Axes, compound: Compound) -> None:
 
 
 def _draw_shift(axes: Axes, compound: Compound) -> None:
-    temperatures = [each.temperature for each in compound.measured.sets if each.temperature is not None]
+    temperatures = compound.measured.temperatures
     if compound.shift is None or not temperatures:
         axes.set_axis_off()
         return

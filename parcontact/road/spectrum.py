@@ -20,8 +20,8 @@ from ..datafiles import read_lines
 from ..errors import InputError
 from ..job import RoughSpectrum
 from ..parallel.slab import Array
+from .map_files import UNITS
 
-LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
 FEWEST = 3  # accuracy: rows of numbers
 ABEL_NODES = 12  # accuracy: of Gauss' rule, in each piece of Abel's integral
@@ -84,10 +84,10 @@ def _read(path: Path) -> tuple[Array, Array, int]:
 def _header(path: Path, number: int, cells: list[str]) -> tuple[tuple[float, float], int]:
     """Factors that make SI units of both columns, and the power of m in that of the spectrum."""
     found = HEADER.fullmatch(" ".join(cells))
-    if not found or not {found[1], found[3]} <= LENGTHS.keys() or int(found[4]) != POWERS[found[2]]:
+    if not found or not {found[1], found[3]} <= UNITS.keys() or int(found[4]) != POWERS[found[2]]:
         raise InputError(f"{path}, line {number}: {FORMS} were expected, got {' '.join(cells)[:60]!r}")
     power = POWERS[found[2]]
-    return (1.0 / LENGTHS[found[1]], LENGTHS[found[3]] ** power), power
+    return (1.0 / UNITS[found[1]], UNITS[found[3]] ** power), power
 
 
 def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:

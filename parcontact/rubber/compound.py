@@ -39,7 +39,7 @@ class Compound:
     def material(self) -> dict[str, Any]:
         """The material section of a job."""
         pairs = zip(self.series.moduli, self.series.times, strict=True)
-        degrees = self.temperatures
+        degrees = self.measured.temperatures
         return {
             "model": "zener",
             "poisson": self.poisson,
@@ -49,11 +49,6 @@ class Compound:
             "band": _rounded([rate / (2 * math.pi) for rate in self.series.band]),
             **({"temperatures": _rounded([min(degrees), max(degrees)])} if self.shift and degrees else {}),
         }
-
-    @property
-    def temperatures(self) -> list[float]:
-        """At which the table was measured [deg C], rising; none if it does not say."""
-        return [each.temperature for each in self.measured.sets if each.temperature is not None]
 
     @property
     def _weighed(self) -> str:
@@ -85,12 +80,12 @@ class Compound:
         if self.shift is None or not self.joined:
             return
         sign = 1.0 if self.measured.kind == "frequency" else -1.0
-        logs = [sign * self.shift.log_factor(t) for t in self.temperatures]
+        logs = [sign * self.shift.log_factor(t) for t in self.measured.temperatures]
         ends = [
             (math.log10(each.at.min()) + log, math.log10(each.at.max()) + log)
             for each, log in zip(self.measured.sets, logs, strict=True)
         ]
-        for (one, mine), (other, its) in pairwise(zip(self.temperatures, ends, strict=True)):
+        for (one, mine), (other, its) in pairwise(zip(self.measured.temperatures, ends, strict=True)):
             gap = max(mine[0], its[0]) - min(mine[1], its[1])
             if gap > WIDE_GAP:
                 yield (
@@ -104,7 +99,7 @@ class Compound:
         series, shift, section = self.series, self.shift, self.material()
         to = f", shifted to {shift.reference:g} C" if shift is not None else ""
         kind = "Young's moduli, divided by 2 (1 + poisson)," if self.measured.tension else "shear moduli"
-        temperatures = self.temperatures
+        temperatures = self.measured.temperatures
         noise = (
             ""
             if math.isnan(series.scatter)
@@ -134,7 +129,7 @@ def fitted(
     from . import series, tables  # scipy is for fits only
 
     measured = tables.read(path, poisson)
-    temperatures = [each.temperature for each in measured.sets if each.temperature is not None]
+    temperatures = measured.temperatures
     shift: Shift | None = None
     if not isinstance(law, str):
         shift = law

@@ -153,8 +153,7 @@ def find_shift(measured: Measurement, reference: float, law: str, weigh: Weigh =
     The constants of a law are those for which one Prony series meets all sets best; free factors move each set until it
     overlaps best with its neighbour. Raises InputError where the sets are too few or do not overlap.
     """
-    temperatures = [each.temperature for each in measured.sets]
-    known = [value for value in temperatures if value is not None]
+    known = measured.temperatures
     if len(known) < 2:
         raise InputError(f"{measured.path}: a shift needs sweeps at two temperatures at least")
     if not known[0] <= reference <= known[-1]:
@@ -163,8 +162,10 @@ def find_shift(measured: Measurement, reference: float, law: str, weigh: Weigh =
             f"got {reference:g}"
         )
     if law == "free":
-        return _relative(known, _overlaps(measured), reference)
-    return _fitted(measured, known, WLF_CONSTANTS if law == "wlf" else ENERGIES, reference, weigh)
+        logs = _overlaps(measured)
+        there = float(np.interp(reference, known, logs))
+        return Factors(tuple(known), tuple(float(log - there) for log in logs), reference)
+    return _fitted(measured, WLF_CONSTANTS if law == "wlf" else ENERGIES, reference, weigh)
 
 
 def _overlaps(measured: Measurement) -> list[float]:
@@ -199,14 +200,7 @@ def _apart(colder: Set, warmer: Set, log: float, kind: str) -> float:
     return float(np.mean(squares))
 
 
-def _relative(temperatures: Sequence[float], logs: Sequence[float], reference: float) -> Factors:
-    there = float(np.interp(reference, temperatures, logs))
-    return Factors(tuple(temperatures), tuple(float(log - there) for log in logs), reference)
-
-
-def _fitted(
-    measured: Measurement, temperatures: Sequence[float], ranges: Ranges, reference: float, weigh: Weigh
-) -> Shift:
+def _fitted(measured: Measurement, ranges: Ranges, reference: float, weigh: Weigh) -> Shift:
     """The constants for which one dense series meets all sets best: of a grid, then near to the best of these."""
 
     def law(constants: Array) -> WLF | Arrhenius:
@@ -215,7 +209,7 @@ def _fitted(
 
     def error(constants: Array) -> float:
         try:
-            shifts = [law(constants).log_factor(t) for t in temperatures]
+            shifts = [law(constants).log_factor(t) for t in measured.temperatures]
         except InputError:
             return math.inf
         if max(shifts) - min(shifts) > MOST_DECADES:

@@ -74,6 +74,11 @@ class Measurement:
     tension: bool
     derived: str = ""
 
+    @property
+    def temperatures(self) -> list[float]:
+        """At which it was measured [deg C], rising; none if the file does not say."""
+        return [each.temperature for each in self.sets if each.temperature is not None]
+
 
 class _Column(NamedTuple):
     name: str

@@ -61,7 +61,7 @@ class _Search:
         """The first set: contact and what penetrates. All points with a given approach, a problem that may have no
         solution, become those that would penetrate the undeformed body."""
         self.problem.constraint.mark(self.x, contact.u, self.h, contact.d, self.working)
-        if self.load is None and self._count() == self.slab.points:
+        if self.load is None and self.slab.sum(float(np.count_nonzero(self.working)))[0] == self.slab.points:
             self.working[...] = self.h + self.d > 0.0
 
     def solve_on_set(self, u: Array, goal: float) -> int:
@@ -94,9 +94,6 @@ class _Search:
         return self.problem.constraint.next_set(self.x, u - self.h - self.d, self.working)
 
     # -- parts ---------------------------------------------------------------------------------------------------------
-
-    def _count(self) -> float:
-        return self.slab.sum(float(np.count_nonzero(self.working)))[0]
 
     def _restrict(self, u: Array) -> None:
         """x at a bound outside the set, and the load, if it is given, made up for on it; `u = A x`."""
