@@ -51,7 +51,7 @@ def test_friction_by_energy_on_coarse_meshes(
         error = abs(found.friction[0] / exact - 1.0)
         assert error < bound
         assert found.error_friction[0] > 0.5 * error - 2e-4
-        assert 0.97 < abs(found.force_x[0]) / np.hypot(found.force_x[0], found.force_y[0])
+        assert abs(found.force_x[0]) / np.hypot(found.force_x[0], found.force_y[0]) > 0.97
 
 
 @pytest.mark.parametrize("direction", [[1.0, 0.0], [0.6, 0.8]])
