@@ -5,8 +5,8 @@
 
 Each scene is a steady state of a random rough surface with `--dozens` of its shortest waves along a side: Hurst
 exponents of 0.5 to 1, slopes of 0.01 to 0.2, 1 to 80 % of contact, bodies of one branch or of twelve. Accuracies are
-5, 1 and 0.3 % of friction, and `--area` times as much of the area. True errors are those against 80 cells per shortest
-wave along the sliding and 40 across it, of the area extrapolated from half as many and these.
+5, 1 and 0.3 % of friction, and `--area` times as much of the area. True errors are those against FINEST points along
+each side, of the area extrapolated from half as many and these: 160 cells per shortest wave, or 80 with 24 waves.
 
 A chosen mesh is compared with the cheapest of those with cells up to 4 : 1 and LENGTHS along each side. Errors scatter
 and change signs from mesh to mesh, so that one may be right by luck. A person who looks for a mesh by hand finds out by
@@ -37,7 +37,7 @@ from parcontact.job import load
 
 ACCURACIES = (0.05, 0.01, 0.003)
 SIZE, DOZEN = 1e-3, 12
-FINEST = 80, 40  # cells per shortest wave of the reference, along the sliding and across it
+FINEST = 1920  # points of the reference along a side
 MOST = 1.5  # times the points of the cheapest mesh
 LENGTHS = (32, 48, 64, 80, 96, 128, 160, 192, 240, 288, 384, 480)  # for a dozen of shortest waves
 AREA_ORDER = 1.3
@@ -83,8 +83,7 @@ def trial(
     """Yield what is missed; add the points over those of the cheapest mesh by either definition."""
     job, meshes = scene(asked.seed, number, asked.dozens), meshes_of(asked.dozens)
     solved = cache(partial(steady, job))
-    along, across = (DOZEN * asked.dozens * cells for cells in FINEST)
-    finest, half = solved((along, across)), solved((along // 2, across // 2))
+    finest, half = solved((FINEST, FINEST)), solved((FINEST // 2, FINEST // 2))
     true = finest[0], finest[1] + (finest[1] - half[1]) / (2.0**AREA_ORDER - 1.0)
     print(f"{number}: friction {true[0]:.5f}, area {true[1]:.4f}", flush=True)
 

@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError
 
 from ..errors import InputError
 from .checks import cells
-from .contact_guess import guess
+from .contact_guess import guesses
 from .model import Job, prepared
 from .sections.calculation import Accuracy, Grid, Numerics
 from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
@@ -75,7 +75,7 @@ def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -
     directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
     asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
-    touching = guess(scenery, wave, box.lx * box.ly)
+    touching = guesses(scenery, wave, box.lx * box.ly)
     points = cells.choose(wave, box.size, directions, own, touching)
     dx, dy = (length / n for length, n in zip(box.size, points, strict=True))
     slides = " and ".join(f"({x:.3g}, {y:.3g})" for x, y in directions)
@@ -83,7 +83,7 @@ def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -
         f"mesh: {points[0]} x {points[1]} points, chosen by numerics.accuracy (friction {100 * asked.friction:g} %, "
         f"area {100 * asked.area:g} %): the shortest wave, {wave:.4g} m, has {wave / dx:.3g} cells along x and "
         f"{wave / dy:.3g} along y; {f'the surface slides along {slides}' if slides else 'nothing slides'}, "
-        f"with about {100 * touching.share:.2g} % in contact"
+        f"with about {100 * min(touching).share:.2g} % in contact"
     )
 
 

@@ -1,19 +1,15 @@
 """Cells that the shortest wave of a surface needs along and across the sliding.
 
-Friction and the contact area come from slopes along the sliding: the mesh makes their errors along it, and little
-across. With c cells per shortest wave along the sliding and c' across it the relative errors are at most about
+The mesh makes errors of friction and of the contact area at edges of contact, of two kinds. A body that loses energy
+has a pressure that rises more steeply at one edge of a spot than at the other, the more so the larger the phase of its
+modulus is. The other kind is chance, as edges lie among the points. It is that of a share counted at random: where a
+share A is in contact, ((1 - A)/A)^0.5 is the standard deviation over the mean for one place, and a box with N of the
+shortest waves along a side has N^2 places. `friction_error` and `area_error` have the sums. Of chance, and of that by
+which surfaces differ in the first kind, SURE standard deviations count.
 
-    max(0.1/A, 1)^0.4 (1 - A)^1.5 hypot(few (12/N)^0.5, lossy phi) hypot(along (4/c)^p, across (4/c')^q),
-
-with numbers of their own for friction and area, where a share A is in contact: what is wrong is wrong at edges, and
-light contact is of small spots. Part of the errors is by chance, as edges lie among the points: the more spots there
-are in a box with N of the shortest waves along a side, the better they average out. The rest is by the body that loses
-energy: the phase phi of its modulus, in right angles, is that at the frequency of edges, and the pressure of such a
-body rises more steeply at one edge of a spot than at the other. They were found by experiment, with A and phi as they
-are guessed before (`job.contact_guess`): some 40 steady states of rough surfaces of 1 to 100 % contact with 12 or 24 of
-their shortest waves along a side, on 60 meshes of 2.7 to 40 cells per shortest wave, so that nine of ten keep what is
-asked for. Where sliding is slow (`Guess.slow` is 1, else less) friction has a further error of 0.22 (4/c), times the
-first two factors: edges of contact lose power in waves shorter than the cells. `scripts/chosen_mesh.py` tells how the
+Their numbers were found by experiment, with the share and the phases as they are guessed before (`job.contact_guess`):
+31 steady states of rough surfaces of 2 to 100 % contact with 12 or 24 of their shortest waves along a side, each on
+some 110 meshes of 2 to 80 cells per shortest wave. Fewer waves count as 12. `scripts/chosen_mesh.py` tells how the
 meshes that follow do on others. Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing
 slides, either direction counts as the one along the sliding.
 """
@@ -21,8 +17,8 @@ slides, either direction counts as the one along the sliding.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 from ..sections.calculation import Accuracy, Grid
@@ -30,11 +26,12 @@ from ..sections.stages import Initial, Stage, Steady
 
 Vector = tuple[float, float]
 
-LIGHT, SMALL_SPOTS = 0.1, 0.4  # accuracy: the share in contact below which spots are small, and the power of it
-OPEN = 1.5  # accuracy: power of the share that is open
-FEW, MANY, AVERAGED = 12.0, 36.0, 0.5  # accuracy: waves along a side, within these (12 and 24 tried); their power
+SURE = 1.1  # accuracy: standard deviations, with which nine of ten surfaces keep what is asked for
+FEW = 12.0  # accuracy: waves along a side; fewer were not tried
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: with which more of them are advised for less
+FRICTION_ASIDE, FRICTION_ASIDE_ORDER = 3e-3, 2.5  # accuracy: of four cells across the sliding, and with more
+AREA_ASIDE, AREA_ASIDE_ORDER = 0.0148, 1.1  # accuracy
 ASIDE = 0.25  # accuracy: of a unit vector along an axis, up to which it is across
 LEAST_CELLS = 2.1  # accuracy: per shortest wave; the grid has no waves shorter than two
 LONG = 1.2  # accuracy: cells with such sides are no squares
@@ -45,52 +42,47 @@ SAME = 1e-9  # accuracy: relative: numbers this close are the same
 
 
 class Guess(NamedTuple):
-    """A guess made before anything is solved: the share in contact, the phase of the body's modulus at the frequency of
-    edges, in right angles, how many of the shortest waves a side of the box has, and how `slow` the sliding is, from 0
-    to 1."""
+    """A guess made before anything is solved: the share in contact, the phases of the body's modulus at the frequencies
+    of edges and of cells, in right angles, how many of the shortest waves a side of the box has, and how `slow` the
+    sliding is, from 0 to 1."""
 
     share: float
     phase: float
+    phase_at_cells: float
     waves: float
     slow: float = 0.0
 
     @property
-    def edges(self) -> float:
-        """Return by how much errors are larger than where little is open and spots are large."""
-        return (1.0 - self.share) ** OPEN * max(LIGHT / self.share, 1.0) ** SMALL_SPOTS
+    def spread(self) -> float:
+        """Return the standard deviation over the mean of one place, in contact or not."""
+        return math.sqrt((1.0 - self.share) / self.share)
+
+    @property
+    def few(self) -> float:
+        """Return by how much errors by chance are larger than in a box of FEW waves."""
+        return FEW / max(self.waves, FEW)
 
 
-class Law(NamedTuple):
-    """Errors by the cells along the sliding and across it, with four of each per shortest wave, and their orders; by
-    how much they are larger where waves are few, and in a body that loses energy; what slow sliding adds."""
-
-    along: float
-    order_along: float
-    across: float
-    order_across: float
-    few: float
-    lossy: float
-    slow: float
-
-    def error(self, c: float, across: float, guess: Guess) -> float:
-        """Return the relative error with so many cells along the sliding and across it."""
-        own = math.hypot(self.along * (4.0 / c) ** self.order_along, self.across * (4.0 / across) ** self.order_across)
-        return math.hypot(self.factor(guess) * own, guess.edges * self.slow * guess.slow * 4.0 / c)
-
-    def factor(self, guess: Guess) -> float:
-        """Return by how much errors of fast sliding are larger for what is guessed."""
-        chance = self.few * (FEW / min(max(guess.waves, FEW), MANY)) ** AVERAGED
-        return guess.edges * math.hypot(chance, self.lossy * guess.phase)
-
-    def cells_across(self, error: float) -> float:
-        """Return how many cells across the sliding make this error."""
-        return max(LEAST_CELLS, 4.0 * (self.across / error) ** (1.0 / self.order_across))
+def friction_error(c: float, across: float, guess: Guess) -> float:
+    """Return the relative error of friction that nine of ten surfaces keep with so many cells along the sliding and
+    across it. Where sliding is slow edges lose power in waves shorter than the cells, which is the last part."""
+    along = (4.0 / c) ** 1.5
+    steep = 0.016 * (1.0 - math.exp(-guess.phase / 1.5)) - 0.0004
+    counted = math.hypot((4.0 / c) ** 2.15, 0.13 * (4.0 / across) ** 2.7)
+    chance = guess.few * 0.0034 * (1.0 + 4.6 * guess.phase) * counted
+    unknown = SURE * math.hypot(chance, 0.007 * guess.phase * along)
+    return guess.spread * (abs(steep) * along + unknown + 0.09 * guess.slow * 4.0 / c)
 
 
-FRICTION = Law(0.035, 1.9, 0.003, 2.5, few=0.9, lossy=0.4, slow=0.22)  # accuracy
-AREA = Law(0.055, 1.3, 0.018, 1.1, few=1.15, lossy=0.3, slow=0.0)  # accuracy: of the corrected area
-USUAL_PHASE = 0.25  # accuracy
-TYPICAL = Guess(0.2, USUAL_PHASE, FEW)  # accuracy: where none is known
+def area_error(c: float, across: float, guess: Guess) -> float:
+    """Return the same of the corrected contact area. Cells across the sliding make it too small, those along it too
+    large in a body that loses energy."""
+    along, aside = (4.0 / c) ** 1.34, (4.0 / across) ** 0.7
+    steep = 0.0365 * (1.0 - math.exp(-guess.phase / 0.31)) - 0.0031
+    known = steep * along + (0.0112 * guess.phase_at_cells - 0.0051) * aside
+    counted = math.hypot((4.0 / c) ** 1.05, 0.63 * (4.0 / across) ** 2.1)
+    unknown = SURE * math.hypot(guess.few * 0.006 * counted, 0.0045 * along, 0.0014 * aside)
+    return guess.spread * (abs(known) + unknown)
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:
@@ -110,7 +102,7 @@ def cells_per_wave(accuracy: float) -> int:
 
 def cells_across(accuracy: float) -> float:
     """Return how many it needs across the sliding, for the friction."""
-    return FRICTION.cells_across(accuracy)
+    return max(LEAST_CELLS, 4.0 * (FRICTION_ASIDE / accuracy) ** (1.0 / FRICTION_ASIDE_ORDER))
 
 
 def cells_for_area(accuracy: float) -> float:
@@ -123,7 +115,8 @@ def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[fl
     that slides along these directions (unit vectors); without any as many as along the sliding."""
     if not directions or any(abs(way[axis]) > ASIDE for way in directions):
         return cells_per_wave(asked.friction), cells_for_area(asked.area)
-    return cells_across(asked.friction), AREA.cells_across(asked.area / AREA.factor(TYPICAL))
+    for_area = max(LEAST_CELLS, 4.0 * (AREA_ASIDE / asked.area) ** (1.0 / AREA_ASIDE_ORDER))
+    return cells_across(asked.friction), for_area
 
 
 def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Steady | None) -> list[Vector]:
@@ -155,21 +148,15 @@ def fast_length(least: float) -> int:
 
 
 def choose(
-    wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guess: Guess = TYPICAL
+    wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]
 ) -> tuple[int, int]:
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,
     where it slides along these directions (unit vectors), or nowhere, and touches as is guessed. Of meshes with as many
     points it is the one with the fewest along a side."""
-    along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
-    best = along_x[-1], along_y[-1]
-    for ny in along_y:
-        cells = lambda nx, ny=ny: (wave * nx / size[0], wave * ny / size[1])  # noqa: E731
-        place = bisect_left(along_x, True, key=lambda nx: _fits(*cells(nx), directions, asked, guess))
-        if place < len(along_x):
-            cx, cy = cells(along_x[place])
-            if max(cx, cy) <= LONGEST * min(cx, cy):
-                best = min(best, (along_x[place], ny), key=lambda points: (math.prod(points), max(points)))
-    return best
+    lengths = [_fast_lengths(MOST_CELLS * length / wave) for length in size]
+    meshes = sorted(product(*lengths), key=lambda points: (math.prod(points), max(points)))
+    cells = lambda points: [wave * n / length for n, length in zip(points, size, strict=True)]  # noqa: E731
+    return next((mesh for mesh in meshes if _fits(*cells(mesh), directions, asked, guesses)), meshes[-1])
 
 
 def _fast_lengths(most: float) -> list[int]:
@@ -180,14 +167,14 @@ def _fast_lengths(most: float) -> list[int]:
     return found
 
 
-def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, guess: Guess) -> bool:
+def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]) -> bool:
     """Return whether cells per wave along x and y keep the errors asked for."""
-    if min(cx, cy) < LEAST_CELLS:
+    if min(cx, cy) < LEAST_CELLS or max(cx, cy) > LONGEST * min(cx, cy):
         return False
-    for x, y in directions or ((1.0, 0.0), (0.0, 1.0)):
+    for (x, y), guess in product(directions or ((1.0, 0.0), (0.0, 1.0)), guesses):
         c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-        if AREA.error(c, across, guess) > asked.area:
+        if area_error(c, across, guess) > asked.area:
             return False
-        if directions and FRICTION.error(c, across, guess) > asked.friction:
+        if directions and friction_error(c, across, guess) > asked.friction:
             return False
     return True
