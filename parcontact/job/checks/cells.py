@@ -8,7 +8,7 @@ shortest waves along a side has N^2 places. `friction_error` and `area_error` ha
 which surfaces differ in the first kind, SURE standard deviations count.
 
 Their numbers were found by experiment, with the share and the phases as they are guessed before (`job.contact_guess`):
-31 steady states of rough surfaces of 2 to 100 % contact with 12 or 24 of their shortest waves along a side, each on
+36 steady states of rough surfaces of 2 to 100 % contact with 12 or 24 of their shortest waves along a side, each on
 some 110 meshes of 2 to 80 cells per shortest wave. Fewer waves count as 12. `scripts/chosen_mesh.py` tells how the
 meshes that follow do on others. Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing
 slides, either direction counts as the one along the sliding.
@@ -77,11 +77,11 @@ def friction_error(c: float, across: float, guess: Guess) -> float:
 def area_error(c: float, across: float, guess: Guess) -> float:
     """Return the same of the corrected contact area. Cells across the sliding make it too small, those along it too
     large in a body that loses energy."""
-    along, aside = (4.0 / c) ** 1.34, (4.0 / across) ** 0.7
-    steep = 0.0365 * (1.0 - math.exp(-guess.phase / 0.31)) - 0.0031
-    known = steep * along + (0.0112 * guess.phase_at_cells - 0.0051) * aside
-    counted = math.hypot((4.0 / c) ** 1.05, 0.63 * (4.0 / across) ** 2.1)
-    unknown = SURE * math.hypot(guess.few * 0.006 * counted, 0.0045 * along, 0.0014 * aside)
+    along, aside = (4.0 / c) ** 1.24, (4.0 / across) ** 0.7
+    steep = 0.036 * (1.0 - math.exp(-guess.phase / 0.33)) - 0.0025
+    known = steep * along + (0.019 * guess.phase_at_cells - 0.0106 * guess.phase - 0.0042) * aside
+    counted = math.hypot((4.0 / c) ** 1.02, 0.67 * (4.0 / across) ** 2.2)
+    unknown = SURE * math.hypot(guess.few * 0.006 * counted, 0.005 * along, 0.0011 * aside)
     return guess.spread * (abs(known) + unknown)
 
 
