@@ -52,10 +52,11 @@ def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
     found = []
     for pressure, speed in {load: None for load in _loads(job, area) if load[0] > 0.0}:
         omega = 2.0 * math.pi * speed / wave
-        few, *more = (_modulus(series, times * omega) for times in (FEW, EDGES, FINEST))
+        few, edges, finest = (_modulus(series, times * omega) for times in (FEW, EDGES, FINEST))
         share = _share(pressure, abs(few), job.material.poisson, slope) if slope else UNKNOWN
         slow = _slowness(series, omega) if curve else 0.0
-        found.append(Guess(share, *(2.0 / math.pi * cmath.phase(one) for one in more), waves, slow))
+        phase, at_cells = (2.0 / math.pi * cmath.phase(modulus) for modulus in (edges, finest))
+        found.append(Guess(share, phase, at_cells, waves, slow))
     return found or [Guess(UNKNOWN, USUAL_PHASE, USUAL_PHASE, waves)]
 
 

@@ -37,7 +37,7 @@ def points_of(directory: Path, *changes: str, text: str = AUTO) -> tuple[int, in
 
 def test_more_accuracy_takes_more_points_where_it_pays(tmp_path: Path) -> None:
     coarse = points_of(tmp_path)
-    finer = points_of(tmp_path, "numerics.accuracy.friction=0.01")
+    finer = points_of(tmp_path, "numerics.accuracy.friction=0.001")
     for_area = points_of(tmp_path, "numerics.accuracy.area=0.01")
     assert finer[0] > coarse[0] >= coarse[1]
     assert finer[0] / finer[1] > 2.0

@@ -153,10 +153,10 @@ def choose(
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,
     where it slides along these directions (unit vectors), or nowhere, and touches as is guessed. Of meshes with as many
     points it is the one with the fewest along a side."""
-    lengths = [_fast_lengths(MOST_CELLS * length / wave) for length in size]
-    meshes = sorted(product(*lengths), key=lambda points: (math.prod(points), max(points)))
-    cells = lambda points: [wave * n / length for n, length in zip(points, size, strict=True)]  # noqa: E731
-    return next((mesh for mesh in meshes if _fits(*cells(mesh), directions, asked, guesses)), meshes[-1])
+    along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
+    meshes = sorted(product(along_x, along_y), key=lambda points: (math.prod(points), max(points)))
+    x, y = (wave / length for length in size)
+    return next((mesh for mesh in meshes if _fits(mesh[0] * x, mesh[1] * y, directions, asked, guesses)), meshes[-1])
 
 
 def _fast_lengths(most: float) -> list[int]:
