@@ -79,19 +79,18 @@ def check(options: argparse.Namespace) -> int:
 
 def _doubts(job: Job) -> list[str]:
     """Return the doubts about a job, also those that only a look at heights and measured moduli raises."""
-    from ..job.checks import meaning
-
-    if meaning.says_all(job.surface) and not job.measured:
+    if not job.depends_on_heights and not job.measured:
         return list(job.warnings)
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..scene import sanity, set_up
     from ..scene.measured_range import describe_beyond
 
-    found = [*job.warnings, *describe_beyond(job)]
-    if sanity.is_quickly_made(job):
-        found += sanity.check_heights(set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
-    return found
+    if not sanity.is_quickly_made(job):
+        return [*job.warnings, *describe_beyond(job)]
+    setup = set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    sanity.refuse_beyond_full_contact(setup)
+    return sanity.find_doubts(setup)
 
 
 def plan(options: argparse.Namespace) -> int:

@@ -16,19 +16,13 @@ from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..physics.adhesion import AdhesionLaw, ramp_of, smallest_range
+from .adhesion_doubts import sizes
 from .effect import Decision, Effect, Instant
 
 MOST_CELLS = 2.0  # physics: process zones in a cell; with more, nothing can be said about rates
 SAME = 1e-9  # rounding: of a range
 JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter, above and below which spheres are as in these theories
 FULL_CONTACT = 0.56988  # physics: Johnson's parameter, from which a wave is in full contact without load
-MOST_WORK = 1.0  # physics: surfaces of dry solids have less [J/m^2]; of rubber 0.03 to 0.1
-MOST_STRAIN = 0.5  # physics: as for slopes: the theory is linear
-RADII = 6.0  # accuracy: of a contact between repeated spheres, whose fields change its force by some 1.9 (a/L)^3 = 1 %
-MOST_RANGE = 0.2  # physics: of the box: the law is that of flat surfaces, as near as their curvature is small
-MOST_RING = (
-    2.0  # accuracy: the force of an undeformed sphere is then wrong by 4 exp(-2 pi^2/4) = 3 % in the sum over cells
-)
 CELLS = 2.0  # accuracy: of the process zone with the range `auto`; pull-off is then right to 0.6 %
 AUTO: Literal["auto"] = "auto"
 LENGTH: TypeAdapter[float] = TypeAdapter(Positive)
@@ -126,47 +120,6 @@ def _facts(job: Any) -> Iterator[str]:
             yield f"surface.{index}: Johnson's parameter {slow:.3g}{_also(slow, fast)}: {full}"
 
 
-def _sizes(job: Any, law: AdhesionLaw, modulus: float) -> Iterator[str]:
-    """Yield what to say of a work or a range whose magnitude cannot be meant, or that the model is not made for."""
-    told = f"adhesion.work is {law.work:g} J/m^2 and the range {law.range:.3g} m"
-    if law.work > MOST_WORK:
-        yield (
-            f"adhesion: {told}: to part dry surfaces takes {MOST_WORK:g} J/m^2 at most, of rubber some 0.05; what a "
-            "body dissipates comes beside it, from its material"
-        )
-    elif modulus and (strain := law.strength / modulus) > MOST_STRAIN:
-        yield (
-            f"adhesion: strains at the edges of contact are some work/(E* range) = {strain:.2g}, and the theory is for "
-            f"small ones, at most {MOST_STRAIN:g}: {told}; use a longer range, or less work"
-        )
-    sides = [size for size, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1] or list(job.grid.size)
-    if law.range > MOST_RANGE * min(sides):
-        yield (
-            f"adhesion: {told}, more than {MOST_RANGE:g} of the box: points then attract more than what lies opposite, "
-            "which the law does not know; use a shorter range"
-        )
-    for index, shape in enumerate(job.surface):
-        if isinstance(shape, Sphere):
-            yield from _sphere(f"surface.{index}", shape.radius, job.grid, law, modulus)
-
-
-def _sphere(name: str, radius: float, grid: Grid, law: AdhesionLaw, modulus: float) -> Iterator[str]:
-    """Yield what to say of a sphere, of whose attraction the cells see little, or whose images act on it."""
-    cell, ring = cell_of(grid), math.sqrt(radius * law.range)
-    if cell > MOST_RING * ring:
-        yield (
-            f"adhesion: a cell, {cell:.3g} m, is {cell / ring:.2g} times sqrt(radius range), how far {name} is "
-            f"attracted around its tip: {MOST_RING:g} times makes the sum over points wrong by 3 %, more is worse; use "
-            f"cells of {MOST_RING * ring:.3g} m, or a range of {cell**2 / MOST_RING**2 / radius:.3g} m"
-        )
-    contact = (4.5 * math.pi * law.work * radius**2 / modulus) ** (1.0 / 3.0) if modulus else 0.0
-    if grid.boundary == "periodic" and min(grid.points) > 1 and RADII * contact > min(grid.size):
-        yield (
-            f"adhesion: {name} has a contact of a radius of {contact:.3g} m without load, and the box repeats it every "
-            f"{min(grid.size):.3g} m: for pull-off to 1 % use boundary: free, or a box of {RADII * contact:.3g} m"
-        )
-
-
 def _also(slow: float, fast: float) -> str:
     return "" if math.isclose(slow, fast) else f" relaxed, {fast:.3g} at once"
 
@@ -208,7 +161,7 @@ class AdhesionColumns(Effect):
         assert law is not None
         modulus, cell = modulus_of(job.material), cell_of(job.grid)
         zone, least = law.process_zone(modulus), smallest_range(law.work, modulus, cell, 1.0)
-        yield from _sizes(job, law, modulus)
+        yield from sizes(job, law, modulus, cell)
         if 0.0 < zone < cell * (1.0 - SAME):
             yield (
                 f"adhesion: a cell, {cell:.3g} m, is {cell / zone:.2g} times as long as the process zone, and the "

@@ -158,6 +158,13 @@ class Job(Part):
         body = self.material.fitted
         return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
+    @property
+    def depends_on_heights(self) -> bool:
+        """True if doubts about the job need the heights of its surface: they are not given by numbers, or an approach
+        or the range of an adhesion is compared with them."""
+        compared = self.section("adhesion") is not None or any(stage.control == "approach" for stage in self.history)
+        return compared or not meaning.says_all(self.surface)
+
     def at_temperature(self, temperature: float) -> Job:
         """Return the job with its material at another temperature [deg C]; raises InputError without a shift."""
         return self.model_copy(update={"material": heated(self.material, temperature)})

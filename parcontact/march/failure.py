@@ -11,11 +11,10 @@ from ..errors import RunError
 from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.measures import Measures
-from ..scene import Scene
+from ..scene import Scene, sanity
 from ..solve.contact import Contact
 
 ROUNDINGS = 4.0  # accuracy: times the rounding of the largest length, below which no certificate is sure to be
-FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 FINITE = "look for heights, loads or moduli that are not finite or too far apart"
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
 MANY_CELLS = 1.5  # tuning: by which a surface moves in a long step
@@ -92,17 +91,9 @@ def reach_of(scene: Scene, last: Contact, h: Array, dtype: DTypeLike) -> float:
     return ROUNDINGS * float(np.finfo(dtype).eps) * max(sizes) / last.certificate.length
 
 
-def refuse_beyond_full_contact(scene: Scene, step: Step, d: float, effective: Array) -> None:
-    """Raise StepError where a periodic half space cannot follow an approach: its mean surface would be below its
-    undeformed level. Where the rigid surface yields it can."""
-    if not scene.setup.half_space.moves_in_the_mean and scene.choices.hardness is None:
+def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> None:
+    """Raise StepError where a periodic body cannot follow the approach of a step; collective."""
+    if sanity.has_full_contact(scene.setup):
         mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
-        datum = scene.setup.surface.datum
-        rounding = FULL_CONTACT_ROUNDING * (abs(step.load) + abs(datum) + scene.setup.height) / scene.units.height
-        if d + mean > rounding:
-            most = -mean * scene.units.height - datum
-            most = 0.0 if abs(most) <= rounding * scene.units.height else most
-            raise StepError(
-                f"step {step.number}: an approach of {step.load:g} m is beyond full contact, which a periodic body "
-                f"reaches at {most:g} m; prescribe a pressure instead"
-            )
+        if text := sanity.beyond_full_contact(scene.setup, step.load, mean * scene.units.height):
+            raise StepError(f"{where(scene, step)}: {text}")

@@ -245,9 +245,8 @@ def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:
     """Return what the load of a step prescribes, in the run's units; collective. Raises StepError."""
     grid = scene.choices.grid
     if step.control == "approach":
-        d = (step.load + scene.setup.surface.datum) / scene.units.height
-        failure.refuse_beyond_full_contact(scene, step, d, trial.effective)
-        return Approach(d)
+        failure.refuse_beyond_full_contact(scene, step, trial.effective)
+        return Approach((step.load + scene.setup.surface.datum) / scene.units.height)
     mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
     return MeanPressure(mean / (trial.alpha * scene.units.pressure))
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..effects.adhesion_doubts import beyond_heights
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
@@ -26,6 +27,7 @@ ODD_CONTACTS = ("edge", "cells")  # at the edge of the box; a few cells wide
 FEW_CELLS = 0.15  # accuracy: of the area, too large if counted in cells: contacts of three cells, a circle of four
 FEW_POINTS = 2**22  # tuning: heights that are made in seconds
 STRICT = "an error with numerics.strict"
+FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
 
 
 def refuse_impossible(job: Job, timeline: Timeline) -> None:
@@ -39,7 +41,7 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
 
 def is_quickly_made(job: Job) -> bool:
     """Return whether the heights of a job say more than the job does, and are few enough to be made to look at them."""
-    return not meaning.says_all(job.surface) and job.grid.nx * job.grid.ny <= FEW_POINTS
+    return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
 def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[str]:
@@ -67,8 +69,41 @@ def _check_heights(setup: Setup) -> Iterator[str]:
     strained = layer.strained(span, body.thickness) if body is not None and setup.roughness else ""
     if strained and not any(told.startswith("body.thickness: the surface") for told in setup.job.warnings):
         yield strained
+    law = setup.choices.adhesion
+    if law and setup.roughness and not setup.surface.shapes and (text := beyond_heights(law, span)):
+        yield text
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
         yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.asked, setup.job.directions)
+
+
+# -- full contact -----------------------------------------------------------------------------------------------------
+
+
+def has_full_contact(setup: Setup) -> bool:
+    """Return whether there is a largest approach: a periodic half space keeps the level of its mean, and an
+    incompressible layer does. Where the rigid surface yields there is none."""
+    return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
+
+
+def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
+    """Return what to say of an approach [m] beyond full contact, or ''; `mean` [m] is that of the heights over the
+    datum of the surface."""
+    closed = -mean - setup.surface.datum
+    rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
+    if approach - closed <= rounding:
+        return ""
+    return (
+        f"an approach of {approach:.6g} m is beyond full contact, which a periodic body reaches at "
+        f"{closed if abs(closed) > rounding else 0.0:.6g} m; approach no further, or prescribe a pressure instead"
+    )
+
+
+def refuse_beyond_full_contact(setup: Setup) -> None:
+    """Raise InputError for stages whose approach goes beyond the full contact of the surface where it begins."""
+    for index, stage in enumerate(setup.job.history if has_full_contact(setup) else ()):
+        most = max(stage.load.start, stage.load.end)
+        if stage.control == "approach" and (text := beyond_full_contact(setup, most, setup.heights.mean)):
+            raise InputError(f"history.{index}: {text}")
 
 
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------

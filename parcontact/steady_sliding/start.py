@@ -8,7 +8,7 @@ from ..march.loop import March
 from ..march.state import first_state, pressed_state
 from ..march.sudden import tolerance_of_start
 from ..parallel.slab import Slab
-from ..scene import Setup, build_on, set_up
+from ..scene import Setup, build_on, sanity, set_up
 from ..solve.nonsymmetric.steady import SteadyContact
 from ..storage.checkpoint import Contents
 from .losses import branch_maps
@@ -20,9 +20,11 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
     """A march before the first step of a job, or after that of a checkpoint; collective.
 
     It can go on to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not fit,
-    and where a steady start is asked for with energies: they count from a body at rest.
+    for approaches beyond full contact, and where a steady start is asked for with energies: they count from a body at
+    rest.
     """
     setup = set_up(job, slab, until)
+    sanity.refuse_beyond_full_contact(setup)
     if saved is None and setup.choices.steady_start.on:
         return _from_steady_sliding(setup)
     march = March(build_on(setup))

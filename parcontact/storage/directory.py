@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, InUseError
+from ..job.reading import CASES
 from ..parallel.slab import Slab
 from . import checkpoint, curve_points, files, hdf5, marker, stopfile
 from .marker import SCENE, VERBS, Claim
@@ -222,8 +223,14 @@ class Directory:
 
 
 def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
-    """Raise InputError if a directory that is not ours holds files of these names, beside hidden ones and `BESIDE`."""
+    """Raise InputError if a directory that is not ours holds files of these names, beside hidden ones and `BESIDE`, or
+    is that of a sweep."""
     foreign = sorted(name for name in names if not name.startswith(".") and name not in BESIDE)
+    if cases := len([*(directory / CASES).glob(f"*/{marker.MARKER}")]):
+        raise InputError(
+            f"the output directory {directory} is that of a sweep, with {cases} of its cases; give --out for another "
+            "directory, or run the job of the sweep, one case of it with --case"
+        )
     if foreign:
         shown = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
         raise InputError(

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from parcontact.errors import InputError
-from parcontact.job import Job
 
 from .texts import SMALL, job_of, replaced
 
@@ -61,17 +60,3 @@ def test_waves_of_a_free_box_are_refused(tmp_path: Path) -> None:
     job_of(tmp_path, replaced(free, steady=steady % "false"))
     with pytest.raises(InputError, match=r"steady\.waves needs a periodic box"):
         job_of(tmp_path, replaced(free, steady=steady % "true"))
-
-
-@pytest.mark.parametrize(("end", "warned"), [(0.0, False), (1e-9, True)])
-def test_approaches_beyond_full_contact(end: float, warned: bool) -> None:
-    """Waves alone are in full contact with a periodic half space at 0; a layer goes on."""
-    data = {
-        "grid": {"points": 32, "size": 1e-4},
-        "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [1, 0]},
-        "material": {"model": "elastic", "shear_modulus": 1e6, "poisson": 0.3},
-        "history": [{"approach": {"from": -1e-6, "to": end}, "duration": 1.0}],
-    }
-    found = Job.model_validate(data).warnings
-    assert ["beyond full contact" in text for text in found] == [True] * warned
-    assert not Job.model_validate({**data, "body": {"thickness": 1e-5}}).warnings

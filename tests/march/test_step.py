@@ -13,7 +13,7 @@ from marching import begun, marched
 from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
-from parcontact.errors import RunError
+from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
@@ -200,16 +200,13 @@ def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
         assert [row["step"] for row in rows(out)] == [str(step) for step in range(7)]
 
 
-def test_approach_beyond_full_contact_leaves_a_checkpoint(bench: Bench) -> None:
-    """It is refused before it is tried: not even the extrapolation is lost."""
-    closed = {"name": "closed", "approach": 1e-3}
-    data = bench.job("viscoelastic", history=[PRESS, closed]) | {"checkpoint": {"minutes": 100}}
-    out, clean = bench.where / "out", bench.where / "clean"
-    with pytest.raises(RunError, match=r"beyond full contact.*; the newest checkpoint is .*step-5\.h5"):
+def test_an_approach_beyond_full_contact_is_refused_before_the_first_step(bench: Bench) -> None:
+    """Value and limit are told, and nothing is written."""
+    data, out = bench.job("viscoelastic", history=[PRESS, {"approach": 1e-3}]), bench.where / "out"
+    with pytest.raises(InputError, match=r"history\.1: an approach of 0\.001 m is beyond full contact.* at 0 m; "):
         bench.run(data, out)
-    assert bench.run(data | {"history": [PRESS]}, clean) == 0
     if bench.comm.rank == 0:
-        assert maps(out / "checkpoint" / "step-5.h5") == maps(clean / "checkpoint" / "step-5.h5")
+        assert not out.exists()
     bench.comm.Barrier()
 
 
@@ -260,7 +257,5 @@ def test_an_approach_to_full_contact_is_one_to_rounding(share: float, refused: b
     """The mean of the surface is 0: to go beyond it by a rounding of its height is to reach it."""
     data = {"grid": GRID, "surface": ROUGH, "material": ELASTIC, "history": [{"approach": 0.0}]}
     height = begun(data).scene.setup.height
-    march = begun(data | {"history": [{"approach": share * height}]})
-    with pytest.raises(StepError, match="is beyond full contact") if refused else nullcontext():
-        run(march, ())
-    assert march.row.step == 1 - refused
+    with pytest.raises(InputError, match="is beyond full contact") if refused else nullcontext():
+        run(begun(data | {"history": [{"approach": share * height}]}), ())

@@ -242,7 +242,6 @@ def test_work_is_force_times_path() -> None:
     assert errors[2] < 3e-4 * SCALE
 
 
-@pytest.mark.filterwarnings("ignore:.*the box repeats it")
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_the_gap_is_between_body_and_surface(boundary: str) -> None:
     """Everywhere, to 1e-5 of the unit of length at a tolerance of 1e-5; and open points are pulled by the law."""

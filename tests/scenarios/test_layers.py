@@ -78,7 +78,7 @@ def test_the_approach_to_a_compressible_layer_is_absolute(base: str) -> None:
 
 
 def test_an_incompressible_layer_cannot_be_pushed_beyond_full_contact() -> None:
-    with pytest.raises(pc.RunError, match="beyond full contact"):
+    with pytest.raises(pc.InputError, match="beyond full contact"):
         last_row({**rough(1.0, body={"thickness": 1e-4}), "history": [{"approach": 1e-4}]})
 
 

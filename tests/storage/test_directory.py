@@ -75,6 +75,14 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
         make(directory_at(out), job)
 
 
+def test_the_directory_of_a_sweep_is_told(tmp_path: Path, job: Path) -> None:
+    """A sweep has no marker of its own, its cases have."""
+    for case in ("000", "001"):
+        make(directory_at(tmp_path / "out" / "cases" / case), job)
+    with pytest.raises(InputError, match=r"out is that of a sweep, with 2 of its cases; give --out for .* with --case"):
+        make(directory_at(tmp_path / "out"), job)
+
+
 def test_differences_of_jobs() -> None:
     """Keys of sections and of lists of parts, with both values; lists of numbers are one value."""
     then = {

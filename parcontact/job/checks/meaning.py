@@ -7,10 +7,11 @@ modulus, and what is isolated has room around it. All is judged by lower bounds,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any
 
+from ...printed import per_cent
 from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
@@ -24,6 +25,8 @@ STRAIN = 1.0  # physics: mean pressure over 2 G/(1 - nu); beyond, strains are no
 LEAST = 1e-12  # accuracy: of the modulus at once, which a fluid keeps for a quotient
 NEAR = 0.4  # accuracy: of the longest wave; as near to where it was, the surface is over its own imprint
 REMEMBERS = 0.1  # accuracy: of the time since; a branch that relaxes in less has forgotten
+ALONE = 0.01  # accuracy: of the load, by which neighbours in a periodic box may change it
+IMAGES = 20  # accuracy: along each side, on either side: the rest is 3 % of all
 ROUNDS = 1000  # tuning: through the box that are looked at
 SAME = 1e-9  # accuracy: ways this near, relatively, are the same
 BEYOND = 100.0  # physics: times slower or faster than all branches: nothing relaxes
@@ -42,23 +45,7 @@ def warnings(job: Sections) -> Iterator[str]:
     yield from _instants(job, material)
     yield from _band(job, material)
     yield from _imprints(job, material)
-    if job.grid.boundary == "free":
-        yield from _room(job, material)
-    elif (
-        job.body is None and job.material.hardness is None and all(isinstance(one, Rough | Wave) for one in job.surface)
-    ):
-        yield from _approaches(job.history)
-
-
-def _approaches(history: Sequence[Stage]) -> Iterator[str]:
-    """Yield what to say of approaches beyond full contact: waves alone are there where their mean is that of a body
-    which does not move in the mean, at 0."""
-    for index, stage in enumerate(history):
-        if stage.control == "approach" and (most := max(stage.load.start, stage.load.end)) > 0.0:
-            yield (
-                f"history.{index}: an approach of {most:g} m is beyond full contact, where a periodic body is at 0: the"
-                " run ends when it gets there; stay below, or prescribe a pressure"
-            )
+    yield from _room(job, material) if job.grid.boundary == "free" else neighbours(job, material)
 
 
 def steep(slope: float) -> str:
@@ -219,6 +206,37 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
     return float((0.75 * max(force, 0.0) * radius / modulus) ** (1 / 3))
+
+
+def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+    """Judge a single sphere in a periodic box by the least radius that its contact has."""
+    modulus = contact_modulus(material)
+    return acting_neighbours(
+        job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
+    )
+
+
+def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[str]:
+    """Yield a sentence on a sphere alone in a periodic box, if the images of its contact change its load.
+
+    `contact` gives for the radius R of the sphere that of the contact under the same force by Hertz, a. An image at the
+    distance r, where the force P is, bends the body by the curvature `P/(2 pi E* r^3)` of its displacement. So the load
+    at a given radius of contact changes by `2 a^3/(3 pi) sum 1/r^3`.
+    """
+    grid, sphere = job.grid, job.surface[0]
+    single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
+    if not single or grid.boundary == "free" or job.body is not None:
+        return
+    around = range(-IMAGES, IMAGES + 1)
+    images = math.fsum(math.hypot(i * grid.lx, j * grid.ly) ** -3 for i in around for j in around if i or j)
+    change = 2.0 * contact(sphere.radius) ** 3 * images / (3.0 * math.pi)
+    if change > ALONE:
+        times = (change / ALONE) ** (1.0 / 3.0)
+        yield (
+            f"surface.0: its images in the periodic box of {grid.lx:g} x {grid.ly:g} m change the load at a given "
+            f"radius of contact by {per_cent(change)} or more; {per_cent(ALONE)} passes: use a grid.size "
+            f"{times:.3g} times as large, or boundary: free"
+        )
 
 
 # -- slides that come round -------------------------------------------------------------------------------------------
