@@ -60,6 +60,13 @@ def law_of(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw |
     return replace(law, ramp=ramp_of(law, modulus_of(material), cell_of(grid))) if law.kind == "dugdale" else law
 
 
+def chosen_range(job: Any) -> float | None:
+    """Return the range [m] that `auto` has on the mesh of a job; None where it is given, or nothing sticks."""
+    section = job.section("adhesion")
+    law = None if section is None or section.range != AUTO else law_of(section, job.grid, job.material)
+    return None if law is None else law.range
+
+
 def cell_of(grid: Grid) -> float:
     """Return the longer side of a cell [m], along directions that have several points."""
     return max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ..effects.adhesion import chosen_range
 from ..history.chosen import SAME_TIME
 from ..history.timeline import Timeline
 from ..job import Job, Rough
@@ -37,6 +38,8 @@ def job_on_half_mesh(job: Job) -> Job:
     data: dict[str, Any] = plain(job)
     data["grid"]["points"] = [max(n // 2, 1) for n in job.grid.points]
     data["output"] = {"directory": str(job.output.directory / DIRECTORY)}
+    if (reach := chosen_range(job)) is not None:  # on coarser cells it would be longer
+        data["adhesion"]["range"] = reach
     data["numerics"]["strict"] = False
     if Timeline.of(job).chooses:
         own = job.numerics.asked.of_steps

@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from ..job import Case, Job
 
@@ -56,7 +56,22 @@ def doubts_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[str]]) -> 
         noted.begin(case.number)
         for text in doubts(case.job):
             noted.shows(text)
-    return noted.summary([noted.kinds])
+    return [*noted.summary([noted.kinds]), *_follow_the_mesh(cases)]
+
+
+def _follow_the_mesh(cases: Sequence[Case]) -> Iterator[str]:
+    """Yield what to say of cases that have different ranges of adhesion, though none is given."""
+    if not any(case.job.section("adhesion") for case in cases):
+        return
+    from ..effects.adhesion import chosen_range  # not for what checks jobs without adhesion
+
+    reaches = {reach for case in cases if (reach := chosen_range(case.job)) is not None}
+    if len(reaches) > 1:
+        yield (
+            f"adhesion.range: auto follows cells, work and modulus, from {min(reaches):.4g} to {max(reaches):.4g} m in "
+            "these cases, which are different physics; to compare them give one range to all: the cells of each "
+            f"resolve {max(reaches):.4g} m"
+        )
 
 
 def warn_once(cases: Sequence[Case]) -> list[str]:

@@ -12,6 +12,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
 
+from ..effects.adhesion import chosen_range
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage, Study
 from ..job.checks.cells import one_cell
@@ -123,6 +124,7 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += ["output.branch_dissipation=false"]
     words += [f"numerics.{name}={getattr(case, name)}" for name in ("integrator", "tolerance", "precision", "kernel")]
+    words += [f"adhesion.range={reach!r}"] if (reach := chosen_range(job)) is not None else []
     factor = case.time_step / own.time_step
     replaced = _sliding(job) if job.study and job.study.cells_per_step else []
     for index, stage in enumerate(job.history):
@@ -158,6 +160,13 @@ def describe_chosen_steps(job: Job) -> list[str]:
     if rest:
         lines.append(f"{_names(rest)}: time steps at rest are chosen in every case, they have no cells per step")
     return lines
+
+
+def describe_held_range(job: Job) -> list[str]:
+    """Return a sentence on the range of adhesion where it would follow the mesh, as a list."""
+    reach = chosen_range(job)
+    own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
+    return [] if reach is None else [f"adhesion.range: {reach:.4g} m in every case, which auto is for {own}"]
 
 
 def _names(stages: Sequence[Stage]) -> str:

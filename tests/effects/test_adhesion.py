@@ -8,7 +8,8 @@ import pytest
 
 from parcontact.effects.adhesion import law_of
 from parcontact.errors import InputError
-from parcontact.job import Job, load
+from parcontact.job import Job, load, load_cases
+from parcontact.run.sweep_warnings import doubts_of
 
 E = 4e6  # E* of an incompressible body of 1 MPa [Pa]
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
@@ -55,6 +56,29 @@ def test_the_range_that_the_mesh_resolves() -> None:
     law = law_of(auto.section("adhesion"), auto.grid, auto.material)
     assert law is not None
     assert law.process_zone(E) == pytest.approx(2 * 4e-4 / 64, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("reach", "key", "values", "told"),
+    [
+        ("auto", "grid.points", [32, 64], "from 3.953e-07 to 5.59e-07 m"),
+        ("auto", "adhesion.work", [0.05, 0.0125], "from 1.976e-07 to 3.953e-07 m"),
+        ("auto", "surface.radius", [1e-3, 2e-3], ""),
+        (4e-7, "adhesion.work", [0.05, 0.0125], ""),
+    ],
+)
+def test_ranges_that_differ_in_a_sweep_are_told(reach: float | str, key: str, values: list[float], told: str) -> None:
+    """Two cells are a process zone: `rho = sqrt(2 h w/E*)`, with the longer one resolved by all cases."""
+    data = {
+        "grid": {"points": 64, "size": 4e-4, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-3},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "adhesion": {"work": 0.05, "range": reach},
+        "history": [{"approach": 0.0}],
+        "sweep": [{key: values}],
+    }
+    found = [text for text in doubts_of(load_cases(data), lambda job: ()) if "different physics" in text]
+    assert [told in text for text in found] == [True] * bool(told)
 
 
 @pytest.mark.parametrize(("reach", "warned"), [(4e-7, False), (2.7e-7, True)])

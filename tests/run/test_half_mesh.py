@@ -20,6 +20,7 @@ from parcontact.physics.mesh_error import WAVES_ORDER
 from parcontact.run import half_mesh, runner
 from parcontact.run.half_mesh import HalfMesh, place_of
 from parcontact.run.run import STOPPED_EARLY, Options
+from parcontact.scene import choices
 from parcontact.storage import tables
 
 Json = dict[str, Any]
@@ -252,3 +253,11 @@ def test_half_of_a_line() -> None:
     assert (half.surface, half.material) == (line.surface, line.material)
     assert [stage.cells_per_step for stage in half.history] == [None, 0.5]
     assert [step.dt for step in Timeline.of(half)] == [step.dt for step in Timeline.of(line)]
+
+
+@pytest.mark.parametrize("reach", ["auto", 2e-6])
+def test_the_range_of_adhesion_is_that_of_the_run(reach: float | str) -> None:
+    """`auto` would be longer on cells of twice the side, which is other physics."""
+    whole = jobs.load(data(adhesion={"work": 0.01, "range": reach}))
+    halved = half_mesh.job_on_half_mesh(whole)
+    assert choices(halved).adhesion == choices(whole).adhesion

@@ -1,5 +1,6 @@
 """Which cases a study has, and what they change in a job."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
-from parcontact.study.ladders import Ladders, Settings, describe_chosen_steps, ladders, overrides
+from parcontact.scene import choices
+from parcontact.study.ladders import Ladders, Settings, describe_chosen_steps, describe_held_range, ladders, overrides
 
 TEXT = """
 grid: {points: [64, 32], size: [1.0e-3, 5.0e-4]}
@@ -145,3 +147,15 @@ def test_a_time_step_of_a_slide_is_told_in_cells(path: Path) -> None:
     job, found = refined(path, "{cells_per_step: [0.5, 0.25]}")
     jobs = [load(path, overrides(job, found.own, case)) for case in found.combine()]
     assert [one.history[1].time_step for one in jobs] == pytest.approx([0.5e-3 / 64, 0.25e-3 / 64], rel=1e-12)
+
+
+@pytest.mark.parametrize(("reach", "held"), [("auto", True), ("2.0e-6", False)])
+def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reach: str, held: bool) -> None:
+    """`auto` is `sqrt(2 h w/E*)` on cells h, and would follow the ladder; it is told that it does not."""
+    path.write_text(f"{TEXT}adhesion: {{work: 0.01, range: {reach}}}\n")
+    job, found = refined(path, "{mesh: [32, 64, 128]}")
+    cases = [load(path, overrides(job, found.own, case)) for case in found.combine()]
+    assert {case.grid.nx for case in cases} == {32, 64, 128}
+    assert {choices(case).adhesion for case in cases} == {choices(job).adhesion}
+    told = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
+    assert [text.startswith(told) for text in describe_held_range(job)] == [True] * held
