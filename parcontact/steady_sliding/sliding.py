@@ -20,6 +20,7 @@ from ..physics.measures import Measures
 from ..physics.time_error import StepObservation
 from ..scene import Setup, choices
 from ..solve import kernels, nested
+from ..solve.local_load import LEAST_CUT
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
@@ -234,25 +235,31 @@ class SteadySliding:
 
     def _solver(self, level: Level, velocity: Vector) -> tuple[SteadySolver, Convolution]:
         operator, inverse = self._operators(level, velocity)
-        return self._solver_for(level, velocity, operator, inverse), operator
+        return self._solver_for(level, velocity, operator, inverse, LEAST_CUT), operator
 
     def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
         operator, inverse = self._operators(level, velocity)
         kind = self.setup.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
-        solver = self._solver_for(level, velocity, nearer, nearer_inverse)
+        solver = self._solver_for(level, velocity, nearer, nearer_inverse, proximal.LEAST_CUT)
         pull = operator.mapped(proximal.pull, np.float64)
         return Proximal(solver, operator, pull), operator
 
     def _solver_for(
-        self, level: Level, velocity: Vector, operator: Convolution, preconditioner: Convolution
+        self,
+        level: Level,
+        velocity: Vector,
+        operator: Convolution,
+        preconditioner: Convolution,
+        least_cut: float,
     ) -> SteadySolver:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
         tolerance = max(self._tolerance, 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
         limit, along = 20 * numerics.max_iterations, soft_stripes(self.setup, velocity)
         slab, grid = level.slab, self.setup.grid
         pairs = pairs_for(grid.lx / slab.nx, grid.ly / slab.ny)
-        return SteadySolver(slab, operator, preconditioner, height, tolerance, limit, along=along, pairs=pairs)
+        what = slab, operator, preconditioner, height, tolerance, limit
+        return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut)
 
     def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""

@@ -10,7 +10,8 @@ from steady_scenes import CREEP_TIME, G0, RADIUS, certificate, sliding
 
 from parcontact.errors import RunError
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.nonsymmetric import projected, steady
+from parcontact.solve.nonsymmetric import steady
+from parcontact.steady_sliding import sliding as solver
 from parcontact.steady_sliding import stiffness
 from parcontact.steady_sliding.losses import branch_maps
 from parcontact.steady_sliding.point import Point
@@ -170,7 +171,7 @@ def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monk
     )
     monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 1000)  # projected steps alone
     near_by = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
-    monkeypatch.setattr(projected, "LEAST_CUT", np.inf)
+    monkeypatch.setattr(solver, "LEAST_CUT", np.inf)
     everywhere = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
     assert near_by.sets == everywhere.sets == 0
     assert 10.0 * near_by.operator_calls < everywhere.operator_calls

@@ -39,17 +39,24 @@ def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
 class Projected:
     """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`.
 
-    With `pairs` along x that make square cells, cells of `LocalLoad` are smaller: so is the least cut they give back.
+    With `pairs` along x that make square cells, cells of `LocalLoad` are smaller: so is the least cut they give back,
+    `least_cut` of the load on squares.
     """
 
     def __init__(
-        self, slab: Slab, operator: Operator, preconditioner: Operator, constraint: Constraint, pairs: int = 0
+        self,
+        slab: Slab,
+        operator: Operator,
+        preconditioner: Operator,
+        constraint: Constraint,
+        pairs: int = 0,
+        least_cut: float = LEAST_CUT,
     ) -> None:
         self.slab, self.operator, self.preconditioner, self.constraint = slab, operator, preconditioner, constraint
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
         grids, floor = extension_on(slab.nx, slab.ny, pairs)
         self.extended = ExtendedPreconditioner(slab, floor, grids)
-        self.local_load, self._least_cut = LocalLoad(slab, pairs), LEAST_CUT / 2.0**pairs
+        self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0**pairs
 
     @property
     def pairs(self) -> list[tuple[Array, Array]]:

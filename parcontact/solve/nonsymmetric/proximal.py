@@ -21,7 +21,8 @@ from .steady import SteadyContact, SteadySolver
 
 Symbol = NDArray[np.inexact]
 PULL = 1.0  # tuning: S over |A|
-SHARE, MOST = 0.1, 0.5  # tuning: of the certificate, as the tolerance of the next contact; up to MOST where that fails
+LEAST_CUT = 1.5e-5  # tuning, of the load, as in `local_load`: with more, contacts take up to three times the calls here
+SHARE, MOST = 0.3, 0.5  # tuning: of the certificate, as the tolerance of the next contact; up to MOST where that fails
 # and is tried again
 LEAST = 0.3  # tuning: of the tolerance asked for, the same: more digits are not needed
 MAX_STEPS_TO_HALVE = 20  # tuning: in which the certificate must halve

@@ -28,6 +28,7 @@ from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
 from ..iterate import certify, weigh
+from ..local_load import LEAST_CUT
 from ..precision import precision_of_directions
 from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
@@ -79,7 +80,7 @@ class SteadySolver:
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate; `max_steps` of the linear solves in all; `directions` kept in each; the axis `along` which the surface
     slides where the body is far softer along stripes (`stripes`), else None; `pairs` along x that make square cells
-    (`extension.pairs_for`).
+    (`extension.pairs_for`); `least_cut` of the load, which is taken back near by (`local_load`).
     """
 
     def __init__(
@@ -93,11 +94,12 @@ class SteadySolver:
         directions: int = MAX_DIRECTIONS,
         along: int | None = None,
         pairs: int = 0,
+        least_cut: float = LEAST_CUT,
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self.constraint = NonNegative()
-        self._projected = Projected(slab, operator, preconditioner, self.constraint, pairs)
+        self._projected = Projected(slab, operator, preconditioner, self.constraint, pairs, least_cut)
         kept = precision_of_directions(tolerance, LOOSE)
         self._striped = along is not None
         on_sets: OnSet = Plain(preconditioner)
