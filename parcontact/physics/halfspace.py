@@ -19,6 +19,7 @@ Around an isolated contact the wake is not periodic: its influence coefficients 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Literal
@@ -93,16 +94,16 @@ class HalfSpace:
     def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Displacement over pressure of each wave of a periodic body, `(1 - nu)/|q|`; a mean moves a layer only."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
-        symbol = self._compliance(q)
+        symbol = self.compliance(q)
         if self.layer is not None:
-            symbol *= self.layer.compliance_ratio(q)
             symbol[q == 0.0] = self.layer.mean_compliance
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
-    def _compliance(self, q: Array) -> Array:
-        """Displacement over pressure of a wave on a half space."""
+    def compliance(self, q: Array) -> Array:
+        """Displacement over pressure of waves on a body that repeats itself, 0 for q = 0, whatever the kernel."""
         with np.errstate(divide="ignore"):
-            return np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
+            found = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
+        return found if self.layer is None else found * self.layer.compliance_ratio(q)
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Pressure over displacement of each wave, `|q|/(1 - nu)`, whatever the kernel.
@@ -187,15 +188,18 @@ class HalfSpace:
             operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
         else:
             operator = periodic_operator(
-                tiles, self.size, self.poisson, lambda qx, qy: self._compliance(np.hypot(qx, qy)), tally
+                tiles, self.size, self.poisson, lambda qx, qy: self.compliance(np.hypot(qx, qy)), tally
             )
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
     # -- of contacts that stick -------------------------------------------------------------------------------------
 
-    def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
-        """Pressure -> displacement, its inverse but for mean values, the displacement over a uniform pressure, and
-        what the first makes of it, which is positive; collective where the half space is free.
+    def gap_operators(
+        self, fft: FFT
+    ) -> tuple[Convolution, Convolution, float, float, Vector, Callable[[Array], Array]]:
+        """Pressure -> displacement, its inverse but for mean values, the displacement over a uniform pressure, what the
+        first makes of it, which is positive, the size of the box, and `compliance`; collective where the half space is
+        free.
 
         A free body is taken as one that repeats itself, whose points influence each other by the shortest way: this is
         exact within half a box.
@@ -212,7 +216,7 @@ class HalfSpace:
         table = np.where(zero, least, np.maximum(table, smallest))
         operator = Convolution(fft, lambda rows: table[rows], fft.dtype)
         inverse = Convolution(fft, lambda rows: np.where(zero[rows], 0.0, 1.0 / table[rows]), fft.dtype)
-        return operator, inverse, mean, least
+        return operator, inverse, mean, least, self.size, self.compliance
 
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 

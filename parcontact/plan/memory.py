@@ -31,6 +31,7 @@ from ..scene.rigid_surface import highest_waves
 from ..solve.adhesive.solver import GapSolver
 from ..solve.contact import ContactSolver
 from ..solve.nonsymmetric.steady import SteadySolver
+from ..solve.preconditioner.cell_sums import CellSums
 from ..solve.preconditioner.extension import grids_for, pairs_for
 from ..steady_sliding.sliding import tolerance_of
 
@@ -68,6 +69,8 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
     found["solver"] = solver
     if chosen.adhesion is not None:
         found["adhesion"] = 2 * Convolution.footprint(whole, grid.ny) + GapSolver.footprint(part.cells(grid.points))
+        cells = CellSums.footprint(*grid.points, ranks, part.number, body.size, body.compliance)
+        found["adhesion"] += cells
     if chosen.spectrum.on:
         found["surface spectrum"] = part.surface_waves
     for what, count, dtype in _maps(job):

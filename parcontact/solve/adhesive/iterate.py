@@ -7,6 +7,7 @@ from typing import NamedTuple
 from ...parallel.slab import Array, Slab
 from ..certificate import Certificate
 from ..iterate import LEAST_SHARE
+from ..preconditioner.cell_sums import Compliance
 from ..problem import Control, Operator
 from . import kernels
 from .law import Law
@@ -18,12 +19,15 @@ LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to le
 
 class GapOperators(NamedTuple):
     """The operator of a body and its inverse K, which is 0 for mean values; `mean` is the displacement over a uniform
-    pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive."""
+    pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive.
+    `size` of the box and `compliance` of waves are those of the body."""
 
     operator: Operator
     inverse: Operator
     mean: float
     least_mean: float
+    size: tuple[float, float]
+    compliance: Compliance
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...compiled import loop
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
-from .levels import count_cells, levels_of
+from .levels import count_cells, interpolate, interpolate_back, levels_of
 
 FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
 LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none
@@ -103,9 +103,9 @@ class ExtendedPreconditioner:
             _compare(*floors, weights)
         self._add_up(maps)
         self._weigh()
-        self._interpolate(known, maps)
+        interpolate(self._levels, known, maps)
         preconditioner.apply(r, r)
-        self._interpolate_back(known, maps)
+        interpolate_back(self._levels, known, maps)
         self._weigh()
         self._add_up_back(maps)
 
@@ -123,14 +123,6 @@ class ExtendedPreconditioner:
     def _add_up_back(self, maps: Maps) -> None:
         for k, level in reversed(list(enumerate(self._levels))):
             level.add_up_back(maps[k + 1], maps[k])
-
-    def _interpolate(self, known: Maps, maps: Maps) -> None:
-        for k, level in reversed(list(enumerate(self._levels))):
-            level.interpolate(maps[k + 1], known[k], maps[k])
-
-    def _interpolate_back(self, known: Maps, maps: Maps) -> None:
-        for k, level in enumerate(self._levels):
-            level.interpolate_back(known[k], maps[k], maps[k + 1])
 
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...compiled import loop
 from ...parallel import pyramid
 from ...parallel.slab import Slab, dealt_to
-from .squares import add_up, add_up_back, interpolate, interpolate_back
+from . import squares
 
 Map = NDArray[Any]
 
@@ -41,21 +41,21 @@ class Squares:
         return self.step.coarse
 
     def add_up(self, points: Map, cells: Map) -> None:
-        add_up(points, self.step.points_beside(points, 0, -1), self.step.above, cells[self.step.own])
+        squares.add_up(points, self.step.points_beside(points, 0, -1), self.step.above, cells[self.step.own])
         self.step.complete(cells)
 
     def add_up_back(self, cells: Map, points: Map) -> None:
         step = self.step
-        add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
+        squares.add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
 
     def interpolate(self, cells: Map, known: Map, points: Map) -> None:
         step = self.step
-        interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, known, points)
+        squares.interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, known, points)
 
     def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
         step = self.step
         around = [step.points_beside(field, 0, 1, -2, -1) for field in (known, points)]
-        interpolate_back(known, around[0], points, around[1], step.above, cells[step.own])
+        squares.interpolate_back(known, around[0], points, around[1], step.above, cells[step.own])
         step.complete(cells)
 
 
@@ -85,6 +85,18 @@ def levels_of(slab: Slab, pairs: int) -> list[Level]:
         slab = Slab(slab.comm, (slab.nx + 1) // 2, slab.ny, slab.tally, slab.dealt)
         made.append(Pairs(slab))
     return made + [Squares(step) for step in pyramid.steps_of(slab)]
+
+
+def interpolate(levels: list[Level], known: list[Map], maps: list[Map]) -> None:
+    """Interpolate from the largest cells down to points, each grid added to the next finer one; collective."""
+    for k, level in reversed(list(enumerate(levels))):
+        level.interpolate(maps[k + 1], known[k], maps[k])
+
+
+def interpolate_back(levels: list[Level], known: list[Map], maps: list[Map]) -> None:
+    """The transpose of `interpolate`, from points to the largest cells; collective."""
+    for k, level in enumerate(levels):
+        level.interpolate_back(known[k], maps[k], maps[k + 1])
 
 
 def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None, pairs: int) -> int:

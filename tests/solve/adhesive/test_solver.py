@@ -66,6 +66,22 @@ def test_conditions(free: bool, control: Approach | MeanPressure) -> None:
     assert_allclose(given, control.value, rtol=1e-9)
 
 
+@pytest.mark.parametrize("control", [Approach(0.3), MeanPressure(0.2)])
+@pytest.mark.parametrize("free", [False, True])
+def test_the_certificate_is_that_of_the_operator(free: bool, control: Approach | MeanPressure) -> None:
+    """It is made of `A c`, of which the preconditioned residual is only an estimate, by its definition; to rounding."""
+    slab, operators, solve = solver(free)
+    h, gap = heights(slab), slab.zeros()
+    gap[...] = np.maximum(-h - 0.1, 0.0)
+    found = solve.solve(WEAK, h, control, gap, 0.02)
+    assert not found.failure
+    c = found.p + WEAK.strength * np.exp(-gap / WEAK.range)
+    c[(gap == 0.0) & (c > 0.0)] = 0.0
+    weight, wrong = abs(found.p) + abs(c), abs(operators.operator.apply(c, slab.zeros()))
+    mean = 10.0 * (weight * wrong)[c != 0.0].sum() / weight.sum()
+    assert_allclose(found.certificate.complementarity, mean / found.certificate.length, rtol=1e-6)
+
+
 def test_nothing_holds_a_load_that_pulls_too_much() -> None:
     """No more than the largest attraction of all points."""
     slab, _, solve = solver(free=True)
