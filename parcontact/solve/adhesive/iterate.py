@@ -14,6 +14,7 @@ from .law import Law
 
 # accuracy
 SHARPER = 10.0  # times the certificate of contacts that do not stick: with it the load is as right as theirs
+SPURIOUS, NET = 0.5, 5.0  # times pressures that are not those of the law: with them loads and pressures are right
 LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to less are none
 
 
@@ -74,15 +75,20 @@ class Iterate:
 
 
 def certify(slab: Slab, it: Iterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
-    """Return how wrong the gap is: by z, weighted by the pressure, over a length; collective.
+    """Return how wrong the gap is: by z, weighted by the pressure, over a length; and the load; collective.
 
-    The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it.
+    The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it. Wrong
+    of the load are pressures that are not those of the law: their magnitudes, of which waves of a few points hardly
+    move the gap, count for half, and their sum five times.
     """
-    load, first, second, wrong = slab.sum(*kernels.judge(working, g, it.heights, q, it.m, sigma, z))
+    *sums, spurious, net = slab.sum(*kernels.judge(working, g, it.heights, q, it.m, sigma, z))
+    load, first, second, wrong = sums
     least = LEAST_TRACTION * it.law.strength
     spread, mean = 0.0, 0.0
     if load > 0.0:
         mean = first / load
         spread = math.sqrt(max(second / load - mean**2, 0.0))
     length = min(max(spread, LEAST_SHARE * abs(mean + it.d), LEAST_SHARE * it.law.range), it.law.range)
-    return Certificate(SHARPER * wrong / max(load, least) / length, 0.0, 0.0, length)
+    load = max(load, least)
+    beside = max(SPURIOUS * spurious, NET * abs(net)) / load
+    return Certificate(SHARPER * wrong / load / length, 0.0, beside, length)

@@ -69,22 +69,27 @@ def centre(working, mean, c):
 @loop
 def judge(working, g, h, q, mean, sigma, z):
     """With `p = q + mean` and `c = p + sigma` on the working set: sums of the weights `|p| + |c|`, of these times u and
-    u^2, with `u = g + h`, and over the set times |z|."""
-    load, first, second, wrong = 0.0, 0.0, 0.0, 0.0
+    u^2, with `u = g + h`, and over the set times |z|; and over the set of |c| and of c."""
+    load, first, second, wrong, spurious, net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(g.shape[0]):
-        row_load, row_first, row_second, row_wrong = 0.0, 0.0, 0.0, 0.0
+        row_load, row_first, row_second, row_wrong, row_spurious, row_net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
             p, u, weight = q[j, i] + mean, g[j, i] + h[j, i], 1.0 if working[j, i] else 0.0
-            size = abs(p) + weight * abs(p + sigma[j, i])
+            c = weight * (p + sigma[j, i])
+            size = abs(p) + abs(c)
             row_load += size
             row_first += size * u
             row_second += size * u * u
             row_wrong += weight * size * abs(z[j, i])
+            row_spurious += abs(c)
+            row_net += c
         load += row_load
         first += row_first
         second += row_second
         wrong += row_wrong
-    return load, first, second, wrong
+        spurious += row_spurious
+        net += row_net
+    return load, first, second, wrong, spurious, net
 
 
 @loop

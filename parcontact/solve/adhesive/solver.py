@@ -25,9 +25,9 @@ so that history decides the branch. One iteration:
    has made a way that raises E, a shorter one takes its place;
 6. E must not rise: else the step is halved.
 
-So there is one operator call in an iteration, `K w`: the pressure goes on with `theta K w`. Certificates are made of
-`A c` on the working set; as long as `M c` is far from the tolerance, it stands for that. Where cells are long, or long
-waves stiff, M is A itself.
+So there is one operator call in an iteration, `K w`: the pressure goes on with `theta K w`. As soon as the certificate
+that `M c` makes is met, that of `A c` is made, which counts. Where that is not met A takes the place of M, as it does
+throughout where cells are long, or long waves stiff.
 
 Where the mean gap is given, c, z and t are centred and w leads to it. V. Rey, G. Anciaux, J.-F. Molinari, Comput.
 Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D. Dureisseix, C. Gauthier,
@@ -40,6 +40,7 @@ import numpy as np
 
 from ...parallel.slab import Array, Slab
 from .. import kernels as maps
+from ..certificate import Certificate
 from ..preconditioner.cell_sums import CellSums
 from ..problem import Approach, Control, MeanPressure
 from . import kernels
@@ -81,20 +82,14 @@ class GapSolver:
         the operators say; collective."""
         it = self._begin(law, heights, control, gap, compliance)
         g, other = gap, self._gap
-        best, scale, iteration, stuck, trust = (math.inf, 0), 0.0, 0, False, 1.0
+        best, scale, iteration, stuck = (math.inf, 0), 0.0, 0, False
         while True:
             members, lost = self._find_residual(it, g)
-            self._precondition(other)
-            certificate = certify(self.slab, it, self._working, g, self._q, self._sigma, other)
-            worst = trust * certificate.worst
-            best = min(best, (worst, iteration))
-            failure = "" if lost else self._verdict(worst, tolerance, iteration, *best, stuck)
-            if failure is not None and self._cells is not None:  # the certificate is that of z = A c
-                estimate = certificate.worst
-                self.operators.operator.apply(self._way, self._way)
-                certificate = certify(self.slab, it, self._working, g, self._q, self._sigma, self._way)
-                trust = certificate.worst / estimate if estimate > 0.0 else 1.0
-                failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best, stuck)
+            certificate, exact = self._precondition(it, g, other, tolerance)
+            best = min(best, (certificate.worst, iteration))
+            failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best, stuck)
+            if failure is not None and not exact:
+                certificate, _ = self._precondition(it, g, other, math.inf)
             if failure is not None:
                 if g is not gap:
                     gap[...] = g
@@ -190,12 +185,16 @@ class GapSolver:
             return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
         return None
 
-    def _precondition(self, z: Array) -> None:
-        """Put `z = M c` into a map, with c in that of the way; collective."""
-        if self._cells is None:
-            self.operators.operator.apply(self._way, z)
-        else:
+    def _precondition(self, it: Iterate, g: Array, z: Array, near: float) -> tuple[Certificate, bool]:
+        """Put `z = M c` into a map, with c in that of the way, or `z = A c` where gaps seem to be `near`; returns the
+        certificate that z makes, and whether it is that of A c; collective."""
+        if self._cells is not None:
             self._cells.apply(self._way, z)
+            certificate = certify(self.slab, it, self._working, g, self._q, self._sigma, z)
+            if not certificate.complementarity <= near:
+                return certificate, False
+        self.operators.operator.apply(self._way, z)
+        return certify(self.slab, it, self._working, g, self._q, self._sigma, z), True
 
     def _turn(self, it: Iterate, members: float, scale: float, z: Array) -> float:
         """Make the new direction from z; returns `<c, z>`; collective.
