@@ -69,7 +69,8 @@ def test_conditions(free: bool, control: Approach | MeanPressure) -> None:
 @pytest.mark.parametrize("control", [Approach(0.3), MeanPressure(0.2)])
 @pytest.mark.parametrize("free", [False, True])
 def test_the_certificate_is_that_of_the_operator(free: bool, control: Approach | MeanPressure) -> None:
-    """It is made of `A c`, of which the preconditioned residual is only an estimate, by its definition; to rounding."""
+    """It is made of `A c`, of which the preconditioned residual is only an estimate, and of the pressures beside the
+    law, c, by its definition; to rounding."""
     slab, operators, solve = solver(free)
     h, gap = heights(slab), slab.zeros()
     gap[...] = np.maximum(-h - 0.1, 0.0)
@@ -80,6 +81,8 @@ def test_the_certificate_is_that_of_the_operator(free: bool, control: Approach |
     weight, wrong = abs(found.p) + abs(c), abs(operators.operator.apply(c, slab.zeros()))
     mean = 10.0 * (weight * wrong)[c != 0.0].sum() / weight.sum()
     assert_allclose(found.certificate.complementarity, mean / found.certificate.length, rtol=1e-6)
+    beside = max(0.5 * abs(c).sum(), 5.0 * abs(c.sum()))
+    assert_allclose(found.certificate.load, beside / weight.sum(), rtol=1e-6, atol=1e-14)
 
 
 def test_nothing_holds_a_load_that_pulls_too_much() -> None:
