@@ -44,12 +44,10 @@ def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
     assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load
 
 
-@pytest.mark.parametrize(
-    ("name", "most"), [("rough, elastic, middle", 3.0), ("rough, elastic, strong", 4.0), ("rough, rubber, middle", 3.0)]
-)
-def test_a_resolved_step_with_adhesion(name: str, most: float) -> None:
-    """It takes at most three times the operator calls of the same step without, if that is solved to errors that are no
-    larger, and more than half of them; to the same tolerance, to which it is more exact, it may take more."""
+@pytest.mark.parametrize("name", ["rough, elastic, middle", "rough, elastic, strong", "rough, rubber, middle"])
+def test_a_resolved_step_with_adhesion(name: str) -> None:
+    """It takes at most three times the operator calls of the same step without, and more than half of them: both are
+    solved to the same tolerance, or the one without to errors that are no larger."""
     sticking = load_script("bench.sticking")
     job = sticking.job_of(sticking.SCENES[name], 128)
     plain = {key: value for key, value in job.items() if key != "adhesion"}
@@ -58,8 +56,8 @@ def test_a_resolved_step_with_adhesion(name: str, most: float) -> None:
     resolved = steps.front <= 1.0
     assert resolved.sum() >= 5
     assert not without.front.any()
-    for others, limit in ((exact, 3.0), (without, most)):
-        assert 0.5 < steps.calls[resolved].sum() / others.calls[resolved].sum() < limit
+    for others in (exact, without):
+        assert 0.5 < steps.calls[resolved].sum() / others.calls[resolved].sum() < 3.0
     own, allowed = (one.errors(sticking.count(each, 2e-5)) for one, each in ((exact, plain), (steps, job)))
     assert own[0] <= allowed[0]
     assert own[1] <= allowed[1]
