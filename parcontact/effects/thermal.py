@@ -200,7 +200,7 @@ class ThermalColumns:
         """Return the heat of a step, by the forces at both of its ends, and remember those of its end."""
         measures, velocity = instant.measures, instant.step.velocity
         speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
-        own = measures.friction_interface * measures.normal_force
+        own = measures.force_interface
         force = np.array([measures.force_x, measures.force_y]) + own * np.array(velocity) / (speed or 1.0)
         pressed = tuple(max(0.0, -float(each @ velocity)) / box for each in (self._force, force))
         share = self._area / measures.contact_area if measures.contact_area > 0.0 else 0.0

@@ -40,7 +40,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     step, contact, slid = solved.step, solved.contact, math.dist(solved.step.position, state.position)
     energy = _advance_energy(scene, state, solved)
     if solved.stuck is not None and energy is not None:
-        solved = replace(solved, stuck=_count_energies(scene, state, solved, energy, slid))
+        solved = replace(solved, stuck=_count_energies(scene, state, solved, energy))
     if solved.stuck is not None and (solved.stuck.snapped or _loses(state, solved)):
         solved, errors = replace(solved, stuck=solved.stuck.noted()), replace(errors, budget=None)
     _tell_effects(scene, solved, slid)
@@ -83,7 +83,9 @@ def _advance_energy(scene: Scene, state: State, solved: Solved) -> EnergyMemory 
     if scene.energy is None or state.energy is None:
         return None
     now, before = Pressed(solved.contact.p, solved.trial.alpha), Pressed(state.pressure, state.alpha)
-    return scene.energy.advance(state.energy, solved.step.dt, now, before, solved.contact.u, solved.body)
+    energy = scene.energy.advance(state.energy, solved.step.dt, now, before, solved.contact.u, solved.body)
+    apart = solved.stuck is not None and _stay_apart(state, solved.stuck)
+    return energy.without_work(state.energy) if apart else energy
 
 
 def _accepted(scene: Scene, state: State, step: Step) -> tuple[Solved, Estimate, MadeStep | None]:
@@ -147,9 +149,7 @@ def _front(scene: Scene, state: State, solved: Solved) -> float:
     return sticking.front_of(scene, solved.stuck.flips, state.row.measures, solved.measures)
 
 
-def _count_energies(
-    scene: Scene, state: State, solved: Solved, energy: EnergyMemory, slid: float
-) -> sticking.StuckContact:
+def _count_energies(scene: Scene, state: State, solved: Solved, energy: EnergyMemory) -> sticking.StuckContact:
     """Return a contact with adhesion with its energies, after those of the body; collective."""
     assert scene.energy is not None
     assert state.energy is not None
@@ -157,9 +157,11 @@ def _count_energies(
     kept, old = ((each.stored, float(each.dissipated.sum())) for each in (energy, state.energy))
     body = scene.energy.unit * ((kept[0] - old[0]) + (kept[1] - old[1]))
     stuck, memory = solved.stuck, solved.stuck.memory
-    changes = body, state.row.measures, solved.measures, slid
-    gap = memory.pasts[0].gap
-    energies = sticking_energies.after_step(scene, memory.energies, gap, solved.trial, stuck.pushed, *changes)
+    (x, y), (x_before, y_before) = solved.step.position, state.position
+    changes = body, state.row.measures, solved.measures, (x - x_before, y - y_before)
+    energies, load = memory.energies, (memory.pasts[0].gap, solved.trial, stuck.pushed, stuck.detached)
+    if not _stay_apart(state, stuck):
+        energies = sticking_energies.after_step(scene, energies, *load, *changes)
     columns = (*stuck.columns[:2], energies.surfaces, energies.lost)
     return stuck._replace(memory=replace(memory, energies=energies), columns=columns)
 
@@ -215,7 +217,7 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
         if not scene.goes_on_open:
             raise DetachedError(step.time, step.load)
         stuck, sentence = sticking.open_up(scene, stuck, trial), failure.nothing_holds(step.control, step.load)
-        if state.row.measures.contact_area == state.row.measures.pressure == 0.0:  # they were apart before
+        if _stay_apart(state, stuck):
             stuck = stuck._replace(snapped=False)
         else:
             remark = f"{failure.where(scene, step)}: {sentence}"
@@ -229,6 +231,11 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
         raise failure.not_finite(scene, step, measures)
     memory = scene.material.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
     return Solved(step, trial, contact, measures, memory, remark, stuck=stuck)
+
+
+def _stay_apart(state: State, stuck: sticking.StuckContact) -> bool:
+    """Return whether nothing holds the load of a step, as nothing did before it."""
+    return stuck.detached and state.row.measures.contact_area == state.row.measures.pressure == 0.0
 
 
 def _path(scene: Scene, state: State, trial: Trial, control: MeanPressure | Approach) -> sticking.Path:

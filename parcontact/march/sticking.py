@@ -27,7 +27,7 @@ from ..solve.contact import Contact
 from ..solve.problem import Approach, Control
 from ..storage.checkpoint import Contents
 from .starts import cells_moved
-from .sticking_energies import NO_ENERGIES, PathWork, StickingEnergies
+from .sticking_energies import NO_ENERGIES, PathWork, Pushed, StickingEnergies
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
@@ -71,15 +71,14 @@ class StickingMemory:
 
 class StuckContact(NamedTuple):
     """The contact of a step, the memory after it, where the surfaces touch, and its numbers for columns; `pushed`
-    [J] is the work of the load along its path, None if that is not through equilibria; `flips` is the number of points
-    that came into contact or left it; `snapped` and `detached` say that the contact did, or that nothing holds the load
-    any more."""
+    is the work of the load along its path; `flips` is the number of points that came into contact or left it; `snapped`
+    and `detached` say that the contact did, or that nothing holds the load any more."""
 
     contact: Contact
     memory: StickingMemory
     touching: Array
     columns: tuple[float, ...]
-    pushed: float | None
+    pushed: Pushed
     flips: float
     snapped: bool
     detached: bool
@@ -149,7 +148,8 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
                 gap[...] = began
             stride *= 0.5
             continue
-        work.go_on(contact)
+        if not detached and not path.together:
+            work.go_on(contact)
         snapped |= hard and now_known
         if detached or share == 1.0:
             break
@@ -161,7 +161,7 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     now = replace(now, snaps=memory.snaps, told=memory.told)
     (flips,) = scene.slab.sum(kernels.count_flips(memory.pasts[0].gap, gap)) if now_known else (0.0,)
     columns = _columns(scene, trial, contact.p)
-    pushed = None if detached or path.together else work.total * trial.alpha
+    pushed = Pushed(work.total * trial.alpha, detached or path.together)
     return StuckContact(contact, now, gap == 0.0, columns, pushed, flips, snapped, detached)
 
 

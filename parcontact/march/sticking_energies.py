@@ -5,10 +5,12 @@ path, by the trapezoidal rule, `F dd - F_t ds`. What is missing is lost in a sna
 any way between its two ends; else it is what the rule makes wrong, and the work is that of the energies.
 
 Surfaces that come off under a load are in no equilibrium until they are apart, and the same holds for those that a load
-brings together again. What a load does on such a way depends on the inertia that the model leaves out. Its work then is
-the least that the change takes, and 0 if energy is set free, which is lost.
+brings together again. What a load does on such a way depends on the inertia that the model leaves out. Its work from
+the last equilibrium on then is the least that the change takes, and 0 if energy is set free, which is lost. While
+surfaces are apart nothing acts on them, and neither work nor losses change.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,6 +35,14 @@ class StickingEnergies(NamedTuple):
 
 
 NO_ENERGIES = StickingEnergies()
+
+
+class Pushed(NamedTuple):
+    """Work of the load along its path, up to the last equilibrium [J]; `jumps` where the path has left that: surfaces
+    came off, or were brought together."""
+
+    work: float
+    jumps: bool
 
 
 @dataclass
@@ -60,35 +70,37 @@ def after_step(
     past: StickingEnergies,
     gap: Array,
     trial: Trial,
-    pushed: float | None,
+    pushed: Pushed,
+    detached: bool,
     body: float,
     before: Measures,
     measures: Measures,
-    slid: float,
+    moved: tuple[float, float],
 ) -> StickingEnergies:
-    """Return the energies after a step to a gap in which the load has `pushed` with a work [J], None on a way without
-    equilibria, and the body has gained an energy [J], while the surface has slid [m]; collective."""
+    """Return the energies after a step to a gap, or to surfaces that are `detached`, in which the load has `pushed` and
+    the body has gained an energy [J], while the surface has moved [m]; collective."""
     law = scene.law(trial.alpha)
     assert scene.energy is not None
     assert law is not None
-    (sum_gamma,) = scene.slab.sum(kernels.surface_energy(law, gap))
+    sum_gamma = 0.0 if detached else scene.slab.sum(kernels.surface_energy(law, gap))[0]
     surfaces = sum_gamma * trial.alpha * scene.energy.unit
     gained = body + surfaces - past.surfaces
-    dragged, doubt = _drag(before, measures, slid)
+    dragged, doubt = _drag(before, measures, moved)
     area, way = scene.choices.grid.lx * scene.choices.grid.ly, measures.approach - before.approach
-    if pushed is None:
-        pushed = max(gained - dragged, 0.0)
+    work = pushed.work + dragged
+    if pushed.jumps:
+        work = max(work, gained)
     else:
         doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
-    work = pushed + dragged
     lost = work - gained
     snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
     return StickingEnergies(past.work + (work if snaps else gained), surfaces, past.lost + (lost if snaps else 0.0))
 
 
-def _drag(before: Measures, now: Measures, slid: float) -> tuple[float, float]:
+def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:
     """Return the work of sliding a way without the friction of the interface, and how wrong it may be [J]."""
+    (x, y), slid = moved, math.hypot(*moved)
     if not slid:
         return 0.0, 0.0
-    forces = [(one.friction - one.friction_interface) * one.normal_force for one in (before, now)]
-    return 0.5 * sum(forces) * slid, (0.5 * abs(forces[1] - forces[0]) + VIEWS_APART * abs(forces[1])) * slid
+    works = [-(one.force_x * x + one.force_y * y) - one.force_interface * slid for one in (before, now)]
+    return 0.5 * sum(works), 0.5 * abs(works[1] - works[0]) + VIEWS_APART * abs(works[1])

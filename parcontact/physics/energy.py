@@ -12,7 +12,7 @@ first order in the time step.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -41,6 +41,14 @@ class EnergyMemory:
     spring: float = 0.0
     branches: Array = field(default_factory=lambda: np.zeros(0))
     elastic: BodyMemory | None = None
+
+    def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
+        """Return the energies after a step in which nothing has acted on the body: its branches have dissipated what it
+        stores less, in the shares that the integrator tells."""
+        lost = self.dissipated - before.dissipated
+        whole = float(lost.sum())
+        share = (before.stored - self.stored) / whole if whole > 0.0 else 0.0
+        return replace(self, work=before.work, dissipated=before.dissipated + share * lost)
 
 
 class Pressed(NamedTuple):

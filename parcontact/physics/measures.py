@@ -26,8 +26,8 @@ class Measures:
     `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
     the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
     spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
-    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, whose part of
-    it is `friction_interface`.
+    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, which is
+    `force_interface`, against the sliding, and `friction_interface`. Friction is 0 where no load presses.
     """
 
     pressure: float = 0.0
@@ -42,6 +42,7 @@ class Measures:
     at_edge: bool = False
     normal_force: float = 0.0
     friction_interface: float = 0.0
+    force_interface: float = 0.0
 
     @property
     def finite(self) -> bool:

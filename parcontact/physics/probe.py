@@ -74,6 +74,7 @@ class Probe:
         corrected = (count - self._excess * sides) / points
         own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]
+        share = math.hypot(*own) / normal if presses else 0.0
         return Measures(
             pressure=load / points * unit_pressure,
             force_x=force_x,
@@ -86,7 +87,8 @@ class Probe:
             contact_area_corrected=corrected,
             at_edge=edge > 0.0,
             normal_force=normal,
-            friction_interface=math.hypot(*own) / normal if presses else 0.0,
+            friction_interface=share,
+            force_interface=share * normal or math.hypot(*own),
         )
 
 

@@ -26,27 +26,30 @@ def find(columns: Columns, detached: bool = False) -> list[PullOff]:
     """Return the pull-offs of a run in their order, from its columns `pressure`, `max_pressure`, `approach` and
     `contact_area`; it may have ended as its surfaces `detached`.
 
-    A pull begins with the highest load of a contact, and ends where the surfaces part no more: those that have come off
-    may pull each other harder than before, and what they do when they come near again is not of the pull.
+    A pull begins with the highest load of a contact, or when the surfaces last came nearer before it was lost: an
+    earlier pull that it has held is no pull-off. It ends where the surfaces part no more: those that have come off may
+    pull each other harder than before, and what they do when they come near again is not of the pull.
     """
     pressure, approach, area = (np.asarray(columns[name], float) for name in ("pressure", "approach", "contact_area"))
     touching = np.concatenate([[False], area > 0.0, [False]])
     changes = np.flatnonzero(touching[1:] != touching[:-1]).tolist()
-    pulls = [_find(pressure, approach, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
-    if detached and pulls:
-        pulls[-1] = pulls[-1]._replace(lost=pulls[-1].lost or len(area))
+    last = len(area) if detached else len(area) - 1  # row at which a contact was lost at the latest
+    pulls = [_find(pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
     return [pull for pull in pulls if pressure[pull.row] < least[pull.row]]
 
 
-def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], start: int, end: int) -> PullOff:
-    """Return the lowest load of a contact from the row `start` to before the row `end`."""
-    highest, stop = start + int(np.argmax(pressure[start:end])), end
+def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], last: int, start: int, end: int) -> PullOff:
+    """Return the lowest load of a contact from the row `start` to before the row `end`, lost if that is not after the
+    `last` one."""
+    highest, stop, lost = start + int(np.argmax(pressure[start:end])), end, end <= last
+    if lost and (nearer := np.flatnonzero(np.diff(approach[highest:end]) > 0.0)).size:
+        highest += int(nearer[-1]) + 1
     while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 where nothing held
         stop += 1
     row = highest + int(np.argmin(pressure[highest:stop]))
     near = pressure[max(row - 1, start) : min(row + 2, stop)]
-    return PullOff(row, float(np.abs(near - pressure[row]).max()), end if end < len(approach) else None)
+    return PullOff(row, float(np.abs(near - pressure[row]).max()), end if lost else None)
 
 
 def describe(columns: Columns, area: float, detached: bool = False) -> Iterator[str]:

@@ -165,3 +165,19 @@ def test_mistakes(tmp_path: Any, more: str, sentence: str) -> None:
         load(path)
     assert sentence in str(failure.value)
     assert ":5:" in str(failure.value)
+
+
+def test_heat_of_the_interface_under_no_load() -> None:
+    """Its shear heats surfaces that stick also where no load presses and friction is not defined: a thousandth of the
+    adhesive force more or less changes temperatures by a hundredth at most."""
+    stuck: dict[str, Any] = {"grid": {"points": 32, "size": 1.2e-3}, "surface": {"shape": "sphere", "radius": 2e-3}}
+    stuck |= {"material": {"model": "elastic", "shear_modulus": 3e5}, "interface": CONSTANT}
+    stuck |= {"adhesion": {"work": 0.05, "range": 2e-6}, "thermal": {"conductivity": 0.2, "diffusivity": 1e-7}}
+    heated = []
+    for force in (5e-7, 0.0, -5e-7):
+        load = {"force": force, "duration": 1.0, "time_step": 0.5}
+        slide = {"force": force, "velocity": 3e-3, "distance": 1e-4, "cells_per_step": 1}
+        _, rows = marched(job(history=[load, slide], **stuck))
+        assert (rows[-1].measures.friction > 0.0) == (force > 0.0)
+        heated.append(rows[-1].added[-2:])
+    assert heated[1:] == [pytest.approx(heated[0], rel=1e-2)] * 2

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.effects.interface import shares
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
+from parcontact.physics.interface import InterfaceFriction
 from parcontact.physics.measures import SIDE, Measures
 from parcontact.physics.probe import Probe
 from parcontact.physics.shapes import Round
@@ -139,7 +141,9 @@ def test_no_friction_where_pull_and_push_balance(comm: MPI.Intracomm, more: floa
     """What rounding leaves of two forces that balance is no load; a load of a millionth of the pull is one."""
     surface = wave(comm, (3, 0))
     slab, h = surface.slab, surface.heights((0.0, 0.0), surface.slab.empty())
-    p = more + np.cos(angle(slab, (3, 0)) - 0.6)
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h, h, 0.0, (0.0, 0.0), touching=np.ones_like(p))
+    p, instant = more + np.cos(angle(slab, (3, 0)) - 0.6), ((0.0, 0.0), (0.3, 0.0))
+    probe = Probe(slab, surface, UNITS, InterfaceFriction(2e5))
+    found = probe.measure(p, ALPHA, h, h, 0.0, *instant, touching=np.ones_like(p))
     assert found.force_x != 0.0
-    assert (found.friction > 0.0) == defined
+    assert_allclose(found.force_interface, 2e5 * LX * LY, rtol=1e-15)
+    assert [each != 0.0 for each in (found.friction, found.friction_x, *shares(found, instant[1]))] == [defined] * 4

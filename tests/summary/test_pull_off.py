@@ -48,6 +48,13 @@ def test_two_pulls() -> None:
     assert [text.split(":")[0] for text in describe(rows, 1.0)] == ["pull-off 1", "pull-off 2"]
 
 
+def test_a_pull_that_was_held_is_no_pull_off() -> None:
+    """Rubber holds a fast pull, and comes off slowly under less."""
+    again = [(-8.0, -1e-6, 0.2), (1.0, 0.0, 0.2), *PULL]
+    assert find(table(*NEAR, *again, *OFF)) == [PullOff(6, 4.0, 8)]
+    assert find(table(*NEAR, *again)) == [PullOff(4, 10.0, None)]
+
+
 def test_a_contact_that_holds_has_none() -> None:
     (held,) = describe(table(*NEAR, *PULL), 0.5)
     assert held == "largest pull so far: 1.5 N (3 Pa), at t = 4 s, approach -1 um; contact holds"
