@@ -6,6 +6,7 @@ import argparse
 from functools import partial
 from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from ..parallel.root import on_root
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case
     from .. import job as jobs
 
     cases = jobs.load_cases(options.job, overrides(options))
+    if getattr(options, "until", None) is not None and not cases[0].job.history:
+        raise InputError("--until: a friction curve has no time to go on to; leave it out")
     return cases, jobs.choose(cases, options.case)
 
 

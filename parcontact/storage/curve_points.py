@@ -26,9 +26,10 @@ class Wanted(NamedTuple):
 
 
 def asked(speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()) -> list[Wanted]:
-    """Return every speed under every pressure at every temperature, in the order in which they are solved."""
+    """Return every speed under every pressure at every temperature, each point once, in the order in which they are
+    solved."""
     order = product(temperatures or (math.nan,), pressures, speeds)
-    return [Wanted(speed, pressure, temperature) for temperature, pressure, speed in order]
+    return list(dict.fromkeys(Wanted(speed, pressure, temperature) for temperature, pressure, speed in order))
 
 
 def of_table(columns: Mapping[str, Sequence[float]]) -> list[Wanted]:

@@ -88,5 +88,5 @@ def read(path: Path) -> Columns:
             try:
                 values.append(float(text or "nan"))
             except ValueError:
-                raise InputError(f"{path}, line {number}: {name} is {text[:20]!r}, not a number") from None
+                raise InputError(f"{path}, line {number}: {name} is {text[:20]!r}, not a number; {MEND}") from None
     return Columns(path, zip(names, series, strict=True))

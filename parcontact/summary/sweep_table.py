@@ -33,6 +33,7 @@ NUMBERS = {"case", *COLUMNS, *PULL_OFFS, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
+FIRST = {"measures.csv": ("step", "time"), "steady.csv": ("velocity", "pressure")}  # columns that tables have
 FAILURE = ".failure"  # why a case has failed
 
 
@@ -94,8 +95,7 @@ def _row(case: Case) -> dict[str, Any]:
     directory = case.job.output.directory
     row: dict[str, Any] = {"case": case.number, **case.settings, "state": state(case)}
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
-        there = (directory / name).is_file()
-        columns: dict[str, list[float]] = tables.read(directory / name) if there else {"time": []}
+        columns = _columns(directory / name) or {"time": []}
         if columns["time"]:
             found = slide.measure(case.job.history, columns)
             row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
@@ -121,9 +121,7 @@ def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, f
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:
     """Yield the rows of a friction curve as far as it has come."""
-    table = case.job.output.directory / "steady.csv"
-    if table.is_file():
-        columns: dict[str, list[float]] = tables.read(table)
+    if columns := _columns(case.job.output.directory / "steady.csv"):
         head = {"case": case.number, **case.settings, "state": state(case)}
         numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]
         for k, place in enumerate(curve_points.of_table(columns)):
@@ -131,15 +129,25 @@ def _points(case: Case) -> Iterator[dict[str, Any]]:
             yield head | places | {name: columns[name][k] for name in numbers}
 
 
+def _columns(path: Path) -> dict[str, list[float]]:
+    """Return the columns of a table by name; none where there is no table, or a damaged one: it concerns its case
+    alone, which fails for it."""
+    with suppress(InputError):
+        columns = tables.read(path) if path.is_file() else {}
+        return columns if {*columns} >= {*FIRST.get(path.name, ())} else {}
+    return {}
+
+
 def state(case: Case) -> str:
-    """Return how far a case has come: done | failed | begun | -"""
+    """Return how far a case has come: done | failed | begun | -, or that its table is damaged."""
     directory = case.job.output.directory
     if (directory / FAILURE).is_file():
         return "failed"
     table = directory / ("measures.csv" if case.job.history else "steady.csv")
     if not table.is_file():
         return "-"
-    columns = tables.read(table)
+    if not (columns := _columns(table)):
+        return "damaged"
     if not case.job.history:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]

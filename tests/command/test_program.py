@@ -80,6 +80,7 @@ BAD: list[tuple[Sequence[str], str]] = [
     (["steady", "job.yaml", "--velocities", "1:10"], "must be first:last:count or a list of numbers, got '1:10'"),
     (["--out", "", "job.yaml"], "must name a directory, got ''"),
     (["heights.yaml"], "heights.npy has shape (3, 4), but the grid has (ny, nx) = (12, 16)"),
+    (["curve.yaml", "--until", "1"], "--until: a friction curve has no time to go on to; leave it out"),
     (["one_solve.yaml", "--until", "1"], "--until 1 is beyond the end of the history, t = 0 s"),
 ]
 
@@ -89,6 +90,7 @@ def test_bad_input(main: Main, tmp_path: Path, words: Sequence[str], message: st
     """One message, exit code 2, and nothing written."""
     job(tmp_path / "job.yaml")
     job(tmp_path / "one_solve.yaml", history=[{"pressure": 1e4}])
+    job(tmp_path / "curve.yaml", history=[], steady={"velocities": [0.1], "pressures": [1e4]})
     np.save(tmp_path / "heights.npy", np.zeros((3, 4)))
     job(tmp_path / "heights.yaml", surface={"shape": "file", "path": "heights.npy"})
     (tmp_path / "broken.yaml").write_text("{")

@@ -17,6 +17,11 @@ def test_every_speed_under_every_pressure_at_every_temperature() -> None:
     assert lacking(asked(speeds, pressures), [(v, p, NONE) for p in pressures for v in speeds]) == []
 
 
+def test_a_point_that_is_asked_for_again_is_one() -> None:
+    assert asked((0.1, 1.0, 0.1), (1e5, 1e5)) == asked((0.1, 1.0), (1e5,))
+    assert asked((0.1, 0.1), (1e5,), (20.0, 20.0)) == [(0.1, 1e5, 20.0)]
+
+
 def test_what_a_table_lacks() -> None:
     """Speeds and pressures to rounding; a temperature that was not asked for is no other one."""
     there = of_table(COLUMNS)

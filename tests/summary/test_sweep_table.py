@@ -9,6 +9,7 @@ from sweeping import JOB, table
 from parcontact.__main__ import main
 from parcontact.job import Case, load_cases
 from parcontact.plotting import sweep as pictures
+from parcontact.run import sweep
 from parcontact.storage import tables
 from parcontact.summary import sweep_table
 
@@ -79,6 +80,33 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
     mean, each = chart.series
     assert (chart.x.name, mean.x.tolist(), each.x.size) == ("velocity", [0.1, 1.0], 6)
     assert mean.y.tolist() == pytest.approx([0.3, 0.15], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "state"),
+    [
+        ("velocity,pressure,friction\n0.1,1e4,0.1\n1.0,1e4,0.1\n", "done"),
+        ("velocity,pressure,friction\n0.1,1e4,0.1\n1.0,1e4,x\n", "damaged"),
+        ("velocity,pressure,friction\n0.1,1e4\n", "damaged"),
+        ("elocity,pressure,friction\n0.1,1e4,0.1\n", "damaged"),
+    ],
+)
+def test_a_damaged_table_concerns_its_case_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, state: str
+) -> None:
+    """The tables of the sweep are written, and the case is still to do."""
+    monkeypatch.chdir(tmp_path)
+    curve = "steady: {velocities: [0.1, 1.0], pressures: [1.0e+4]}\n"
+    Path("job.yaml").write_text(JOB[: JOB.index("history:")] + curve + "sweep: [{surface.seed: [1, 2]}]\n")
+    cases = load_cases(Path("job.yaml"))
+    sound = "velocity,pressure,friction\n0.1,1e4,0.1\n1.0,1e4,0.1\n"
+    for case, lines in zip(cases, (text, sound), strict=True):
+        case.job.output.directory.mkdir(parents=True)
+        (case.job.output.directory / "steady.csv").write_text(lines)
+    sweep_table.write(Path("out/job"), cases)
+    assert [row["state"] for row in table()] == [state, "done"]
+    assert {row["case"] for row in table("sweep_curves.csv")} == ({"0", "1"} if state == "done" else {"1"})
+    assert len(sweep.to_do(cases, afresh=False)) == (state != "done")
 
 
 def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
