@@ -14,7 +14,7 @@ from .law import Law
 
 # accuracy
 SHARPER = 10.0  # times the certificate of contacts that do not stick: with it the load is as right as theirs
-SPURIOUS, NET = 0.5, 5.0  # times pressures that are not those of the law: with them loads and pressures are right
+SPURIOUS, NET = 2.0, 5.0  # times pressures that are not those of the law: with them loads and pressures are right
 LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to less are none
 
 
@@ -79,7 +79,7 @@ def certify(slab: Slab, it: Iterate, working: Array, g: Array, q: Array, sigma: 
 
     The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it. Wrong
     of the load are pressures that are not those of the law: their magnitudes, of which waves of a few points hardly
-    move the gap, count for half, and their sum five times.
+    move the gap, count twice, and their sum five times.
     """
     *sums, spurious, net = slab.sum(*kernels.judge(working, g, it.heights, q, it.m, sigma, z))
     load, first, second, wrong = sums
