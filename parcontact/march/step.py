@@ -127,8 +127,8 @@ def _remarked(scene: Scene, state: State, solved: Solved) -> Solved:
     if front <= sticking.SNAP_FRONT:
         return solved
     remark = (
-        f"{failure.where(scene, step)}: the edge of contact moves by {0.5 * front:.2g} process zones, and rates are "
-        "resolved up to half of one: use shorter steps, or time_step: auto; further steps are not looked at"
+        f"{failure.where(scene, step)}: the edge of contact moves by {0.5 * front:.2g} times a process zone, and rates "
+        "are resolved up to half of one: use shorter steps, or time_step: auto; further steps are not looked at"
     )
     memory = replace(stuck.memory, told=True)
     return replace(solved, stuck=stuck._replace(memory=memory), remark=solved.remark or remark)

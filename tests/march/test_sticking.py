@@ -249,7 +249,7 @@ def test_given_steps_that_are_too_long_are_said_once() -> None:
     job["adhesion"] = {**STICK, "range": 3e-7}
     pull = {"approach": {"from": 1e-6, "to": -1e-6}, "duration": 3.0, "time_step": 1.0}
     _, found = marched({**job, "history": [{"approach": 1e-6}, pull]})
-    assert ["process zones" in row.remark for row in found].count(True) == 1
+    assert ["process zone" in row.remark for row in found].count(True) == 1
 
 
 def test_chosen_steps_of_surfaces_apart_are_long() -> None:
