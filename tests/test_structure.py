@@ -133,7 +133,7 @@ MAKERS = {"__init__", "__post_init__"}
 
 @pytest.mark.parametrize("directory", [HOUSE, ROOT / "scripts", ROOT / "tests"], ids=lambda path: path.name)
 def test_files_are_short(directory: Path) -> None:
-    lengths = {path.name: len(path.read_text().splitlines()) for path in directory.rglob("*.py")}
+    lengths = {path.relative_to(directory): len(path.read_text().splitlines()) for path in directory.rglob("*.py")}
     assert not {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE}
 
 

@@ -225,7 +225,8 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
     if contact.failure and not _accepts(scene, contact):
         moved = math.hypot(*cells_moved(scene, step, state.position))
         raise failure.of_solve(scene, step, contact, contact, [], trial.effective, moved)
-    instant = step.position, step.velocity, stuck.touching
+    _, pull, *_ = stuck.columns
+    instant = step.position, step.velocity, stuck.touching, pull
     measures = scene.probe.measure(contact.p, trial.alpha, contact.u, trial.effective, contact.d, *instant)
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)

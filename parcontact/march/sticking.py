@@ -274,8 +274,7 @@ def entries(memory: StickingMemory, measures: Measures, height: float, modulus: 
 
 
 def restored_measures(saved: Saved) -> Measures:
-    """Return the measures of the last step: loads and areas with which the next one is compared. What a version before
-    this one did not save is 0."""
+    """Return the measures of the last step, with which the next one is compared; what was not saved is 0."""
     numbers = dict(zip(Measures.__dataclass_fields__, saved["measures"].tolist(), strict=False))
     return Measures(**{**numbers, "at_edge": bool(numbers["at_edge"])})
 

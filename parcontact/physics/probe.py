@@ -10,8 +10,6 @@ longer than wide it is less (`measures.excess_of`).
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
@@ -48,11 +46,13 @@ class Probe:
         displacement: Vector,
         velocity: Vector = (0.0, 0.0),
         touching: Array | None = None,
+        pull: float = 0.0,
     ) -> Measures:
         """Measure the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving
         with `velocity` [m/s]; collective.
 
-        `touching` is a map that is not 0 where the surfaces touch; without one that is where there is a pressure.
+        `touching` is a map that is not 0 where the surfaces touch; without one that is where there is a pressure. All
+        tension adds up to the force `pull` [N].
         Friction is 0 where no load presses: none, tension, or what rounding leaves of two forces that balance. Where
         nothing touches all pressure is tension, and a load above 0 is an error of the solve.
         """
@@ -61,7 +61,6 @@ class Probe:
         mask = p if touching is None else touching
         *sums, largest = loops.measure(p, u, h, mask, rows.before_first(self.slab, mask, cyclic), cyclic)
         edge = 0.0 if cyclic else _largest_at_edge(self.slab, mask)
-        pull = 0.0 if touching is None else self.slab.sum(float(np.minimum(p, 0.0).sum()))[0]
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
@@ -70,11 +69,11 @@ class Probe:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
-        presses = load > -LEAST_LOAD * pull and count > 0
+        presses = normal > LEAST_LOAD * pull and count > 0
         corrected = (count - self._excess * sides) / points
         own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]
-        share = math.hypot(*own) / normal if presses else 0.0
+        rubbed = math.hypot(*own)
         return Measures(
             pressure=load / points * unit_pressure,
             force_x=force_x,
@@ -87,8 +86,8 @@ class Probe:
             contact_area_corrected=corrected,
             at_edge=edge > 0.0,
             normal_force=normal,
-            friction_interface=share,
-            force_interface=share * normal or math.hypot(*own),
+            friction_interface=rubbed / normal if presses else 0.0,
+            force_interface=rubbed,
         )
 
 

@@ -89,7 +89,12 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
     load_axis, load = run.load
     area_axis, area = run.in_contact
     panels: tuple[tuple[str, Axis, dict[str, Array], bool], ...] = (
-        ("friction", Axis(friction), {"": columns["friction_x" if signed else "friction"]}, run.slides),
+        (
+            "friction",
+            Axis(friction),
+            {"": columns["friction_x" if signed else "friction"]},
+            run.slides and bool(columns["friction"].any()),  # it is 0 where no load presses
+        ),
         ("area", area_axis, {"": area}, True),
         (
             "approach",

@@ -155,9 +155,9 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     step, time = int(columns["step"][-1]), columns["time"][-1]
     ended = claim is not None and claim.finished is not None and claim.finished[0] == step
     how = "finished" if ended else "not finished"
-    came_off = ended and claim is not None and bool(claim.detached)
-    if came_off and claim is not None:
-        yield f"  {claim.detached}"
+    came_off = claim.detached if ended and claim is not None else ""
+    if came_off:
+        yield f"  {came_off}"
     yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
     resolved = table.with_name(RESOLVED)
     job = shown_job(resolved) if resolved.exists() else None
@@ -167,7 +167,7 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if job is not None:
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
-        yield from (f"  {text}" for text in pull_off.describe(columns, job.grid.lx * job.grid.ly, came_off))
+        yield from (f"  {text}" for text in pull_off.describe(columns, job.grid.lx * job.grid.ly, bool(came_off)))
 
 
 def _slides(job: Job | None) -> bool:

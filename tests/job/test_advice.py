@@ -1,4 +1,4 @@
-"""What a job is warned of, or refused for, as it is read."""
+"""A job is warned of odd values, and refused for impossible ones, as it is read."""
 
 from pathlib import Path
 

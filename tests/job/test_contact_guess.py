@@ -73,8 +73,8 @@ def test_a_body_is_stiff_for_waves_that_pass_fast() -> None:
 
 
 def test_phases_at_edges_and_cells() -> None:
-    """Of each load, in right angles: of one branch atan(g x/(1 + (1 + g) x^2)), with x the frequency times its time and
-    g its modulus over that at rest; of an elastic body, or one at rest, none."""
+    """Phases are in right angles. One branch lags by atan(g x/(1 + (1 + g) x^2)) at each load, with x the frequency
+    times its time and g its modulus over that at rest; elastic bodies and bodies at rest do not lag."""
     body = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "relaxation_time": 1e-3}]}
     velocities = [1e-9, 3e-7, 1e-5]
 

@@ -138,12 +138,14 @@ def test_a_load_on_nothing_has_no_friction(comm: MPI.Intracomm, touches: bool) -
 
 @pytest.mark.parametrize(("more", "defined"), [(0.0, False), (1e-12, False), (1e-6, True), (-1e-6, False)])
 def test_no_friction_where_pull_and_push_balance(comm: MPI.Intracomm, more: float, defined: bool) -> None:
-    """What rounding leaves of two forces that balance is no load; a load of a millionth of the pull is one."""
+    """A load that rounding leaves of two forces is none; a load of a millionth of the pull is one."""
     surface = wave(comm, (3, 0))
     slab, h = surface.slab, surface.heights((0.0, 0.0), surface.slab.empty())
     p, instant = more + np.cos(angle(slab, (3, 0)) - 0.6), ((0.0, 0.0), (0.3, 0.0))
+    (tension,) = slab.sum(-float(np.minimum(p, 0.0).sum()))
+    pull = tension * ALPHA * UNITS.pressure * LX * LY / (slab.nx * slab.ny)
     probe = Probe(slab, surface, UNITS, InterfaceFriction(2e5))
-    found = probe.measure(p, ALPHA, h, h, 0.0, *instant, touching=np.ones_like(p))
+    found = probe.measure(p, ALPHA, h, h, 0.0, *instant, touching=np.ones_like(p), pull=pull)
     assert found.force_x != 0.0
     assert_allclose(found.force_interface, 2e5 * LX * LY, rtol=1e-15)
     assert [each != 0.0 for each in (found.friction, found.friction_x, *shares(found, instant[1]))] == [defined] * 4

@@ -29,7 +29,7 @@ def test_by_approach() -> None:
 
 
 def test_surfaces_that_pull_hardest_when_they_have_come_off() -> None:
-    """As of a stiff sphere: the lowest load is behind the end of contact, but not on the way back."""
+    """A stiff sphere pulls so: its lowest load is behind the end of contact, but not on the way back."""
     rows = table(*NEAR, *PULL, (-4.0, -3e-6, 0.0), (-2.0, -4e-6, 0.0), (-6.0, -3e-6, 0.0))
     assert find(rows) == [PullOff(6, 2.0, 6)]
 
@@ -61,7 +61,7 @@ def test_a_contact_that_holds_has_none() -> None:
 
 
 def test_a_run_that_ended_with_its_contact_has_one() -> None:
-    """Nothing held the load after the last row."""
+    """The load after the last row was held by nothing."""
     assert find(table(*NEAR, *PULL), detached=True) == [PullOff(4, 5.0, 6)]
     (told,) = describe(table(*NEAR, *PULL), 1.0, detached=True)
     assert told.endswith("the steps beside it differ by 5 N, and nothing held the next load")

@@ -26,7 +26,7 @@ STIFFER = 0.1  # tuning: of the softest waves: where longer ones are stiffer by 
 
 
 class CellSums:
-    """M on one grid; a map in single precision on each grid of larger cells, and two bytes for each point or cell."""
+    """M on one grid; a map in single precision on each grid of larger cells, and a byte for each point or cell."""
 
     def __init__(self, slab: Slab, pairs: int, weights: list[float]) -> None:
         self._weights, self._levels = weights, levels_of(slab, pairs)

@@ -44,8 +44,8 @@ def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int)
 @pytest.mark.parametrize("ny", [64, 16])
 @pytest.mark.parametrize("layer", [None, Layer(0.1, "smooth", 0.3), Layer(0.5, "bonded", 0.3)])
 def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | None) -> None:
-    """Of waves along x, y and between, from two points to the whole box, on square cells and on cells of 4 : 1, 0.5 to
-    2.5 times as much: the interpolation takes a wave of four points for half of what it is."""
+    """Waves along x, y and between, from two points to the whole box, come out 0.5 to 2.5 times as large, on square
+    cells and on cells of 4 : 1: the interpolation takes a wave of four points for half of what it is."""
     slab, body = Slab(MPI.COMM_SELF, 64, ny), HalfSpace((1.0, 1.0), poisson=0.3, layer=layer)
     sums = CellSums.on(slab, body.size, body.compliance)
     assert sums is not None
@@ -73,7 +73,7 @@ def test_none_where_they_are_no_good(nx: int, ny: int, layer: Layer | None) -> N
 @pytest.mark.mpi
 @pytest.mark.parametrize(("nx", "ny"), [(24, 20), (41, 9), (8, 2)])
 def test_footprint(nx: int, ny: int) -> None:
-    """What it says is held, to the byte, on any ranks."""
+    """The bytes that it names are held, on any ranks."""
     slab, body = Slab(MPI.COMM_WORLD, nx, ny), HalfSpace((1.0, 1.0))
     before = slab.tally["map bytes"]
     made = CellSums.on(slab, body.size, body.compliance)
