@@ -106,6 +106,8 @@ def test_forces_of_a_slide_under_no_load() -> None:
     (force, *_), where = said([REST, CLIMB, SETTLE], table), "in 2 of 3 steps of the slide, in which no load presses"
     mean = "5 N at most, and 2.17 N in the mean"  # 3.5 over a metre, 1.5 over two
     assert force.startswith(f"friction is not defined {where}, and is 0 in the table: the tangential force is {mean}")
+    table |= {"force_x": [9.0, 9.0, 0.0, 0.0, -1.0], "force_y": [0.0] * 5}  # no force, as where nothing touches
+    assert said([REST, CLIMB, SETTLE], table)[0].startswith("mu_max, the highest friction of the slide, is 6")
 
 
 def test_sentences_about_a_slide_that_others_follow() -> None:
