@@ -47,8 +47,8 @@ def test_rough(shared_path: Path, comm: MPI.Intracomm, speed: float, share: floa
 
 
 def test_operator_calls_of_a_contact(shared_path: Path) -> None:
-    """At most 1440 are taken: 1278 were seen. With the cut of other bodies, or contacts ten times as close, there are 1615
-    and 1821."""
+    """At most 1440 are taken: 1278 were seen. With the cut of other bodies there are 1615, with contacts ten times as
+    close 1821."""
     finer = ROUGH.replace("points: 64", "points: 128").replace("1.25e-4", "6.25e-5")
     states = sliding(shared_path, finer, MPI.COMM_SELF)
     assert states.solve((0.3 * PEAK, 0.0), 0.6 * 0.05 * MODULUS * float(np.sqrt(RATIO))).operator_calls <= 1440
