@@ -1,4 +1,5 @@
-"""Grids of ever larger cells, each made of two by two cells of the one before, down to a single cell.
+"""Grids of ever larger cells, each made of two by two cells of the one before, down to a single cell; the first of
+them, if so many are wanted, of two cells along y.
 
 A cell that is cut by the end of the grid has what there is of it. Each cell is with the rank that has its last row in
 the grid before, until there are so few cells that every rank has all of them, which needs no more messages.
@@ -20,30 +21,31 @@ from .slab import Slab, dealt_to
 FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
 
 
-def steps_of(slab: Slab) -> list["Step"]:
-    """All steps from a grid to a single cell, the finest first. A grid that every rank has is that of a rank alone."""
+def steps_of(slab: Slab, pairs: int = 0) -> list["Step"]:
+    """All steps from a grid to a single cell, the finest first; so many to `pairs` along y come first. A grid that
+    every rank has is that of a rank alone."""
     grids = [slab]
     dealt = slab.dealt
-    for nx, ny, alone in _larger(slab.nx, slab.ny, len(dealt)):
+    for nx, ny, alone in _larger(slab.nx, slab.ny, len(dealt), pairs):
         dealt = [slice(0, ny)] if alone else halves(dealt)
         grids.append(Slab(MPI.COMM_SELF if alone else slab.comm, nx, ny, slab.tally, dealt))
     return [Step(fine, coarse) for fine, coarse in pairwise(grids)]
 
 
-def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None) -> int:
-    """Cells of the next grids, `most` of them or all, that a rank has."""
+def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None, pairs: int = 0) -> int:
+    """Cells of the next grids, `most` of them or all, that a rank has; the first of so many `pairs` along y."""
     total, part, last = 0, dealt_to(ny, ranks, rank), rank == ranks - 1
-    for width, height, alone in islice(_larger(nx, ny, ranks), most):
+    for width, height, alone in islice(_larger(nx, ny, ranks, pairs), most):
         part = slice(0, height) if alone else slice(part.start // 2, (part.stop + last) // 2)  # as in `halves`
         total += width * (part.stop - part.start)
     return total
 
 
-def _larger(nx: int, ny: int, ranks: int) -> Iterator[tuple[int, int, bool]]:
+def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, bool]]:
     """Cells along x and y of each larger grid, and whether every rank has all of them."""
     enough, alone = nx * ny // (FEW * ranks), ranks == 1
-    while nx * ny > 1:
-        nx, ny = (nx + 1) // 2, (ny + 1) // 2
+    while nx * ny > 1 or pairs > 0:
+        nx, ny, pairs = nx if pairs > 0 else (nx + 1) // 2, (ny + 1) // 2, pairs - 1
         alone = alone or nx * ny <= enough
         yield nx, ny, alone
 

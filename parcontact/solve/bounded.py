@@ -17,7 +17,7 @@ import numpy as np
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .constraint import CELL, Cells, Set
+from .constraint import Cells, Set
 
 MAX_PASSES = 20  # accuracy: of scaling to the load, of which each takes in those that reach H; 2 or 3 do as a rule
 LOAD_ROUNDING = 1e-14  # accuracy: of the load, a smaller part of which cannot be told from none
@@ -133,8 +133,8 @@ def _advance(p_old, t, step, p, highest, cells, sums):
             value = p_old[j, i] - step * t[j, i]
             kept = min(max(value, 0.0), highest) if value == value else value
             p[j, i] = kept
-            row[i // CELL] += kept if kept < highest else 0.0
-            row[columns + i // CELL] += kept - value
+            row[i // cells.columns] += kept if kept < highest else 0.0
+            row[columns + i // cells.columns] += kept - value
             row_load += kept
             row_cut += abs(kept - value)
         load += row_load
@@ -148,7 +148,7 @@ def _scale_cells(p, highest, cells, factors):
     for j in range(p.shape[0]):
         row = factors[(j + cells.above) // cells.rows]
         for i in range(p.shape[1]):
-            p[j, i] = min(p[j, i] * row[i // CELL], highest) if p[j, i] < highest else p[j, i]
+            p[j, i] = min(p[j, i] * row[i // cells.columns], highest) if p[j, i] < highest else p[j, i]
 
 
 @loop

@@ -13,16 +13,17 @@ from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
 
-CELL = 16  # tuning: points along x of a cell of `LocalLoad`; 8 and 32 need a few iterations more
+CELL = 16  # tuning: points along a side of a cell of `LocalLoad`; 8 and 32 need a few iterations more
 Set = NDArray[np.bool_]
 
 
 class Cells(NamedTuple):
-    """Cells of `LocalLoad` on a rank: the `rows` of points of each, and how many of the first one another rank `above`
-    has."""
+    """Cells of `LocalLoad` on a rank: the `rows` and `columns` of points of each, and how many rows of the first one
+    another rank `above` has."""
 
     rows: int
     above: int
+    columns: int
 
 
 class Constraint(Protocol):
@@ -144,8 +145,8 @@ def advance(p_old, t, step, p, cells, sums):
         if (j + cells.above + 1) % cells.rows == 0 or j + 1 == p.shape[0]:
             row = sums[(j + cells.above) // cells.rows]
             for i in range(p.shape[1]):
-                row[i // CELL] += load[i]
-                row[columns + i // CELL] += cut[i]
+                row[i // cells.columns] += load[i]
+                row[columns + i // cells.columns] += cut[i]
             load[:] = 0.0
             cut[:] = 0.0
 
@@ -158,7 +159,7 @@ def scale_cells(p, cells, factors):
         if j == 0 or (j + cells.above) % cells.rows == 0:
             row = factors[(j + cells.above) // cells.rows]
             for i in range(line.size):
-                line[i] = row[i // CELL]
+                line[i] = row[i // cells.columns]
         for i in range(p.shape[1]):
             p[j, i] *= line[i]
 

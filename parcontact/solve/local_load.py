@@ -5,8 +5,8 @@ scaled by one factor to take it back, every spot would be lifted or lowered by i
 much more, on a large grid, than the gaps are beside an edge, so that points penetrate along all edges, enter, and are
 cut off again. So each cell of CELL x CELL points gives back what was added in it, which changes the displacement near
 by only. From a cold start on 4096 x 4096 points that makes 22 of 57 applications of the operator. Where points are
-nearer along x than along y, cells have fewer rows and are about square: in higher ones spots give back what others
-added, and projected steps towards a steady state may cycle.
+nearer along one direction, cells have fewer points along the other and are about square: in longer ones spots give back
+what others added, and projected steps towards a steady state may cycle.
 """
 
 from itertools import pairwise
@@ -18,7 +18,7 @@ from ..parallel.slab import Array, Slab
 from .constraint import CELL, Cells, Constraint
 
 LEAST_CUT = 3e-4  # tuning, of the load: less disturbs no long wave, and is better taken from all points alike
-LEAST_ROWS = 4  # tuning: of a cell; with fewer, as on cells of 16 : 1, contacts may cycle
+LEAST = 4  # tuning: points along a side of a cell; with fewer, as on cells of 16 : 1, contacts may cycle
 MOST_GIVEN_BACK = 0.5  # tuning, of the load of a cell: more is not taken from it
 
 
@@ -26,10 +26,11 @@ class LocalLoad:
     """Cells of one grid, the same on any number of ranks; it holds no maps."""
 
     def __init__(self, slab: Slab, pairs: int = 0) -> None:
-        """On a grid where so many `pairs` along x make square cells."""
-        self._slab, rows = slab, max(CELL >> pairs, LEAST_ROWS)
+        """On a grid where so many `pairs` make square cells (`preconditioner.levels`)."""
+        self._slab = slab
+        rows, columns = (max(CELL >> max(count, 0), LEAST) for count in (pairs, -pairs))
         touched = [_rows_of_cells(part, rows) for part in slab.dealt]
-        rank, width = slab.comm.rank, -(-slab.nx // CELL)
+        rank, width = slab.comm.rank, -(-slab.nx // columns)
         ends = np.cumsum([0] + [part.stop - part.start for part in touched]).tolist()
         stacked = [slice(start, stop) for start, stop in pairwise(ends)]
         self._stack = Slab(slab.comm, 2 * width, ends[-1], slab.tally, stacked)
@@ -37,7 +38,7 @@ class LocalLoad:
         self._wanted = [slice(*np.searchsorted(numbers, [part.start, part.stop]).tolist()) for part in touched]
         own = np.arange(touched[rank].start, touched[rank].stop)
         self._starts = np.searchsorted(numbers[self._wanted[rank]], own)
-        self._cells = Cells(rows, slab.rows.start % rows)
+        self._cells = Cells(rows, slab.rows.start % rows, columns)
         self._sums = np.zeros(self._stack.shape)
 
     def advance(self, constraint: Constraint, p_old: Array, t: Array, step: float, p: Array) -> tuple[float, float]:

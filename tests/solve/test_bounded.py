@@ -162,7 +162,7 @@ def test_kernels_without_a_bound_are_those_of_pressures_that_are_not_negative(sh
     np.testing.assert_array_equal(sets[0], sets[1])
     moved, sums = np.empty((2, *shape)), np.empty((2, 1 + shape[0] // 16 + 1, 2 * (1 + shape[1] // 16)))
     for each, new, cells in zip(both, moved, sums, strict=True):
-        each.advance(p, t, 0.7, new, Cells(16, 3), cells)
+        each.advance(p, t, 0.7, new, Cells(16, 3, 16), cells)
     np.testing.assert_array_equal(moved[0], moved[1])
     assert_allclose(sums[1], sums[0], rtol=ROUNDING, atol=ROUNDING)
 
@@ -171,7 +171,7 @@ def test_what_is_cut_off_at_both_bounds() -> None:
     """Cells have the free load, and what was added less what was taken off; a NaN stays one."""
     random = np.random.default_rng(3)
     value, p, sums = random.normal(size=(20, 33)), np.empty((20, 33)), np.empty((2, 6))
-    load, cut = Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3), sums)
+    load, cut = Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3, 16), sums)
     kept = np.clip(value, 0.0, 0.5)
     np.testing.assert_array_equal(p, kept)
     assert_allclose([load, cut], [kept.sum(), np.abs(kept - value).sum()], rtol=ROUNDING)
@@ -180,7 +180,7 @@ def test_what_is_cut_off_at_both_bounds() -> None:
             cell, change = kept[rows, columns], (kept - value)[rows, columns]
             assert_allclose(sums[j, [i, i + 3]], [cell[cell < 0.5].sum(), change.sum()], rtol=ROUNDING, atol=ROUNDING)
     value[2, 2] = np.nan
-    assert np.isnan(Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3), sums)).all()
+    assert np.isnan(Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3, 16), sums)).all()
 
 
 @pytest.mark.mpi

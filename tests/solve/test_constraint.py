@@ -84,24 +84,25 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
 
 
 @pytest.mark.parametrize(("high", "above"), [(CELL, 0), (CELL, 3), (4, 3)])
+@pytest.mark.parametrize("wide", [CELL, 4])
 @pytest.mark.parametrize("shape", [(40, 33), (1, 1), (16, 16)])
-def test_cells(shape: tuple[int, int], high: int, above: int, dtype: type[np.floating]) -> None:
+def test_cells(shape: tuple[int, int], high: int, above: int, wide: int, dtype: type[np.floating]) -> None:
     """Pressures cut off at 0, what that adds to each cell, and cells scaled one by one; the first is cut by a rank."""
     maps = Maps(shape, dtype)
     p, step = np.empty(shape), 0.7
-    rows, columns = (shape[0] + above - 1) // high + 1, (shape[1] - 1) // CELL + 1
+    rows, columns = (shape[0] + above - 1) // high + 1, (shape[1] - 1) // wide + 1
     sums, factors = np.full((rows, 2 * columns), 9.0), np.random.default_rng(2).random((rows, columns))
-    load, cut = NonNegative().advance(maps.u, maps.t, step, p, Cells(high, above), sums)
+    load, cut = NonNegative().advance(maps.u, maps.t, step, p, Cells(high, above, wide), sums)
     value = maps.wide("u") - step * maps.wide("t")
     kept = np.maximum(value, 0.0)
     np.testing.assert_allclose(p, kept, rtol=0, atol=10 * ROUNDING[dtype])
-    whole = np.zeros((2, rows * high, columns * CELL))
+    whole = np.zeros((2, rows * high, columns * wide))
     whole[0, above : above + shape[0], : shape[1]] = kept
     whole[1, above : above + shape[0], : shape[1]] = kept - value
-    expected = whole.reshape(2, rows, high, columns, CELL).sum(axis=(2, 4))
+    expected = whole.reshape(2, rows, high, columns, wide).sum(axis=(2, 4))
     np.testing.assert_allclose(sums, np.hstack(list(expected)), atol=1e3 * ROUNDING[dtype])
     np.testing.assert_allclose([load, cut], expected.sum(axis=(1, 2)), rtol=1e3 * ROUNDING[dtype])
     before = p.copy()
-    constraint.scale_cells(p, Cells(high, above), factors)
-    of_points = np.repeat(np.repeat(factors, high, axis=0), CELL, axis=1)[above : above + shape[0], : shape[1]]
+    constraint.scale_cells(p, Cells(high, above, wide), factors)
+    of_points = np.repeat(np.repeat(factors, high, axis=0), wide, axis=1)[above : above + shape[0], : shape[1]]
     np.testing.assert_allclose(p, before * of_points, rtol=1e-15)

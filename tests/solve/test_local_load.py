@@ -30,12 +30,12 @@ def cut_off(values: Map, near_by: bool = True, pairs: int = 0) -> tuple[slice, M
     return slab.rows, p, load, cut
 
 
-def expected(values: Map, rows: int) -> Map:
-    """Cell by cell, of so many rows."""
+def expected(values: Map, rows: int, columns: int) -> Map:
+    """Cell by cell, of so many rows and columns."""
     out = np.maximum(values, 0.0)
     for j in range(0, values.shape[0], rows):
-        for i in range(0, values.shape[1], CELL):
-            cell = np.s_[j : j + rows, i : i + CELL]
+        for i in range(0, values.shape[1], columns):
+            cell = np.s_[j : j + rows, i : i + columns]
             load = out[cell].sum()
             share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
             out[cell] *= 1.0 - share
@@ -50,18 +50,28 @@ def pressures(shape: tuple[int, int], sunk: float) -> Map:
 @pytest.mark.mpi
 @ANY_RANKS
 @pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
-@pytest.mark.parametrize(("near_by", "pairs", "high"), [(True, 0, CELL), (True, 1, 8), (True, 4, 4), (False, 0, CELL)])
+@pytest.mark.parametrize(
+    ("near_by", "pairs", "cell"),
+    [
+        (True, 0, (CELL, CELL)),
+        (True, 1, (8, CELL)),
+        (True, 4, (4, CELL)),
+        (True, -2, (CELL, 4)),
+        (False, 0, (CELL, CELL)),
+    ],
+)
 def test_each_cell_gives_back_what_was_added_in_it(
-    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, high: int
+    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, cell: tuple[int, int]
 ) -> None:
-    """Cells have fewer rows where pairs along x make square cells, but four at least."""
+    """Cells have fewer rows where pairs along x make square cells, fewer columns where pairs along y do, but four at
+    least."""
     values = pressures(shape, sunk) + 2.0 - 2.0  # with the rounding of what is advanced
     rows, p, load, cut = cut_off(values, near_by, pairs)
     whole = np.maximum(values, 0.0)
     assert_allclose(load, whole.sum(), rtol=ROUNDING)
     assert_allclose(cut, (whole - values).sum(), rtol=ROUNDING, atol=ROUNDING)
     if load > 0.0:
-        kept = expected(values, high) if near_by else whole
+        kept = expected(values, *cell) if near_by else whole
         assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=ROUNDING)
 
 

@@ -25,21 +25,21 @@ DIRECTIONS = 3  # the residual's, and the last two changes
 SQUARES, WIDE, NARROW = 5, 0.5, (Grids(4), 1.0)  # tuning: grids of squares and floor of `ExtendedPreconditioner`; the
 # last take a fifth more calls, but where a body is far stiffer at once, as on a line of points, larger cells or a
 # smaller floor may make sets of points come and go
-WITH_PAIRS = 0.3  # tuning: the floor with pairs along x: a higher one takes a tenth more calls
+WITH_PAIRS = 0.3  # tuning: the floor with pairs: a higher one takes a tenth more calls
 
 
 def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
-    """The grids and the floor of `ExtendedPreconditioner` on so many points, where so many `pairs` along x make square
+    """The grids and the floor of `ExtendedPreconditioner` on so many points, where so many `pairs` make square
     cells."""
     if 1 in (nx, ny):
         return NARROW
-    return Grids(SQUARES + pairs, pairs), WITH_PAIRS if pairs else WIDE
+    return Grids(SQUARES + abs(pairs), pairs), WITH_PAIRS if pairs else WIDE
 
 
 class Projected:
     """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`.
 
-    With `pairs` along x that make square cells, cells of `LocalLoad` are smaller: so is the least cut they give back,
+    With `pairs` that make square cells, cells of `LocalLoad` are smaller: so is the least cut they give back,
     `least_cut` of the load on squares.
     """
 
@@ -56,7 +56,7 @@ class Projected:
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
         grids, floor = extension_on(slab.nx, slab.ny, pairs)
         self.extended = ExtendedPreconditioner(slab, floor, grids)
-        self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0**pairs
+        self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0 ** abs(pairs)
 
     @property
     def pairs(self) -> list[tuple[Array, Array]]:

@@ -79,7 +79,7 @@ class SteadySolver:
 
     Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate; `max_steps` of the linear solves in all; `directions` kept in each; the axis `along` which the surface
-    slides where the body is far softer along stripes (`stripes`), else None; `pairs` along x that make square cells
+    slides where the body is far softer along stripes (`stripes`), else None; `pairs` that make square cells
     (`extension.pairs_for`); `least_cut` of the load, which is taken back near by (`local_load`).
     """
 

@@ -36,8 +36,8 @@ class CellSums:
 
     @classmethod
     def on(cls, slab: Slab, size: tuple[float, float], compliance: Compliance) -> "CellSums | None":
-        """Return M for a body of that compliance, or None where it is no good: on lines, on cells that no pairs along x
-        make nearly square, and where long waves are stiffer than shorter ones, as on incompressible layers."""
+        """Return M for a body of that compliance, or None where it is no good: on lines, on cells that no pairs make
+        nearly square, and where long waves are stiffer than shorter ones, as on incompressible layers."""
         weights = _weights(slab.nx, slab.ny, size, compliance)
         return cls(slab, pairs_for(size[0] / slab.nx, size[1] / slab.ny), weights) if weights else None
 
@@ -64,10 +64,11 @@ def _weights(nx: int, ny: int, size: tuple[float, float], compliance: Compliance
     pairs = pairs_for(dx, dy)
     if min(nx, ny) == 1 or not dy / SQUARE < dx * 2**pairs < dy * SQUARE:
         return []
-    count = pairs + math.ceil(math.log2(max(math.ceil(nx / 2**pairs), ny)))
-    softer = compliance(np.pi / (dx * 2.0 ** np.arange(count + 1)))
+    along_x, along_y = max(pairs, 0), max(-pairs, 0)
+    count = abs(pairs) + math.ceil(math.log2(max(math.ceil(nx / 2**along_x), math.ceil(ny / 2**along_y))))
+    softer = compliance(np.pi / (min(dx * 2.0**along_y, dy) * 2.0 ** np.arange(count + 1)))
     steps = np.diff(softer)
     if steps.min() < -STIFFER * softer.max():
         return []
-    points = [2.0 ** (2 * level - min(level, pairs)) for level in range(1, count + 1)]
+    points = [2.0 ** (2 * level - min(level, abs(pairs))) for level in range(1, count + 1)]
     return [POINTS * float(softer[0]), *(CELLS * np.maximum(steps, 0.0) / points).tolist()]

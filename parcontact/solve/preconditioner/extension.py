@@ -33,7 +33,7 @@ Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
 
 class Grids(NamedTuple):
     """Grids of larger cells: how many at most, None for all that there are, of which the first are of so many `pairs`
-    along x; the floor of the `last` one over that of the others."""
+    (`levels`); the floor of the `last` one over that of the others."""
 
     most: int | None = None
     pairs: int = 0
@@ -44,17 +44,17 @@ ALL = Grids()
 
 
 def pairs_for(dx: float, dy: float) -> int:
-    """Return how often points at distances dx and dy have to be joined to pairs along x until cells are about square; 0
-    where they are not nearer along x, or too far from square."""
+    """Return how often points at distances dx and dy have to be joined to pairs along x until cells are about square,
+    below 0 along y; 0 where they are too far from square."""
     if max(dx, dy) > LONG * min(dx, dy):
         return 0
-    return max(round(math.log2(dy / dx)), 0)
+    return round(math.log2(dy / dx))
 
 
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     """Return the grids of larger cells to use with distances dx and dy of points.
 
-    Where points are nearer along x than along y, pairs along x are made first, until cells are about square: a step of
+    Where points are nearer along one direction, pairs along it are made first, until cells are about square: a step of
     a slide takes as many iterations as on squares then, and up to a half more without. Points further apart than the
     `reach` do not act on each other: no square cell is longer than about that. There are two sizes of these at least;
     if the larger one is longer than the reach, it counts for less, as its floor is higher.
@@ -65,7 +65,7 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     if reach == math.inf:
         return Grids(None, pairs)
     sizes = max(math.log2(reach / max(dx, dy)), -10.0)
-    return Grids(pairs + max(round(sizes), 2), pairs, max(2.0 ** (FADING * (1.5 - sizes)), 1.0))
+    return Grids(abs(pairs) + max(round(sizes), 2), pairs, max(2.0 ** (FADING * (1.5 - sizes)), 1.0))
 
 
 class ExtendedPreconditioner:
@@ -77,15 +77,16 @@ class ExtendedPreconditioner:
     def __init__(self, slab: Slab, floor: float = FLOOR, larger: Grids = ALL) -> None:
         """With another floor, or other grids of `larger` cells than all."""
         most, pairs, last = larger
+        down, across = max(pairs, 0), max(-pairs, 0)
         self._levels = levels_of(slab, pairs)[:most]
         grids = [level.coarse for level in self._levels]
         self._floors = [
-            (np.float32(floor) * lengths(slab.ny, max(level - pairs, 0))[grid.rows], lengths(slab.nx, level))
+            (np.float32(floor) * lengths(slab.ny, level - down)[grid.rows], lengths(slab.nx, level - across))
             for level, grid in enumerate(grids, 1)
         ]
         if self._floors and last > 1.0:
-            down, across = self._floors[-1]
-            self._floors[-1] = np.float32(last) * down, across
+            rows, columns = self._floors[-1]
+            self._floors[-1] = np.float32(last) * rows, columns
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     @staticmethod
@@ -127,7 +128,7 @@ class ExtendedPreconditioner:
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
     """How many points there are of each cell along one direction: fewer in the last one."""
-    length = 1 << level
+    length = 1 << max(level, 0)
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
 
 

@@ -1,10 +1,11 @@
-"""Between points and the larger cells of `extension`: squares of two by two, or pairs along x where cells are long.
+"""Between points and the larger cells of `extension`: squares of two by two, or pairs where cells are long.
 
 Pairs are made first, until points are about as far apart along x as along y: what is smooth over square cells is not
-over long ones. Rows of points stay with their ranks.
+over long ones. A number of pairs is that of pairs along x, and below 0 of pairs along y.
 """
 
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from ...compiled import loop
 from ...parallel import pyramid
 from ...parallel.slab import Slab, dealt_to
-from . import squares
+from . import pairs_along_y, squares
 
 Map = NDArray[Any]
 
@@ -31,36 +32,37 @@ class Level(Protocol):
 
 
 @dataclass(frozen=True)
-class Squares:
-    """Cells of two by two points."""
+class Stepped:
+    """Cells of a step of `pyramid`, and their `loops`: `squares` or `pairs_along_y`."""
 
     step: pyramid.Step
+    loops: ModuleType
 
     @property
     def coarse(self) -> Slab:
         return self.step.coarse
 
     def add_up(self, points: Map, cells: Map) -> None:
-        squares.add_up(points, self.step.points_beside(points, 0, -1), self.step.above, cells[self.step.own])
+        self.loops.add_up(points, self.step.points_beside(points, 0, -1), self.step.above, cells[self.step.own])
         self.step.complete(cells)
 
     def add_up_back(self, cells: Map, points: Map) -> None:
         step = self.step
-        squares.add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
+        self.loops.add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
 
     def interpolate(self, cells: Map, known: Map, points: Map) -> None:
         step = self.step
-        squares.interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, known, points)
+        self.loops.interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, known, points)
 
     def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
         step = self.step
         around = [step.points_beside(field, 0, 1, -2, -1) for field in (known, points)]
-        squares.interpolate_back(known, around[0], points, around[1], step.above, cells[step.own])
+        self.loops.interpolate_back(known, around[0], points, around[1], step.above, cells[step.own])
         step.complete(cells)
 
 
 @dataclass(frozen=True)
-class Pairs:
+class PairsAlongX:
     """Cells of two points along x; no messages."""
 
     coarse: Slab
@@ -83,8 +85,9 @@ def levels_of(slab: Slab, pairs: int) -> list[Level]:
     made: list[Level] = []
     for _ in range(pairs):
         slab = Slab(slab.comm, (slab.nx + 1) // 2, slab.ny, slab.tally, slab.dealt)
-        made.append(Pairs(slab))
-    return made + [Squares(step) for step in pyramid.steps_of(slab)]
+        made.append(PairsAlongX(slab))
+    steps = pyramid.steps_of(slab, -pairs)
+    return made + [Stepped(step, pairs_along_y if k < -pairs else squares) for k, step in enumerate(steps)]
 
 
 def interpolate(levels: list[Level], known: list[Map], maps: list[Map]) -> None:
@@ -105,8 +108,8 @@ def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None, pairs
     for _ in range(pairs if most is None else min(pairs, most)):
         nx = (nx + 1) // 2
         total += nx * (rows.stop - rows.start)
-    left = None if most is None else most - pairs
-    return total + (pyramid.count_cells(nx, ny, ranks, rank, left) if left is None or left > 0 else 0)
+    left = None if most is None else max(most - max(pairs, 0), 0)
+    return total + pyramid.count_cells(nx, ny, ranks, rank, left, -pairs)
 
 
 @loop

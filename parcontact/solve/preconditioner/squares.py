@@ -6,7 +6,7 @@ from ...compiled import loop
 
 
 @loop
-def _row(own, beside, j):
+def row_of(own, beside, j):
     """Row j, counted from the first of `own`; of those beside, the ones above are the last."""
     if j < 0:
         return beside[beside.shape[0] + j]
@@ -18,7 +18,7 @@ def add_up(points, beside, above, cells):
     """The sums over cells."""
     pairs = points.shape[1] // 2
     for j in range(cells.shape[0]):
-        a, b = _row(points, beside, 2 * j - above), _row(points, beside, 2 * j - above + 1)
+        a, b = row_of(points, beside, 2 * j - above), row_of(points, beside, 2 * j - above + 1)
         out = cells[j]
         for i in range(pairs):
             out[i] = (a[2 * i] + b[2 * i]) + (a[2 * i + 1] + b[2 * i + 1])
@@ -31,7 +31,7 @@ def add_up_back(cells, beside, above, points):
     """Add the value of each cell to its points."""
     pairs = points.shape[1] // 2
     for j in range(points.shape[0]):
-        cell, out = _row(cells, beside, (j + above) // 2), points[j]
+        cell, out = row_of(cells, beside, (j + above) // 2), points[j]
         for i in range(pairs):
             out[2 * i] += cell[i]
             out[2 * i + 1] += cell[i]
@@ -47,7 +47,7 @@ def interpolate(cells, beside, above, known, points):
     for j in range(points.shape[0]):
         near = (j + above) // 2
         other = near + 1 if (j + above) % 2 else near - 1
-        a, b = _row(cells, beside, near), _row(cells, beside, other)
+        a, b = row_of(cells, beside, near), row_of(cells, beside, other)
         for i in range(columns):
             line[i + 1] = np.float32(0.75) * a[i] + np.float32(0.25) * b[i]
         line[0], line[columns + 1] = line[columns], line[1]
@@ -67,10 +67,10 @@ def interpolate_back(known, known_beside, points, beside, above, cells):
     line = np.zeros(2 * columns + 2, cells.dtype)
     for j in range(cells.shape[0]):
         first = 2 * j - above - 1
-        a, b = _row(points, beside, first), _row(points, beside, first + 1)
-        c, d = _row(points, beside, first + 2), _row(points, beside, first + 3)
-        w_a, w_b = _row(known, known_beside, first), _row(known, known_beside, first + 1)
-        w_c, w_d = _row(known, known_beside, first + 2), _row(known, known_beside, first + 3)
+        a, b = row_of(points, beside, first), row_of(points, beside, first + 1)
+        c, d = row_of(points, beside, first + 2), row_of(points, beside, first + 3)
+        w_a, w_b = row_of(known, known_beside, first), row_of(known, known_beside, first + 1)
+        w_c, w_d = row_of(known, known_beside, first + 2), row_of(known, known_beside, first + 3)
         for i in range(count):
             outer = (1.0 - w_a[i]) * a[i] + (1.0 - w_d[i]) * d[i]
             inner = (1.0 - w_b[i]) * b[i] + (1.0 - w_c[i]) * c[i]

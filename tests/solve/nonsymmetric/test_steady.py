@@ -23,7 +23,7 @@ class Identity:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("tolerance", "pairs"), [(1e-8, 0), (1e-5, 0), (1e-5, 2)])
+@pytest.mark.parametrize(("tolerance", "pairs"), [(1e-8, 0), (1e-5, 0), (1e-5, 2), (1e-5, -2)])
 def test_maps_are_made_when_they_are_needed(
     comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, tolerance: float, pairs: int
 ) -> None:
