@@ -18,7 +18,7 @@ AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
 NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
 MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEVELS = 3  # of names above each other, before they are turned
-FEW_NAMES = 2  # of lines, for which a legend finds room among them
+FEW_NAMES, MANY_NAMES = 2, 4  # of lines, for which a legend finds room among them: always, and in half the width
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # of a panel over its highest point, and over one that the legend names
 FRACTION = "contact area /\nnominal area"
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
@@ -89,7 +89,9 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         units.label(axes.yaxis, chart.y.name, chart.y.unit)
     _mark_stages(axes, chart.stages, chart.named)
     if names := len(axes.get_legend_handles_labels()[1]):
-        place = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {"ncols": 1 + (names > 4)}
+        place: dict[str, Any] = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {}
+        if names > MANY_NAMES and not place:
+            place = style.ABOVE
         axes.legend(title=chart.legend_title or None, **place)
 
 
