@@ -32,6 +32,7 @@
 # module load openmpi
 
 start=$(date +%s) slurm=${SLURM_JOB_ID:-}
+[ "$slurm${PBS_JOBID:-}" ] || { echo "submit this script: sbatch $0 job.yaml, or JOB=job.yaml qsub -v JOB $0" >&2; exit 2; }
 there=${SLURM_SUBMIT_DIR:-${PBS_O_WORKDIR:-.}}
 cd "$there" || exit 1
 bin=${PARCONTACT_BIN:-$there/.venv/bin}

@@ -133,7 +133,7 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
 def describe_solve(run: Run) -> str:
     """Return what the last solve has found, in words."""
     axis, load = run.load
-    fraction = run.columns["contact_area"][-1]
+    fraction = run.columns["contact_area_corrected"][-1]
     area = units.text(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
     name, column = ("approach", "approach") if run.free else ("mean gap", "mean_gap")
     length = units.text(run.columns[column][-1], "m", 4)

@@ -17,8 +17,8 @@ from . import units
 from .charts import FRACTION, Axis
 
 MEASURED = (
-    *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "approach", "mean_gap"),
-    *("max_pressure", "work", "stored", "dissipated"),
+    *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "contact_area_corrected"),
+    *("approach", "mean_gap", "max_pressure", "work", "stored", "dissipated"),
 )
 NEAREST = 3  # steps with maps that a message names
 
@@ -43,7 +43,8 @@ class Run:
 
     @property
     def in_contact(self) -> tuple[Axis, Array]:
-        return to_contact_area(self.columns["contact_area"], self.area * self.free)
+        """The contact area as corrected for the cells on its edge."""
+        return to_contact_area(self.columns["contact_area_corrected"], self.area * self.free)
 
     @property
     def backwards(self) -> bool:

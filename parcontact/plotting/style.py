@@ -43,7 +43,13 @@ RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
-ABOVE: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 3, "columnspacing": 1.0, "handlelength": 1.4}
+ABOVE: dict[str, Any] = {  # where that of a panel of half the width is
+    "loc": "lower center",
+    "bbox_to_anchor": (0.5, 1.0),
+    "ncols": 3,
+    "columnspacing": 1.0,
+    "handlelength": 1.4,
+}
 BESIDE: dict[str, Any] = {  # where the legend of a panel is that leaves it no room
     "loc": "upper left",
     "bbox_to_anchor": (1.0, 1.0),

@@ -15,6 +15,7 @@ import numpy as np
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..summary import sweep_table
+from ..summary.slide import CORRECTED
 from ..summary.sweep_table import SAMPLES
 from . import style, units
 from .charts import FRACTION, Axis, Chart, Series
@@ -27,11 +28,11 @@ MAX_LINES = 3  # of a second key
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 PANELS = (  # measures and their columns by the names of lines
     ("friction", "friction coefficient", {"highest": "mu_max", "dynamic": "mu_dyn"}),
-    ("area", FRACTION, {"simulation": "contact_area"}),
+    ("area", FRACTION, {"simulation": CORRECTED}),
 )
 CURVE_PANELS = (
     ("friction", "friction coefficient", {"steady sliding": "friction"}),
-    ("area", FRACTION, {"steady sliding": "contact_area"}),
+    ("area", FRACTION, {"steady sliding": CORRECTED}),
 )
 
 Rows = Sequence[dict[str, Any]]
@@ -118,7 +119,8 @@ def _named(key: str, value: Any) -> str:
 
 def _make_lines(name: str, part: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
     """Yield means as a line with its points, all cases as small dots, and the theory."""
-    x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{column}"))
+    theirs = "contact_area" if column == CORRECTED else column
+    x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
         at, means = _average(x[there], y[there])
         yield Series(name + part, at, means, {"marker": "o", "linestyle": "-", "color": color})

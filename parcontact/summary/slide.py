@@ -26,13 +26,14 @@ ERRORS = ("error_friction", "error_area")  # columns of the error budget of each
 class Slide(NamedTuple):
     """`mu_max` and the distance [m] from the start of the slide to it; means over the last three quarters of it.
 
-    Friction is nan where it is not defined, as no load presses in some steps.
+    Friction is nan where it is not defined, as no load presses in some steps, the corrected area where it is not known.
     """
 
     mu_max: float
     mu_max_distance: float
     mu_dyn: float
     contact_area: float
+    contact_area_corrected: float
 
 
 def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC) -> float:
@@ -45,20 +46,25 @@ def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC
 
 
 def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Slide | None:
-    """Measure the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows.
+    """Measure the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows, and
+    `contact_area_corrected` where it is there.
 
     None where nothing slides, or has not slid yet.
     """
     rows = _during(history, np.asarray(columns["time"], float))
-    distance, friction, area = (np.asarray(columns[name])[rows] for name in ("distance", "friction", "contact_area"))
+    columns = {CORRECTED: [math.nan] * len(columns["time"]), **columns}
+    distance, friction, *areas = (
+        np.asarray(columns[name])[rows] for name in ("distance", "friction", "contact_area", CORRECTED)
+    )
     if distance.size < 2 or distance[-1] == distance[0]:
         return None
+    touching = [mean_over_end(distance, area) for area in areas]
     if _without_load(columns, rows).size:
-        return Slide(math.nan, math.nan, math.nan, mean_over_end(distance, area))
+        return Slide(math.nan, math.nan, math.nan, *touching)
     start = distance[0]
     highest = int(np.argmax(friction[1:])) + 1
-    means = mean_over_end(distance, friction), mean_over_end(distance, area)
-    return Slide(float(friction[highest]), float(distance[highest] - start), *means)
+    mean = mean_over_end(distance, friction)
+    return Slide(float(friction[highest]), float(distance[highest] - start), mean, *touching)
 
 
 def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -24,10 +24,10 @@ CURVES = "sweep_curves.csv"
 PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
-RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area")
+RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area", slide.CORRECTED)
 PULL_OFFS = ("pull_off", "pull_off_approach")
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
-THEORY = tuple(f"theory_{name}" for name in RESULTS)
+THEORY = tuple(f"theory_{name}" for name in RESULTS if name != slide.CORRECTED)
 COLUMNS = ("state", *RESULTS, *FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
 NUMBERS = {"case", *COLUMNS, *PULL_OFFS, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
@@ -98,8 +98,9 @@ def _row(case: Case) -> dict[str, Any]:
         columns = _columns(directory / name) or {"time": []}
         if columns["time"]:
             found = slide.measure(case.job.history, columns)
-            row |= {f"{prefix}{key}": value for key, value in (found._asdict() if found else {}).items()}
-            row.setdefault(f"{prefix}contact_area", columns["contact_area"][-1])
+            ends = {name: columns[name][-1] for name in RESULTS if name in columns}
+            known = ends if found is None else {key: value for key, value in found._asdict().items() if value == value}
+            row |= {f"{prefix}{key}": value for key, value in known.items()}
         if columns["time"] and not prefix:
             row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
             row["seconds"] = math.fsum(columns["seconds"])

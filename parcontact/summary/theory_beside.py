@@ -39,12 +39,13 @@ def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tup
     columns = tables.read(path) if path.is_file() else {}
     if not columns.get("time"):
         return {}
-    area = columns.get(slide.CORRECTED, columns["contact_area"])
-    found = slide.measure(history, {**columns, "contact_area": area})
+    columns = {slide.CORRECTED: columns["contact_area"], **columns}
+    found = slide.measure(history, columns)
     if found is None:
-        return {"contact area": (area[-1], columns.get(slide.ERRORS[1], [math.nan])[-1] * area[-1])}
+        area = columns[slide.CORRECTED][-1]
+        return {"contact area": (area, columns.get(slide.ERRORS[1], [math.nan])[-1] * area)}
     within = slide.absolute_errors(history, columns, cell)
-    values = {"mu_max": found.mu_max, "mu_dyn": found.mu_dyn, "contact area": found.contact_area}
+    values = {"mu_max": found.mu_max, "mu_dyn": found.mu_dyn, "contact area": found.contact_area_corrected}
     defined = {name: value for name, value in values.items() if value == value}
     return {name: (value, within.get(name.replace(" ", "_"), math.nan)) for name, value in defined.items()}
 

@@ -38,7 +38,8 @@ def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("- 1\n", "job.yaml:1:1: the job must be a mapping of keys, got [1]"),
         ("a: 1\nb: [1,\n  2\n", ("job.yaml:4:1: cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
          "(while parsing a flow sequence in line 2)")),
-        ("a: b: c\n", "job.yaml:1:5: cannot be read as YAML: mapping values are not allowed here"),
+        ("a: b: c\n", "job.yaml:1:5: cannot be read as YAML: mapping values are not allowed here; "
+            "a text that holds a colon needs quotes"),
         ("a: 1\n\tb: 2\n", "job.yaml:2:1: cannot be read as YAML: found character '\\t' that "
          "cannot start any token; indent by blanks, not by tabs"),
         ("a: *b\n", "job.yaml:1:4: cannot be read as YAML: found undefined alias 'b'"),
@@ -59,6 +60,7 @@ def test_text_that_cannot_be_read(text: str | bytes, mistake: str) -> None:
         ("title: !!timestamp 2001-01-01", "6:8: !!timestamp does not belong in a job"),
         ("title: !!python/object:os.system {}", "6:8: !!python/object:os.system does not belong in a job"),
         ("1: x", "6:1: a key must be a word, got '1'"),
+        ("body: {thickness: 1,0e-3}", "6:21: a key must be a word, got '0e-3'; write decimals with a point"),
         ("? [a]\n: x", "6:3: a key must be a word, got a list or a mapping"),
         ("<<: 3", "6:5: << takes a mapping, or a list of mappings"),
     ],

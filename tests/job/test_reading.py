@@ -104,7 +104,8 @@ def test_roughness() -> None:
         "surface.rms_slope=": f"job.yaml:2:10: {none_of} none",
         "surface.rms_height=1": f"job.yaml:2:10: {none_of} rms_slope and rms_height",
         f"{wave}=3e-4": f"{wave} must not be longer than long_wavelength and rolloff_wavelength, 0.0002 m, got 0.0003",
-        f"{wave}=3.1e-5": f"{wave} must be at least two cells, 3.125e-05 m (Nyquist), got 3.1e-05",
+        f"{wave}=3.1e-5": f"{wave} must be at least two cells, 3.125e-05 m (Nyquist), got 3.1e-05, which needs "
+        "65 points along x",
         "surface.rolloff_wavelength=3e-4": "surface.rolloff_wavelength must not be longer than "
         "long_wavelength, 0.0002 m, got 0.0003",
         "surface.long_wavelength=-1": "surface.long_wavelength must be a positive wavelength [m], got -1",

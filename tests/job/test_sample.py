@@ -68,6 +68,7 @@ def test_a_slide_round_the_box(changes: dict[str, Any], start: str) -> None:
         {"material": {"model": "elastic", "shear_modulus": 1e6}},
         {"grid": {"points": 128, "size": 1e-3, "boundary": "free"}},
         {"surface": WAVE},
+        {"surface": ROUGH | {"long_wavelength": 2.5e-3}, "history": [ROUND | {"distance": 5e-4}]},
         {"initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4}},
     ],
 )

@@ -135,9 +135,9 @@ def test_a_mistake_of_some_cases_names_the_first_of_them(path: Path) -> None:
     assert sorted(found) == [
         "--set material.poisson=2: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got 2",
         f"--set surface={rough}: surface.0.short_wavelength must be at least two cells, 0.000125 m (Nyquist), got "
-        "0.0001 (in case 1: grid.points = 16)",
+        "0.0001, which needs 20 points along x (in case 1: grid.points = 16)",
         f"--set surface={rough}: surface.0.short_wavelength must be at least two cells, 0.00025 m (Nyquist), got "
-        "0.0001 (in case 2: grid.points = 8)",
+        "0.0001, which needs 20 points along x (in case 2: grid.points = 8)",
     ]
 
 

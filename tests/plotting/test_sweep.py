@@ -14,7 +14,8 @@ from parcontact.plotting import sweep
 from parcontact.plotting.plots import Options, plot
 
 SIZES = (1e-3, 2e-3, 3e-3)
-HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "state", "mu_max", "mu_dyn", "contact_area")
+RESULTS = ("mu_max", "mu_dyn", "contact_area_corrected")
+HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "state", *RESULTS)
 
 
 def saved(directory: Path, *rows: tuple[Any, ...], head: tuple[str, ...] = (*HEAD, "theory_mu_max")) -> Path:

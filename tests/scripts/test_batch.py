@@ -150,6 +150,14 @@ history: [{pressure: 1.0e3, duration: 4.0, time_step: 1.0}]
 """
 
 
+def test_without_a_batch_system(tmp_path: Path) -> None:
+    command = ["bash", str(SCRIPTS / "batch.sh"), "job.yaml"]
+    done = subprocess.run(command, cwd=tmp_path, env={"PATH": "/usr/bin:/bin"}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("submit this script: sbatch ")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(("words", "code"), [([], 0), (["--until", "1"], 0), (["--set", "grid.points=0"], 2)])
 def test_exit_code_in_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], code: int) -> None:
     """Root leaves it where PARCONTACT_EXIT_FILE says; 3 too, when a file `stop` asks for it."""

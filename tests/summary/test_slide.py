@@ -50,6 +50,7 @@ def test_all_stages_at_one_velocity_are_one_slide() -> None:
     assert (found.mu_max, found.mu_max_distance) == (4.0, 1.0)
     assert found.mu_dyn == pytest.approx((3.0 * 1 + 2.0 * 2) / 3, rel=1e-14)  # over the last 3 of 4 m
     assert found.contact_area == pytest.approx(found.mu_dyn / 10, rel=1e-14)
+    assert math.isnan(found.contact_area_corrected)
 
 
 @pytest.mark.parametrize("before", [SLOW, BACK])

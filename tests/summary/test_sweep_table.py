@@ -25,12 +25,13 @@ def test_the_worst_of_what_is_known(cases: tuple[Case, ...]) -> None:
     """Errors are not known in the first row."""
     directory = cases[0].job.output.directory
     directory.mkdir(parents=True)
-    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction"
-    (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,\n1,1,0,0.1,0.2,1e-5,0.25,3e-3\n")
+    head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,contact_area_corrected"
+    (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,,0.1\n1,1,0,0.1,0.2,1e-5,0.25,3e-3,0.15\n")
     sweep_table.write(Path("out/job"), cases)
     row = table()[0]
     assert [row[name] for name in ("residual", "error_friction", "error_area")] == ["2e-05", "0.003", ""]
-    assert (row["state"], row["seconds"], row["mu_max"], row["contact_area"]) == ("begun", "0.75", "", "0.2")
+    assert (row["state"], row["seconds"], row["mu_max"]) == ("begun", "0.75", "")
+    assert [row[name] for name in ("contact_area", "contact_area_corrected")] == ["0.2", "0.15"]
 
 
 def test_errors_are_those_of_the_slide(cases: tuple[Case, ...]) -> None:
@@ -61,7 +62,7 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
     for case, friction in zip(cases, (0.1, 0.2, 0.6), strict=True):
         case.job.output.directory.mkdir(parents=True)
         rows = f"0.1,{1e4 * (1 + case.number * 1e-15)!r},{friction},0.5\n1.0,1e4,{friction / 2},0.25\n"
-        text = "velocity,pressure,friction,contact_area\n" + rows
+        text = "velocity,pressure,friction,contact_area_corrected\n" + rows
         (case.job.output.directory / "steady.csv").write_text(text)
     sweep_table.write(Path("out/job"), cases)
     points, means = table("sweep_curves.csv"), table("sweep_curves_mean.csv")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from operator import itemgetter
 from typing import Any
 
 from ...errors import InputError
@@ -44,18 +45,21 @@ def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
 
 def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
     """Check that no wave is shorter than two cells (Nyquist), and that the shortest one fits into the box."""
-    cell = max([step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1], default=0.0)
+    steps = zip((grid.dx, grid.dy), grid.size, "xy", grid.points, strict=True)
+    cell, size, axis, _ = max((one for one in steps if one[-1] > 1), key=itemgetter(0), default=(0.0, 0.0, "", 0))
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - SAME_LENGTH):
-            sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), got {shape.short_wavelength!r}"
+            needed = math.ceil(2 * size / shape.short_wavelength * (1 - SAME_LENGTH))
+            got = f"got {shape.short_wavelength!r}, which needs {needed} points along {axis}"
+            sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), {got}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
         if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):
             sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
-        for axis, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
+        for number, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
             if abs(waves) > n / 2:
                 sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
-                yield Fault(sentence, ("surface", index, "waves", axis))
+                yield Fault(sentence, ("surface", index, "waves", number))
 
 
 def half_mesh_fits(grid: Grid, surface: tuple[Any, ...], output: Output) -> Iterator[Fault]:

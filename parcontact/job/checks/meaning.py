@@ -253,7 +253,8 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     if grid.boundary != "periodic" or not times or all(isinstance(shape, Wave) for shape in job.surface):
         return
     memory = max(times) * material.time_factor
-    near = NEAR * max((shape.long_wavelength for shape in job.surface if isinstance(shape, Rough)), default=0.0)
+    longest = max((shape.long_wavelength for shape in job.surface if isinstance(shape, Rough)), default=0.0)
+    near = NEAR * min(longest, *grid.size)  # longer waves are those of the box
     steady = (initial.velocity, initial.pressure) if initial.state == "steady" else None
     for velocity, stages in groupby(enumerate(job.history), key=lambda stage: stage[1].velocity):
         (index, first), *more = stages

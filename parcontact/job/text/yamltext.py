@@ -84,6 +84,13 @@ def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
     return b"", found
 
 
+def _remedy(problem: str) -> str:
+    """Return what to do about a frequent problem of PyYAML's, or ''."""
+    if "\\t" in problem:
+        return "; indent by blanks, not by tabs"
+    return "; a text that holds a colon needs quotes" if problem.startswith("mapping values") else ""
+
+
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
     """Return YAML text as a `Source`; `origin` names it in places, unless `whole` is the one place of all of it."""
     start = whole or Place(origin, 1, 1)
@@ -94,8 +101,7 @@ def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
     except yaml.MarkedYAMLError as error:
         began = f" ({error.context} in line {error.context_mark.line + 1})" if error.context_mark else ""
         mark = error.problem_mark or error.context_mark
-        tabs = "; indent by blanks, not by tabs" if "\\t" in str(error.problem) else ""
-        source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}{tabs}")
+        source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}{_remedy(str(error.problem))}")
     except yaml.reader.ReaderError as error:
         source.note(start, f"is not a text file in UTF-8: {error.reason} at position {error.position}")
     except yaml.YAMLError as error:
@@ -155,7 +161,8 @@ class _Reader:
                 merged += child.value if isinstance(child, yaml.SequenceNode) else [child]
             elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str":
                 got = repr(shorten(key.value)) if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
-                self.refuse(key, f"a key must be a word, got {got}")
+                comma = "; write decimals with a point" if got[1:2].isdigit() and not child.value else ""
+                self.refuse(key, f"a key must be a word, got {got}{comma}")
             elif key.value in found:
                 name, line = ".".join(map(str, (*path, key.value))), self.source.places[*path, key.value][0].line
                 self.refuse(key, f"{shorten(name)} is given twice" + f", first in line {line}" * bool(line))
