@@ -20,12 +20,12 @@ from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.slopes import friction_by_energy
-from ..physics.time_error import RunProperties, StepObservation, time_error
+from ..physics.time_error import RunProperties, StepObservation, error_of_rise, time_error
 from ..scene import Scene, Setup
 from ..solve.contact import Contact
 from .sticking import StuckContact
 
-PAIR, VIEWS = "budget/look", "budget/views"  # in a checkpoint
+PAIR, VIEWS, FRICTION = "budget/look", "budget/views", "budget/friction"  # in a checkpoint
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 ALIKE_STEPS = 4  # tuning: of one stage and one length, to which one look at the embedded pair applies at most
 ALIKE_VIEWS = 5  # tuning: the same of the two views of friction; odd, as steps may be quarters of a cell
@@ -52,16 +52,19 @@ class LastObservation:
 
 @dataclass(frozen=True)
 class Observations:
-    """Memory of the last looks at the embedded pair and at the two views of friction."""
+    """Memory of the last looks at the embedded pair and at the two views of friction, and of the friction of the body
+    in the last step, infinite where that is not known or was a jump."""
 
     pair: LastObservation = LastObservation()
     views: LastObservation = LastObservation()
+    friction: float = math.inf
 
     def entries(self) -> dict[str, Entry]:
         """Return the entries of both; a checkpoint may lack them."""
         looks = {PAIR: self.pair, VIEWS: self.views}
         numbers = {name: [look.stage, look.dt, look.so_far, *look.observed] for name, look in looks.items()}
-        return {name: Entry(np.array(each), optional=True) for name, each in numbers.items()}
+        found = {name: Entry(np.array(each), optional=True) for name, each in numbers.items()}
+        return found | {FRICTION: Entry(self.friction, optional=True)}
 
     @classmethod
     def restored(cls, saved: Saved) -> "Observations":
@@ -70,17 +73,19 @@ class Observations:
         for name in (PAIR, VIEWS):
             stage, dt, so_far, *observed = saved[name].tolist() if name in saved else (-1.0, 0.0, 0.0)
             looks.append(LastObservation(stage, dt, so_far, tuple(observed)))
-        return cls(*looks)
+        return cls(looks[0], looks[1], float(saved.get(FRICTION, math.inf)))
 
 
 @dataclass(frozen=True)
 class Estimate:
     """Errors of a step: its budget, None where nothing touches, and the error of its length alone, by which steps
-    that are chosen are judged; with the looks after it."""
+    that are chosen are judged; with the looks after it. `lasting` is the budget without the error of a rise of
+    friction, which passes: the tolerance of the next solves does not follow it."""
 
     budget: ErrorBudget | None
     step: float
     observations: Observations
+    lasting: ErrorBudget | None
 
 
 @dataclass(frozen=True)
@@ -111,10 +116,11 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
     run = properties_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
     pair, integrators = _compare_integrators(scene, observations.pair, solved)
     views, apart = _compare_views(scene, observations.views, solved)
-    observations = Observations(pair, views)
+    own = measures.friction - measures.friction_interface
+    change, observations = own - observations.friction, Observations(pair, views, math.inf if step.jump else own)
     if measures.contact_area == 0.0:
         still = StepObservation(0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0)
-        return Estimate(None, time_error(run, still, points), observations)
+        return Estimate(None, time_error(run, still, points), observations, None)
     observed = StepObservation(
         complementarity=certificate.complementarity,
         difference=integrators.difference,
@@ -132,7 +138,18 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
         way=step.velocity,
     )
     time = time_error(run, observed, points)
-    return Estimate(estimate(run, observed, points, time), time, observations)
+    lasting = estimate(run, observed, points, time)
+    uneven = min(1.0, measures.max_pressure / measures.pressure - 1.0) if measures.pressure > 0.0 else 1.0
+    budget = _with_rise(lasting, error_of_rise(run, observed, points, change, uneven))
+    return Estimate(budget, time, observations, lasting)
+
+
+def _with_rise(budget: ErrorBudget, rise: float) -> ErrorBudget:
+    """Return the budget with the error of a rise of friction, where it is more than that of the time steps."""
+    parts = budget.friction
+    if parts is None or rise <= parts.time:
+        return budget
+    return replace(budget, friction=replace(parts, time=rise))
 
 
 def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> float:

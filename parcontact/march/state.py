@@ -106,11 +106,13 @@ def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
 
 
 def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approach: float) -> State:
-    """Return a first state under a pressure, which is copied into its maps, and that had been there before."""
+    """Return a first state under a pressure, which is copied into its maps, and that had been there before, with the
+    friction of a row."""
     for past in state.pasts[:2]:
         past.pressure[...] = pressure
     pasts = (*(past._replace(alpha=1.0) for past in state.pasts[:2]), *state.pasts[2:])
-    return completed(scene, replace(state, row=row, pasts=pasts, approach=approach))
+    seen = Observations(friction=row.measures.friction - row.measures.friction_interface)
+    return completed(scene, replace(state, row=row, pasts=pasts, approach=approach, observations=seen))
 
 
 def completed(scene: Scene, state: State) -> State:

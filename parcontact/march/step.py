@@ -73,7 +73,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         starts=state.starts.after(solved.moved_start, contact.iterations),
         observations=errors.observations,
         sticking=None if solved.stuck is None else solved.stuck.memory,
-        tolerance=state.tolerance.after(scene, contact, errors.budget),
+        tolerance=state.tolerance.after(scene, contact, errors.lasting),
         rounding=solved.rounding,
     )
 

@@ -24,6 +24,7 @@ WAVES_FRICTION, WAVES_ORDER = 0.05, 2.5  # at 4 cells per shortest wave
 SPOTS_FRICTION, SPOTS_ORDER = 0.13, 2.3  # at a contact spot of a radius of one cell
 SPOTS_POWER = 0.25  # of the number of spots, by which they average errors out
 LOST, FREE_LOST = 2.0, 6.0  # times s m^k of `edge_loss`; of steady sliding in free boxes, with sampled coefficients
+GAPS = 2.0  # times what is open, in steady sliding: from half contact on radii are those of gaps, with fewer edges
 STEADY_POWER, MARCH_POWER = 1.0, 2.0  # k; in marches the cells per wave make enough of what is fast
 STRAIGHT_POWER = 0.5  # k along edges that follow the grid, which move by whole cells
 ACROSS = 0.06  # of these errors, on squares: that of the cells across the sliding
@@ -52,7 +53,8 @@ def lost_at_edges(run: RunProperties, observed: StepObservation, points: int, st
     size = radius_of(run, observed, points) * (run.mean_cell / cell)
     share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.straight)
     power = STRAIGHT_POWER if run.straight else STEADY_POWER if steady else MARCH_POWER
-    return min(1.0, (FREE_LOST if run.free and steady else LOST) * (1.0 - observed.area) * share * slow**power)
+    few = min(1.0, GAPS * (1.0 - observed.area)) if steady else 1.0 - observed.area
+    return min(1.0, (FREE_LOST if run.free and steady else LOST) * few * share * slow**power)
 
 
 def area_by_mesh(run: RunProperties, observed: StepObservation, points: int) -> tuple[float, float]:

@@ -106,14 +106,14 @@ def test_what_is_given_holds() -> None:
 
 @pytest.mark.parametrize("numerics", [{}, {"tolerance": 5e-3}], ids=["chosen", "given"])
 def test_a_restart_goes_on_with_it(tmp_path: Path, numerics: dict[str, float]) -> None:
-    """The memory is saved, and whether the tolerance was given: the same digits as without a stop."""
+    """The memory is saved, and whether the tolerance was given: the same digits as without a stop, also of errors."""
     whole = pc.Simulation(job(**numerics), comm=MPI.COMM_SELF)
-    rows = [(row.friction, row.operator_calls) for row in whole.steps()]
+    rows = [(row.friction, row.error_friction, row.operator_calls) for row in whole.steps()]
     run = pc.Simulation(job(**numerics), comm=MPI.COMM_SELF)
     for row in run.steps():
         if row.step == STEPS // 2:
             break
     run.save(tmp_path / "state.h5")
     again = pc.Simulation.restore(tmp_path / "state.h5", comm=MPI.COMM_SELF)
-    rest = [(row.friction, row.operator_calls) for row in again.steps()]
+    rest = [(row.friction, row.error_friction, row.operator_calls) for row in again.steps()]
     assert rest == rows[-len(rest) :]

@@ -66,12 +66,13 @@ def test_without_edges_or_losses() -> None:
 
 
 def test_friction_of_slow_sliding_has_their_error() -> None:
-    """Twice the share that is lost, of what is open; six times in steady sliding in free boxes; along straight edges by
-    their half width. None at rest and where waves pass fast."""
+    """Twice the share that is lost, of what is open; in steady sliding of all up to half contact, and of twice what is
+    open beyond, six times in free boxes. Along straight edges by their half width. None at rest and where waves pass
+    fast."""
     share, _ = lost_in_short_waves(ONE, radius_of(KNOWN, SEEN, 10_000), SLOW, False)
-    lost = 2.0 * 0.9 * share
+    lost = 2.0 * share
     for judge, free, expected in (
-        (estimate, True, lost),
+        (estimate, True, 0.9 * lost),
         (estimate_steady, False, lost),
         (estimate_steady, True, 3 * lost),
     ):
@@ -90,6 +91,12 @@ def test_friction_of_slow_sliding_has_their_error() -> None:
     found = estimate(ridges, SEEN, 10_000).friction
     assert found is not None
     assert found.edges == pytest.approx(2.0 * 0.9 * share, rel=1e-4)
+    for area, few in ((0.5, 1.0), (0.75, 0.5)):
+        seen = replace(SEEN, area=area, corrected=area - 0.005)
+        share, _ = lost_in_short_waves(ONE, radius_of(KNOWN, seen, 10_000), SLOW, False)
+        found = estimate_steady(KNOWN, seen, 10_000).friction
+        assert found is not None
+        assert found.edges == pytest.approx(2.0 * few * share, rel=1e-4)
 
 
 def test_the_larger_one_of_it_and_of_the_two_views() -> None:
