@@ -99,15 +99,17 @@ def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> fl
     if isinstance(shape, OnOneMesh):
         raise InputError("heights from a file or an array are given on one mesh; give its numbers of points")
     if isinstance(shape, Topography):
-        return float(MAP.load()(_on_its_own_mesh(data, origin)) or math.inf)
+        return float(MAP.load()(_alone(shape, data, origin)) or math.inf)
     return math.inf
 
 
-def _on_its_own_mesh(data: dict[str, Any], origin: Origin) -> Job:
-    """Return the job on the points of its measured map. Raises InputError, and ValidationError for other mistakes."""
-    points, _ = extent_of(data["surface"], data["grid"].get("size"), origin)
-    grid = {**data["grid"], "points": list(points)}
-    return Job.model_validate({**data, "grid": grid}, context=origin)
+def _alone(shape: Topography, data: dict[str, Any], origin: Origin) -> Job:
+    """Return a job of the measured map alone on its own points: what other sections ask of a mesh is not asked of that
+    one. Raises InputError."""
+    of_box, of_map = (extent_of(data["surface"], box, origin)[0] for box in (data["grid"].get("size"), None))
+    grid = {**data["grid"], "points": list(map(min, of_box, of_map))}  # no box that is too large takes all memory
+    body, load = {"model": "elastic", "shear_modulus": 1.0}, {"pressure": 1.0}
+    return Job.model_validate({"grid": grid, "surface": (shape,), "material": body, "history": [load]}, context=origin)
 
 
 # -- the grid of a measured map ----------------------------------------------------------------------------------------

@@ -69,6 +69,19 @@ def test_a_measured_map_and_a_table_have_the_mesh_of_their_waves(tmp_path: Path)
     assert np.all(np.abs(np.subtract(of_table, own)) <= 16)
 
 
+def test_nothing_is_asked_of_the_mesh_of_a_map(tmp_path: Path) -> None:
+    """The map's own mesh is too coarse for another wave and for a range, and a box may be too large for any mesh."""
+    np.save(tmp_path / "road.npy", pc.surface(yaml.safe_load(ROUGH), grid={"points": 32, "size": 1e-3}))
+    there = "{shape: topography, path: road.npy, unit: m, size: [1e-3, 1e-3]}"
+    shorter = "{shape: rough, hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 3.125e-5, rms_slope: 0.1, seed: 1}"
+    assert points_of(tmp_path, f"surface=[{there}, {shorter}]")[0] > points_of(tmp_path, f"surface={there}")[0]
+    for change, sentence in (
+        ("adhesion={work: 0.05, range: 1e-9}", "adhesion.range must be at least"),
+        ("grid.size=100.0", "the box is 100 m along y, the map only 0.001 m"),
+    ):
+        assert any(sentence in text for text in mistakes_of(tmp_path, AUTO, f"surface={there}", change))
+
+
 @pytest.mark.mpi(2)
 def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path: Path) -> None:
     """On all ranks the same points; in the logs, and by `info`."""
