@@ -34,6 +34,7 @@ MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
 FIRST = {"measures.csv": ("step", "time"), "steady.csv": ("velocity", "pressure")}  # columns that tables have
+DAMAGED = "damaged"
 FAILURE = ".failure"  # why a case has failed
 
 
@@ -92,8 +93,15 @@ def fail(case: Case, reason: str) -> None:
 
 
 def _row(case: Case) -> dict[str, Any]:
-    directory = case.job.output.directory
-    row: dict[str, Any] = {"case": case.number, **case.settings, "state": state(case)}
+    head = {"case": case.number, **case.settings}
+    try:
+        return head | {"state": state(case)} | _results(case)
+    except InputError:  # a table without a column that is read here
+        return head | {"state": DAMAGED}
+
+
+def _results(case: Case) -> dict[str, Any]:
+    directory, row = case.job.output.directory, dict[str, Any]()
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
         columns = _columns(directory / name) or {"time": []}
         if columns["time"]:
@@ -148,7 +156,7 @@ def state(case: Case) -> str:
     if not table.is_file():
         return "-"
     if not (columns := _columns(table)):
-        return "damaged"
+        return DAMAGED
     if not case.job.history:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]
