@@ -142,6 +142,17 @@ def test_a_wave_that_fills_its_free_box_comes_off() -> None:
     assert abs(ends[0] - ends[1]) < 6.1e-9
 
 
+def test_a_sphere_in_a_large_box_comes_off_under_a_force() -> None:
+    """Nothing but the attraction of the contact holds the box beyond the pull-off, 0.26 mN. Steps that took mean values
+    to be as stiff as under an approach needed 1081 iterations for the way off; 92 are left."""
+    grid, force = {"points": 64, "size": 6e-4}, {"force": {"from": 0.0, "to": -4e-4}, "duration": 1.0, "time_step": 0.1}
+    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": ELASTIC}
+    job["adhesion"] = {"work": 0.05, "range": 1e-6, "detached": "open"}
+    _, found = marched({**job, "history": [{"force": 0.0}, force]})
+    assert not column(found, "contact_area")[-4:].any()
+    assert max(row.iterations for row in found) < 150
+
+
 def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A job without the section makes no solver of gaps, no operators for it and no memory of gaps, and calls nothing
     of them; it holds what its plan tells, to the byte, which has no map of theirs."""

@@ -116,7 +116,7 @@ def test_so_does_a_table_without_a_column(cases: tuple[Case, ...]) -> None:
         head = f"step,time,distance,friction,{name},residual,seconds"
         (case.job.output.directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5\n")
     sweep_table.write(Path("out/job"), cases)
-    assert [(row["state"], row["contact_area"]) for row in table()[:3]] == [("begun", "0.2"), ("damaged", ""), ("-", "")]
+    assert [(row["state"], row["contact_area"]) for row in table()[:2]] == [("begun", "0.2"), ("damaged", "")]
 
 
 def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,9 +20,10 @@ so that history decides the branch. One iteration:
 3. direction `t = z + beta t` (Polak and Ribiere), and `t = z` where that is no descent;
 4. the way `w = max(g - alpha t, 0) - g` of a step as long as the last one should have been;
 5. `g <- g + theta w` with the step of Newton, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`, and where that curvature
-   is not clearly positive the majorized one, `-<c, w>/<w, K w>`: as gamma is concave it lowers E. It is no longer than
-   gaps allow, and a way that closes gaps is gone to its end, theta = 1, if it nearly is by Newton. Where cutting off
-   has made a way that raises E, a shorter one takes its place;
+   is not clearly positive the majorized one, `-<c, w>/<w, K w>`: as gamma is concave it lowers E. Under a load only
+   attraction holds mean values, to which K then adds what bounds the step. It is no longer than gaps allow, and a way
+   that closes gaps is gone to its end, theta = 1, if it nearly is by Newton. Where cutting off has made a way that
+   raises E, a shorter one takes its place;
 6. E must not rise: else the step is halved.
 
 So there is one operator call in an iteration, `K w`: the pressure goes on with `theta K w`. As soon as the certificate
@@ -49,6 +50,7 @@ from .law import Law
 
 # tuning
 LEAST_CURVATURE = 0.02  # of the elastic one: with less the majorized step is made
+LOOSE = 0.01  # stiffness of mean values under a load, which has none, in majorized steps; over that under an approach
 WHOLE = 0.75  # share of a way that closes gaps, if Newton's step: from it on it is gone to its end
 SHORTER = 0.1  # length of a way over that of one that raises E
 MAX_TRIES = 12  # of ways, and of halvings of a step that raises E
@@ -251,8 +253,8 @@ class GapSolver:
         *sums, fastest = kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
         slope, stiff, soft, total, fastest = self.slab.reduce(sums, [fastest])
         it.moved = total / self.slab.points
-        own = self.slab.points * it.moved**2 / it.least_mean
-        true, major = stiff - soft + (0.0 if isinstance(it.control, MeanPressure) else own), stiff + own
+        own, loaded = self.slab.points * it.moved**2 / it.least_mean, isinstance(it.control, MeanPressure)
+        true, major = stiff - soft + (0.0 if loaded else own), stiff + (LOOSE if loaded else 1.0) * own
         it.stable = true > LEAST_CURVATURE * major
         wanted = slope / (true if it.stable else major) if major > 0.0 else 0.0
         return wanted, 1.0 / fastest if fastest > 0.0 else math.inf
