@@ -52,10 +52,9 @@ def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) ->
     None where nothing slides, or has not slid yet.
     """
     rows = _during(history, np.asarray(columns["time"], float))
-    columns = {CORRECTED: [math.nan] * len(columns["time"]), **columns}
-    distance, friction, *areas = (
-        np.asarray(columns[name])[rows] for name in ("distance", "friction", "contact_area", CORRECTED)
-    )
+    unknown = [math.nan] * len(columns["time"])
+    series = columns["distance"], columns["friction"], columns["contact_area"], columns.get(CORRECTED, unknown)
+    distance, friction, *areas = (np.asarray(each)[rows] for each in series)
     if distance.size < 2 or distance[-1] == distance[0]:
         return None
     touching = [mean_over_end(distance, area) for area in areas]

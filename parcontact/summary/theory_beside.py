@@ -39,7 +39,7 @@ def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tup
     columns = tables.read(path) if path.is_file() else {}
     if not columns.get("time"):
         return {}
-    columns = {slide.CORRECTED: columns["contact_area"], **columns}
+    columns.setdefault(slide.CORRECTED, columns["contact_area"])
     found = slide.measure(history, columns)
     if found is None:
         area = columns[slide.CORRECTED][-1]
