@@ -23,7 +23,7 @@ def prefixed(unit: str, largest: float) -> tuple[str, float]:
 
 def text(value: float, unit: str, digits: int = 3) -> str:
     """Return a number with its unit, for pictures and pages: 11.7 µm."""
-    rounded = float(f"{value:.{digits}g}")
+    rounded = float(f"{value:.{digits}g}") + 0.0  # no -0
     shown, size = prefixed(unit, rounded)
     return f"{rounded / size:g} {shown}".rstrip()
 

@@ -76,10 +76,11 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
     share = math.exp(-edge) if exponential else max(1.0 - edge, 0.0)
     if share > SMALL:
         enough = -math.log(SMALL) if exponential else 1.0
+        shorter = f"a range up to {law.range * edge / enough:.3g} m, or " if edge else ""
         yield (
             f"{name}: {per_cent(share)} of its attraction over an adhesion.range of {law.range:.3g} m comes from "
-            f"beyond {room:.3g} m, where the box ends; {per_cent(SMALL)} passes: use a range up to "
-            f"{law.range * edge / enough:.3g} m, or {math.sqrt(2.0 * enough) * ring:.3g} m of room around the sphere"
+            f"beyond {room:.3g} m, where the box ends; {per_cent(SMALL)} passes: use {shorter}"
+            f"{math.sqrt(2.0 * enough) * ring:.3g} m of room around the sphere"
         )
 
 

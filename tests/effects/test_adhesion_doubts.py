@@ -51,6 +51,12 @@ def test_limits(changes: dict[str, Any], without: dict[str, Any], sentence: str)
     assert sentence not in "\n".join(job(**without).warnings)
 
 
+def test_no_range_is_short_enough_for_a_sphere_at_the_edge_of_its_box() -> None:
+    sphere = {"shape": "sphere", "radius": R, "center": [0.0, 2e-4]}
+    (text,) = (text for text in job(surface=sphere).warnings if "of its attraction" in text)
+    assert text.endswith("passes: use 6.79e-05 m of room around the sphere")  # sqrt(2 ln(100) R 5e-7)
+
+
 def test_a_range_above_the_roughness() -> None:
     """From the lowest to the highest point of a wave is twice its amplitude."""
     for share, told in ((0.99, False), (1.01, True)):

@@ -119,10 +119,11 @@ def test_a_chosen_mesh_is_not_called_too_coarse(tmp_path: Path) -> None:
 
 def test_check_says_it(tmp_path: Path, main: Main) -> None:
     job_of(tmp_path, AUTO)
-    code, said, _ = main("check", tmp_path / "job.yaml")
-    assert code == 0
-    assert "mesh: " in said
-    assert "the surface slides along (1, 0)" in said
+    for change in ("1", "-1"):
+        code, said, _ = main("check", tmp_path / "job.yaml", "--set", f"history.0.velocity={change}")
+        assert code == 0
+        assert "mesh: " in said
+        assert "the surface slides along (1, 0)" in said
 
 
 def test_from_python_and_in_a_sweep(tmp_path: Path) -> None:

@@ -41,6 +41,11 @@ def test_under_a_load() -> None:
     assert find(table(*NEAR[:-1], (-2.0, 0.0, 0.1), (-2.5, 0.0, 0.1), (0.0, -5e-6, 0.0))) == [PullOff(4, 0.5, 5)]
 
 
+def test_flat_surfaces_are_pulled_at_no_approach() -> None:
+    (text,) = describe(table((0.0, 0.0, 1.0), (-2.0, -0.0, 1.0)), 1.0)
+    assert "approach 0 m" in text
+
+
 def test_two_pulls() -> None:
     rows = table(*NEAR, *PULL, *OFF, *NEAR, (-2.0, 0.0, 0.1), *OFF)
     first, second = find(rows)

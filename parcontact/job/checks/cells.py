@@ -129,7 +129,7 @@ def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Ste
 def _unit(way: Vector) -> Vector:
     """Return the unit vector along a way that points to +x, or to +y, rounded."""
     sign = math.copysign(1.0, way[0] or way[1]) / math.hypot(*way)
-    return round(sign * way[0], 9), round(sign * way[1], 9)
+    return round(sign * way[0], 9) + 0.0, round(sign * way[1], 9) + 0.0  # no -0
 
 
 def more_points(grid: Grid) -> str:
