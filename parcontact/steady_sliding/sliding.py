@@ -32,6 +32,7 @@ from .stiffness import loses_most, soft_stripes
 
 COARSE_TOLERANCE = 0.02  # tuning: of the certificate on all grids but the finest
 LOOSE, SHARE = 1e-3, 0.6  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
+GIVE_UP = 250  # tuning: linear steps of the usual solver on a grid, where there are stripes: sets have not settled then
 NEAR = 1.1  # tuning: a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
 
@@ -209,17 +210,26 @@ class SteadySliding:
             yield None, self._proximal
 
     def _descend(
-        self, velocity: Vector, mean: float, start: Array | None, solver: Make
+        self, velocity: Vector, mean: float, start: Array | None, make: Make
     ) -> tuple[SteadyContact, float, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took, and
-        friction by energy, without an interface."""
+        friction by energy, without an interface.
+
+        Where the body is soft along stripes and the usual solver gives up, proximal points go on from there, and do all
+        finer grids.
+        """
         tally, calls = self.setup.slab.tally, 0.0
 
         def solve(level: Level, p: Array) -> tuple[SteadyContact, Convolution]:
-            nonlocal calls
+            nonlocal calls, make
             before = tally["operator"]
-            chosen, operator = solver(level, velocity)
-            contact = chosen.solve(level.heights, mean, p)
+            solver, operator = make(level, velocity)
+            contact = solver.solve(level.heights, mean, p)
+            if contact.failure and make == self._solver and soft_stripes(self.setup, velocity) is not None:
+                del solver, operator  # before others are made: their maps
+                make = self._proximal
+                solver, operator = make(level, velocity)
+                contact = solver.solve(level.heights, mean, p)
             calls += (tally["operator"] - before) * level.slab.points / self.setup.slab.points
             return contact, operator
 
@@ -235,7 +245,8 @@ class SteadySliding:
 
     def _solver(self, level: Level, velocity: Vector) -> tuple[SteadySolver, Convolution]:
         operator, inverse = self._operators(level, velocity)
-        return self._solver_for(level, velocity, operator, inverse, LEAST_CUT), operator
+        limit = GIVE_UP if soft_stripes(self.setup, velocity) is not None else math.inf
+        return self._solver_for(level, velocity, operator, inverse, LEAST_CUT, limit), operator
 
     def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
         operator, inverse = self._operators(level, velocity)
@@ -252,13 +263,14 @@ class SteadySliding:
         operator: Convolution,
         preconditioner: Convolution,
         least_cut: float,
+        limit: float = math.inf,
     ) -> SteadySolver:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
         tolerance = max(self._tolerance, 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
-        limit, along = 20 * numerics.max_iterations, soft_stripes(self.setup, velocity)
+        most, along = int(min(limit, 20 * numerics.max_iterations)), soft_stripes(self.setup, velocity)
         slab, grid = level.slab, self.setup.grid
         pairs = pairs_for(grid.lx / slab.nx, grid.ly / slab.ny)
-        what = slab, operator, preconditioner, height, tolerance, limit
+        what = slab, operator, preconditioner, height, tolerance, most
         return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut)
 
     def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:

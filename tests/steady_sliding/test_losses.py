@@ -27,6 +27,7 @@ ROUGH = (
     f"relaxation_time: {TIME!r}}}]}}\n"
     "history: [{pressure: 1.0}]\nnumerics: {tolerance: 1.0e-4}\n"
 )
+COARSE = ROUGH.replace("tolerance: 1.0e-4", "tolerance: 5.0e-3")
 
 
 @pytest.fixture
@@ -47,11 +48,17 @@ def test_rough(shared_path: Path, comm: MPI.Intracomm, speed: float, share: floa
 
 
 def test_operator_calls_of_a_contact(shared_path: Path) -> None:
-    """At most 1440 are taken: 1278 were seen. With the cut of other bodies there are 1615, with contacts ten times as
-    close 1821."""
-    finer = ROUGH.replace("points: 64", "points: 128").replace("1.25e-4", "6.25e-5")
+    """At most 465 are taken: 413 were seen. With the cut of other bodies there are 514, with ten times closer contacts
+    680."""
+    finer = COARSE.replace("points: 64", "points: 128").replace("1.25e-4", "6.25e-5")
     states = sliding(shared_path, finer, MPI.COMM_SELF)
-    assert states.solve((0.3 * PEAK, 0.0), 0.6 * 0.05 * MODULUS * float(np.sqrt(RATIO))).operator_calls <= 1440
+    assert states.solve((0.3 * PEAK, 0.0), 0.6 * 0.05 * MODULUS * float(np.sqrt(RATIO))).operator_calls <= 465
+
+
+def test_proximal_points_go_on_where_sets_do_not_settle(shared_path: Path) -> None:
+    """Waves are soft nowhere, so that sets of points come first: 520 calls were seen, and 5364 with these alone."""
+    states = sliding(shared_path, COARSE, MPI.COMM_SELF)
+    assert states.solve((PEAK, 0.0), 0.4 * 0.05 * MODULUS * float(np.sqrt(RATIO))).operator_calls <= 1000
 
 
 @pytest.mark.usefixtures("_alone")

@@ -8,8 +8,8 @@ With S symmetric and positive, the contact p' of the operator `A + S` for height
 
 that is solved for A and h once p' = p. As A is positive, p comes nearer to the solution in every step, measured by S,
 also where p' is only good to a share of the change (proximal points: R. T. Rockafellar, SIAM J. Control Optim. 14
-(1976) 877). With `S = PULL |A|`, of each wave, `A + S` has a loss tangent of 1/PULL at most, and in full contact the
-error of a wave falls to `PULL/(1 + PULL^2)^(1/2)` of it or less.
+(1976) 877). S is as small as makes the loss tangent of `A + S` 1 at most: `|Im A| - Re A` of each wave whose own is
+larger, and 0 of the others. In full contact the error of a wave then falls to 2^(-1/2) of it or less.
 """
 
 import numpy as np
@@ -20,18 +20,18 @@ from ..problem import Operator
 from .steady import SteadyContact, SteadySolver
 
 Symbol = NDArray[np.inexact]
-PULL = 1.0  # tuning: S over |A|
 LEAST_CUT = 1.5e-5  # tuning, of the load, as in `local_load`: with more, contacts take up to three times the calls here
 SHARE, MOST = 0.3, 0.5  # tuning: of the certificate, as the tolerance of the next contact; up to MOST where that fails
 # and is tried again
 LEAST = 0.3  # tuning: of the tolerance asked for, the same: more digits are not needed
 MAX_STEPS_TO_HALVE = 20  # tuning: in which the certificate must halve
+STEPS_TO_HALVE = 12  # tuning: the same of the projected steps of a contact
 MOST_STEPS = 3  # tuning: times the steps that one contact may take, in all
 
 
 def pull(symbol: Symbol) -> Symbol:
     """The symbol of S, of that of A."""
-    return np.asarray(PULL * np.abs(symbol))
+    return np.maximum(np.abs(symbol.imag) - symbol.real, 0.0)
 
 
 def nearer(symbol: Symbol) -> Symbol:
@@ -41,9 +41,9 @@ def nearer(symbol: Symbol) -> Symbol:
 
 def nearer_inverse(symbol: Symbol) -> Symbol:
     """The symbol of the inverse of `A + S`, of that of the inverse of A: 0 where that is 0."""
-    size = np.abs(symbol)
-    phase = np.divide(symbol, size, out=np.zeros_like(symbol), where=size > 0.0)
-    return symbol / (1.0 + PULL * phase)
+    square = np.abs(symbol) ** 2
+    own = np.divide(pull(symbol), square, out=np.zeros_like(square), where=square > 0.0)
+    return symbol / (1.0 + own * symbol)
 
 
 class Proximal:
@@ -55,7 +55,7 @@ class Proximal:
 
     def __init__(self, solver: SteadySolver, operator: Operator, pull: Operator) -> None:
         self.solver, self.operator, self.pull = solver, operator, pull
-        self.tolerance = solver.tolerance
+        self.tolerance, solver.steps_to_halve = solver.tolerance, STEPS_TO_HALVE
         self._h, self._kept = solver.slab.empty(), solver.slab.empty()
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:

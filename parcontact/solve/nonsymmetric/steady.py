@@ -102,6 +102,7 @@ class SteadySolver:
         self._projected = Projected(slab, operator, preconditioner, self.constraint, pairs, least_cut)
         kept = precision_of_directions(tolerance, LOOSE)
         self._striped = along is not None
+        self.steps_to_halve = STRIPED_STEPS_TO_HALVE if self._striped else MAX_STEPS_TO_HALVE
         on_sets: OnSet = Plain(preconditioner)
         if along is not None:
             on_sets = Stripes(slab, preconditioner, self._projected.extended, along)
@@ -151,11 +152,11 @@ class SteadySolver:
         """Projected steps as long as they help: in one way and, but where the active set is as good, in the other."""
         self._admit(p, mean)
         d, certificate = self._certify(p, h, mean)
-        steps, limit = 0, STRIPED_STEPS_TO_HALVE if self._striped else MAX_STEPS_TO_HALVE
+        steps = 0
         for near_by in (True,) if self._striped else (True, False):
             best, since = certificate.worst, 0
             self._projected.begin(near_by)
-            while certificate.worst > self.tolerance and since < limit:
+            while certificate.worst > self.tolerance and since < self.steps_to_halve:
                 self._projected.step(p, self._u, h, self._working, mean * self.slab.points)
                 d, certificate = self._certify(p, h, mean)
                 steps += 1

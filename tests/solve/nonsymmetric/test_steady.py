@@ -43,7 +43,7 @@ def test_maps_are_made_when_they_are_needed(
     before += start.nbytes
     assert solver.solve(h, 1.0, start).sets == 0
     assert held() == few
-    monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 0)
+    solver.steps_to_halve = 0
     monkeypatch.setattr(steady, "REDUCTION", 1e-9)
     start.fill(0.0)
     contact = solver.solve(h, 1.0, start)
