@@ -15,6 +15,7 @@ from parcontact.march.rounding import NAME
 from parcontact.march.state import entries
 
 HUGE, USUAL = 3e10, 1e4  # Pa: the first moves the body by 3e3 times the height of the surface, and more
+MORE = 4  # calls of a step, by the rounding of the transforms that FFTW chooses; a solve that stalls takes 60 more
 HELD, CALLS = 6, 3  # steps under the huge load, and operator calls of one in full contact
 
 
@@ -35,13 +36,14 @@ def unforeseen(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.mpi(2)
 @pytest.mark.parametrize("tolerance", [1e-3, 5e-3])
 def test_no_solve_stalls(comm: MPI.Intracomm, tolerance: float) -> None:
-    """Each step takes the calls of double precision, from below the rounding that is allowed to far beyond it."""
+    """Each step takes about the calls of double precision, from below the rounding that is allowed to far beyond it."""
     for load in (1e8, 1e9, 3e9, 1e11, 1e13):
         given = job("mixed", load, tolerance)
         march, rows = marched({**given, "history": given["history"][:1]}, comm=comm)
         _, exact = marched({**given, "history": given["history"][:1], "numerics": {"tolerance": tolerance}}, comm=comm)
         assert march.scene.slab.tally["retry"] == 0
-        assert [row.operator_calls for row in rows] == [row.operator_calls for row in exact]
+        for row, wanted in zip(rows, exact, strict=True):
+            assert row.operator_calls <= wanted.operator_calls + MORE
 
 
 @pytest.mark.mpi(2)
