@@ -54,7 +54,8 @@ class Settings:
 class Ladders:
     """Ladders of what is refined, from the coarsest to the finest; one value where the job asks for none.
 
-    `shared` is the relative error that all cases may have alike: the accuracy for which steps are chosen, else 0.
+    `shared` is the relative error that all cases may have alike: the accuracy for which steps are chosen, else 0. Where
+    nothing `slides`, friction is not judged.
     """
 
     meshes: tuple[int, ...]
@@ -63,6 +64,7 @@ class Ladders:
     study: Study
     own: Settings
     shared: float = 0.0
+    slides: bool = True
 
     def combine(self) -> list[Settings]:
         """All combinations, each once, the cheapest first."""
@@ -115,7 +117,8 @@ def ladders(job: Job) -> Ladders:
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
     cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
     shared = numerics.asked.of_steps if _sliding(job) and not study.cells_per_step else 0.0
-    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case, shared)
+    slides = any(stage.speed for stage in job.history)
+    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case, shared, slides)
 
 
 def overrides(job: Job, own: Settings, case: Settings) -> list[str]:

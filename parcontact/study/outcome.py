@@ -134,7 +134,7 @@ def write_outcomes(
     writer.writerow(COLUMNS)
     for settings, outcome in outcomes.items():
         given = (AUTO if value is None else value for value in astuple(settings))
-        missed = [errors[settings][name] if errors else "" for name in QUANTITIES]
+        missed = [errors[settings].get(name, "") if errors else "" for name in QUANTITIES]
         writer.writerow([fingerprints[settings], *given, *astuple(outcome), *missed])
     files.write(path, text.getvalue())
 

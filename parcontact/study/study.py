@@ -17,7 +17,6 @@ from .ladders import Ladders, Settings, describe_chosen_steps, describe_held_ran
 from .outcome import Outcome, read_outcomes, write_outcomes
 
 DONE, AGAIN = 0, 3  # exit codes
-HEAD = f"  {'case':80} {'friction max':>13} {'area':>9} {'CPU [s]':>8}"
 MakeJob = Callable[[Sequence[str]], Job]
 
 
@@ -66,7 +65,7 @@ class _Study:
     def run(self, stopped: Callable[[], bool]) -> bool:
         """Run the cases that lack; whether all are there in the end."""
         self.say(f"{len(self.jobs)} cases" + f", {len(self.outcomes)} of them finished before" * bool(self.outcomes))
-        self.say(HEAD)
+        self._say_line("case", "friction max", "area", "CPU [s]")
         for case, job in self.jobs.items():
             if case not in self.outcomes:
                 found = self._one(case, job, stopped)
@@ -76,8 +75,12 @@ class _Study:
                 if self.slab.root:
                     write_outcomes(self.path, self.prints, self.outcomes)
             one = self.outcomes[case]
-            self.say(f"  {case!s:80} {one.mu_max:13.6g} {one.area_corrected:9.5f} {one.cpu_seconds:8.2f}")
+            numbers = f"{one.mu_max:.6g}", f"{one.area_corrected:.5f}", f"{one.cpu_seconds:.2f}"
+            self._say_line(str(case), *numbers)
         return True
+
+    def _say_line(self, case: str, friction: str, area: str, seconds: str) -> None:
+        self.say(f"  {case:80}" + f" {friction:>13}" * self.refined.slides + f" {area:>9} {seconds:>8}")
 
     def _one(self, case: Settings, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
         slab = self.slab.resized(*job.grid.points)
@@ -102,7 +105,7 @@ class _Study:
         files.write(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
         proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
         doubts = {name: limit.doubt for name, limit in reference.items()}
-        points = {quantity: _points(ordered, proven, quantity) for quantity in verdict.NEEDED}
+        points = {quantity: _points(ordered, proven, quantity) for quantity in verdict.NEEDED if quantity in doubts}
         pictures = study_plots.plot(self.path.parent, self._curves(ordered, errors), points, doubts)
         for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
             self.say(line)
@@ -116,6 +119,7 @@ class _Study:
             for integrator in self.refined.integrators
             for name, (sizes, cases) in verdict.sequences(self.refined, outcomes, integrator).items()
             for quantity in verdict.NEEDED
+            if quantity in errors[cases[0]]
         ]
 
 

@@ -10,7 +10,8 @@ from .ladders import Ladders, Settings
 from .outcome import QUANTITIES, Outcome
 
 TARGETS = (0.05, 0.03, 0.01, 0.003)
-NEEDED = ("mu_max", "mu_end", "area_corrected")  # what the sentences hold the settings to
+FRICTION = ("mu_max", "mu_end")
+NEEDED = (*FRICTION, "area_corrected")  # what the sentences hold the settings to
 TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
 Outcomes = Mapping[Settings, Outcome]
 
@@ -63,12 +64,17 @@ def _alike(one: float | None, other: float | None) -> bool:
     return one == other if one is None or other is None else math.isclose(one, other)
 
 
+def judged(ladders: Ladders) -> list[str]:
+    """Return the quantities whose errors are told: friction only where something slides."""
+    return [name for name in QUANTITIES if ladders.slides or name not in FRICTION]
+
+
 def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
     """The limit of every quantity along every ladder."""
     found = []
     for integrator in ladders.integrators:
         for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
-            for quantity in QUANTITIES:
+            for quantity in judged(ladders):
                 values = [float(getattr(outcomes[case], quantity)) for case in cases]
                 finer = [getattr(outcomes[case], quantity) for case in _finer(outcomes, cases[-1])]
                 found.append(Found(quantity, integrator, name, _cover(extrapolate(sizes, values), finer)))
@@ -101,8 +107,8 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
         each = [replace(ladders, cells=(cells,)) for cells in ladders.cells]
         found = [one for part in each for one in limits(part, outcomes) if one.ladder in (TOGETHER, CHOSEN)]
     dearest = max(outcomes, key=lambda case: (case.effort, -case.tolerance, case.precision == "double"))
-    best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in QUANTITIES}
-    for quantity in QUANTITIES:
+    best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in judged(ladders)}
+    for quantity in best:
         choices = [one.limit for one in found if one.quantity == quantity and one.limit.value]
         if choices:
             limit = min(choices, key=lambda one: (math.isnan(one.doubt), math.isnan(one.order), one.doubt))
@@ -125,7 +131,7 @@ def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[s
 
 def worst(error: Mapping[str, float]) -> float:
     """The largest of the errors that settings are held to; NaN if there is none."""
-    values = [error[name] for name in NEEDED if not math.isnan(error[name])]
+    values = [error[name] for name in NEEDED if not math.isnan(error.get(name, math.nan))]
     return max(values, default=math.nan)
 
 
@@ -143,7 +149,10 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     """Return what is held to the targets, and for each the cheapest settings that reach it, with the time they take."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
-    doubts = [reference[name].doubt for name in NEEDED if name in reference and reference[name].value]
+    if math.isnan(error[best]):
+        return ["nothing touches: there are no errors to tell"]
+    needed = [name for name in NEEDED if name in reference]
+    doubts = [reference[name].doubt for name in needed if reference[name].value]
     doubt = max((doubt for doubt in doubts if not math.isnan(doubt)), default=math.nan)
     lines: list[str] = []
     for target in TARGETS:
@@ -164,4 +173,5 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
             lines[-1] = lines[-1].replace(" %: none", f" %, {100 * target:g} %: none")
         else:
             lines.append(f"for {100 * target:g} %: {text}")
-    return [f"the cheapest settings whose errors of {', '.join(NEEDED)} are all within a bound:", *lines]
+    held = f"errors of {', '.join(needed)} are all" if len(needed) > 1 else f"error of {needed[0]} is"
+    return [f"the cheapest settings whose {held} within a bound:", *lines]

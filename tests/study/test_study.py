@@ -205,6 +205,24 @@ def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_pat
     assert changed.startswith("4 cases\n")
 
 
+@pytest.mark.parametrize(
+    ("load", "sentence"),
+    [
+        ("pressure: 1.0e4", "the cheapest settings whose error of area_corrected is within a bound:"),
+        ("approach: -1.0e-6", "nothing touches: there are no errors to tell"),
+    ],
+)
+def test_without_a_slide_nothing_is_said_of_friction(main: Main, tmp_path: Path, load: str, sentence: str) -> None:
+    """Its friction is next to nothing, or nothing, and its relative error no number."""
+    history = f"history: [{{{load}}}]\nstudy: {{mesh: [16, 32, 64]}}\noutput: {{directory: out}}\n"
+    job = tmp_path / "rest.yaml"
+    job.write_text(WAVE.partition("initial")[0] + history)
+    code, out, err = main("study", job)
+    assert (code, sentence in out.splitlines()) == (0, True), err
+    assert not any(word in out for word in ("nan", "mu_", "friction"))
+    assert {row["error_mu_max"] for row in rows(tmp_path / "out" / "study.csv")} == {""}
+
+
 def test_a_case_that_cannot_be(main: Main, tmp_path: Path) -> None:
     """All cases are read before the first is run; nothing is written."""
     job = tmp_path / "wave.yaml"
