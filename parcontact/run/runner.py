@@ -12,11 +12,12 @@ from ..job import Job, Rough, RoughSpectrum
 from ..job.sections import listing
 from ..march.loop import March
 from ..march.sticking import NEVER, came_off
+from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
-from ..storage import header, heights, row, wisdom
+from ..storage import header, heights, marker, row, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.console import Console
 from ..storage.directory import Directory
@@ -106,6 +107,8 @@ def _find_origin(
         reason = f"detached before, at t = {off[0]:g} s (--restart never: run it afresh)"
     elif origin and until is not None and reached(origin.contents.time, until):
         reason = f"is at t = {origin.contents.time:g} s already, and --until {until:g} is not later"
+    if reason and (lost := on_root(slab.comm, lambda: marker.find_lost_rows(directory.path))):
+        raise InputError(lost)
     return origin, warnings, reason
 
 

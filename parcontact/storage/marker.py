@@ -6,13 +6,14 @@ Only what the marker (or a sealed checkpoint) proves to be ours is ever replaced
 import json
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from . import files
+from . import files, tables
 
 MARKER = ".parcontact"
 FORMAT = 1
@@ -57,14 +58,34 @@ def read(directory: Path) -> dict[str, Claim]:
     raise ValueError(f"{path} was written by a newer parcontact")
 
 
-def detached(directory: Path) -> str:
-    """Return how the surfaces of the run in a directory came off for good, empty where they did not; raises InputError
-    for a marker that cannot be read."""
+def claim_of_run(directory: Path) -> Claim | None:
+    """Return the claim of the run in a directory; raises InputError for a marker that cannot be read."""
     try:
-        claim = read(directory).get("run")
+        return read(directory).get("run")
     except (OSError, ValueError) as error:
         raise InputError(str(error)) from error
+
+
+def detached(directory: Path) -> str:
+    """Return how the surfaces of the run in a directory came off for good, empty where they did not; raises
+    InputError."""
+    claim = claim_of_run(directory)
     return "" if claim is None else claim.detached
+
+
+def find_lost_rows(directory: Path) -> str:
+    """Return what to say of a run that has finished, and whose table is damaged or lacks rows, or ''; raises
+    InputError for a marker that cannot be read."""
+    claim, table = claim_of_run(directory), directory / "measures.csv"
+    if claim is None or claim.finished is None:
+        return ""
+    with suppress(InputError, OSError, IndexError):
+        if tables.read(table)["step"][-1] >= claim.finished[0]:
+            return ""
+    return (
+        f"{table} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; mend it, "
+        f"or move {directory} away to run it afresh"
+    )
 
 
 def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:

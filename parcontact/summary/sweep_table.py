@@ -150,6 +150,8 @@ def _columns(path: Path) -> dict[str, list[float]]:
 def state(case: Case) -> str:
     """Return how far a case has come: done | failed | begun | -, or that its table is damaged."""
     directory = case.job.output.directory
+    if case.job.history and marker.find_lost_rows(directory):
+        return DAMAGED
     if (directory / FAILURE).is_file():
         return "failed"
     table = directory / ("measures.csv" if case.job.history else "steady.csv")

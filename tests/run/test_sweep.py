@@ -63,6 +63,25 @@ def test_a_case_that_fails_does_not_stop_the_others(
     assert [row["state"] for row in table()] == ["-"] * 6
 
 
+@pytest.mark.parametrize("damage", [lambda text: text[: len(text) // 2], lambda text: text + "x\n", None])
+def test_a_finished_case_whose_table_lacks_rows_is_damaged(
+    cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str], damage: Callable[[str], str] | None
+) -> None:
+    """Its checkpoint is at the end, so that no run adds them: the message says what to do."""
+    assert main(["job.yaml", "--case", "0", "--quiet"]) == 0
+    directory = cases[0].job.output.directory
+    csv = directory / "measures.csv"
+    whole = csv.read_text()
+    csv.unlink() if damage is None else csv.write_text(damage(whole))
+    assert main(["job.yaml", "--case", "0", "--quiet"]) == 1
+    assert f"lacks rows; mend it, or move {directory} away to run it afresh" in capsys.readouterr().err
+    assert [row["state"] for row in table()] == ["damaged", *"-----"]
+    directory.rename("aside")
+    assert main(["job.yaml", "--case", "0", "--quiet"]) == 0
+    assert [row["state"] for row in table()] == ["done", *"-----"]
+    assert len(csv.read_text().splitlines()) == len(whole.splitlines())
+
+
 def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> None:
     assert seeds_done(cases, {2: 3}) == (3, [1, 2, 3])
 
