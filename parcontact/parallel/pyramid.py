@@ -44,7 +44,7 @@ def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None
 def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, bool]]:
     """Cells along x and y of each larger grid, and whether every rank has all of them."""
     enough, alone = nx * ny // (FEW * ranks), ranks == 1
-    while nx * ny > 1 or pairs > 0:
+    while nx * ny > 1:
         nx, ny, pairs = nx if pairs > 0 else (nx + 1) // 2, (ny + 1) // 2, pairs - 1
         alone = alone or nx * ny <= enough
         yield nx, ny, alone

@@ -99,7 +99,7 @@ def run(
         sanity.refuse_impossible(job, Timeline.of(job))
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
-        goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain, job.origin.mesh))
+        goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
         setup = scene.set_up(job, slab)
         doubts = sanity.find_doubts(setup, wanted.temperatures)
         sliding = SteadySliding(setup)
@@ -124,14 +124,14 @@ def _identity(job: Job, wanted: Request) -> dict[str, Any]:
     return {**marker.kept(listing.plain_job(job)), "steady": steady}
 
 
-def _goes_on(directory: Directory, plain: Mapping[str, Any], chosen: str) -> bool:
+def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
     """Return whether points of the same curve are there; root only. Raises InputError if they are of another, and says
-    how to keep its mesh if that was `chosen` for another request."""
+    how to keep another mesh."""
     if (claim := directory.claim) is None or not directory.results():
         return False
     if different := marker.told(marker.differences(claim.job, plain, (*SAME, "steady"))):
         points = str(claim.job["grid"]["points"]).replace(" ", "")
-        kept = f"give --set grid.points={points} to keep its mesh, or " if chosen and "grid.points" in different else ""
+        kept = f"give --set grid.points={points} to keep its mesh, or " if "grid.points" in different else ""
         raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {kept}{ADVICE}")
     return True
 

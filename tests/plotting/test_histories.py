@@ -1,17 +1,21 @@
 """`parcontact plot`: a picture with the panels that a job has."""
 
 import csv
+import re
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from drawing import ELASTIC, KINDS, SLIDE, SPHERE, WAVE, ZENER, panels, ran
+from drawing import AREA, ELASTIC, FRACTION, KINDS, PEAK, SLIDE, SPHERE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
 from parcontact.plotting import plots
+from parcontact.storage import tables
 from parcontact.summary import theory_settings
+
+BOX = 2e-3**2  # area of the box of a sphere [m^2]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -32,6 +36,26 @@ def test_hertz_beside_the_sphere(tmp_path: Path, drawn: list[Figure]) -> None:
     inside = exact > 0.5 * exact.max()
     assert inside.sum() > 8
     assert np.abs(p - exact)[inside].max() < 0.02 * exact.max()
+
+
+def test_areas_are_corrected(tmp_path: Path, drawn: list[Figure]) -> None:
+    """In the title of a single solve, to its four digits, and in the panel of a run: by more than a digit."""
+    for kind in ("Hertz", "creep"):
+        (tmp_path / kind).mkdir()
+        plots.plot([ran(tmp_path / kind, KINDS[kind][0])])
+    hertz, creep = (tables.read(tmp_path / kind / "out" / "measures.csv") for kind in ("Hertz", "creep"))
+    (told,) = re.findall(r"contact area (\S+) mm²", drawn[0].get_suptitle())
+    corrected, raw = (hertz[name][-1] * BOX * 1e6 for name in ("contact_area_corrected", "contact_area"))
+    assert abs(float(told) - corrected) < 1e-3 * corrected < abs(corrected - raw)
+    (panel,) = (axes for axes in drawn[1].axes if axes.get_ylabel() == AREA)
+    shown = np.array(panel.get_lines()[0].get_ydata())
+    assert np.allclose(shown, BOX * np.array(creep["contact_area_corrected"])[-shown.size :], rtol=1e-12)
+
+
+def test_no_panel_of_friction_that_is_0(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Of a flat surface that slides."""
+    plots.plot([ran(tmp_path, WAVE.replace("1.0e-6", "0.0") + ZENER + SLIDE)])
+    assert panels(drawn[0]) == [FRACTION, PEAK]
 
 
 def test_peak_of_friction_is_named(tmp_path: Path, drawn: list[Figure]) -> None:
@@ -121,7 +145,7 @@ def test_load_over_approach_is_a_loop(tmp_path: Path, drawn: list[Figure]) -> No
 
 
 def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Approach, force and pressure go below 0, and all five energies are there."""
+    """Approach, force and pressure go below 0, and all five energies are there, their legend above the panel."""
     stick = "adhesion: {work: 0.05, range: 3.0e-6}\noutput: {energy: true, fields: [pressure]}\n"
     stages = "history: [{approach: {from: -4.0e-6, to: -1.0e-6}, duration: 1.0, time_step: 0.25}]\n"
     plots.plot([ran(tmp_path, SPHERE + ELASTIC + stick + stages)])
@@ -129,4 +153,8 @@ def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: 
     for name in ("approach", "force", "pressure"):
         assert found[name].get_ylim()[0] < 0.0
         assert min(np.nanmin(np.array(line.get_ydata())) for line in found[name].get_lines()) < 0.0
-    assert len(found["energy"].get_legend_handles_labels()[1]) == 5
+    legend = found["energy"].get_legend()
+    assert legend is not None
+    assert len(legend.get_texts()) == 5
+    drawn[0].draw_without_rendering()
+    assert legend.get_window_extent().y0 >= found["energy"].get_window_extent().y1

@@ -42,6 +42,13 @@ def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
     assert np.allclose(area.series[0].y, 0.2)
 
 
+def test_corrected_areas_beside_those_of_the_theory(tmp_path: Path) -> None:
+    """The theory has no cells to correct for: its column is that of the contact area."""
+    head = (*HEAD, "theory_contact_area")
+    _, area = sweep.charts(saved(tmp_path, case(1.0, 1, 3.0, theory=0.25), case(2.0, 1, 4.0, theory=0.35), head=head))
+    assert {one.name: one.y.tolist() for one in area.series} == {"simulation": [0.2, 0.2], "theory": [0.25, 0.35]}
+
+
 def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
     rows = [case(v, 1, 10 * v + size, size) for v in (1.0, 2.0) for size in (1e-3, 2e-3)]
     friction, _ = sweep.charts(saved(tmp_path, *rows))

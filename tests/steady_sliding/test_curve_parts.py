@@ -172,6 +172,7 @@ def test_curve_of_another_job(main: Main, tmp_path: Path) -> None:
     code, said = main(*CURVE, "--set", "numerics.tolerance=1e-5")
     assert code == BAD_INPUT
     assert "out holds the friction curve of another job: numerics.tolerance was 0.005, is 1e-05" in said
+    assert "to keep its mesh" not in said
     assert (tmp_path / "out" / "steady.csv").read_bytes() == before
 
 

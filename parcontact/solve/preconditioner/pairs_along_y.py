@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...compiled import loop
-from .squares import row_of
+from .squares import row_of, rows_from
 
 
 @loop
@@ -40,11 +40,8 @@ def interpolate(cells, beside, above, known, points):
 def interpolate_back(known, known_beside, points, beside, above, cells):
     """Add points to cells: `1 - known` times their values, by the weights of the interpolation."""
     for j in range(cells.shape[0]):
-        first = 2 * j - above - 1
-        a, b = row_of(points, beside, first), row_of(points, beside, first + 1)
-        c, d = row_of(points, beside, first + 2), row_of(points, beside, first + 3)
-        w_a, w_b = row_of(known, known_beside, first), row_of(known, known_beside, first + 1)
-        w_c, w_d = row_of(known, known_beside, first + 2), row_of(known, known_beside, first + 3)
+        a, b, c, d = rows_from(points, beside, 2 * j - above - 1)
+        w_a, w_b, w_c, w_d = rows_from(known, known_beside, 2 * j - above - 1)
         for i in range(cells.shape[1]):
             outer = (1.0 - w_a[i]) * a[i] + (1.0 - w_d[i]) * d[i]
             inner = (1.0 - w_b[i]) * b[i] + (1.0 - w_c[i]) * c[i]

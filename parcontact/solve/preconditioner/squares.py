@@ -14,6 +14,13 @@ def row_of(own, beside, j):
 
 
 @loop
+def rows_from(own, beside, j):
+    """Row j and the three after it."""
+    first, second = row_of(own, beside, j), row_of(own, beside, j + 1)
+    return first, second, row_of(own, beside, j + 2), row_of(own, beside, j + 3)
+
+
+@loop
 def add_up(points, beside, above, cells):
     """The sums over cells."""
     pairs = points.shape[1] // 2
@@ -66,11 +73,8 @@ def interpolate_back(known, known_beside, points, beside, above, cells):
     count, columns = points.shape[1], cells.shape[1]
     line = np.zeros(2 * columns + 2, cells.dtype)
     for j in range(cells.shape[0]):
-        first = 2 * j - above - 1
-        a, b = row_of(points, beside, first), row_of(points, beside, first + 1)
-        c, d = row_of(points, beside, first + 2), row_of(points, beside, first + 3)
-        w_a, w_b = row_of(known, known_beside, first), row_of(known, known_beside, first + 1)
-        w_c, w_d = row_of(known, known_beside, first + 2), row_of(known, known_beside, first + 3)
+        a, b, c, d = rows_from(points, beside, 2 * j - above - 1)
+        w_a, w_b, w_c, w_d = rows_from(known, known_beside, 2 * j - above - 1)
         for i in range(count):
             outer = (1.0 - w_a[i]) * a[i] + (1.0 - w_d[i]) * d[i]
             inner = (1.0 - w_b[i]) * b[i] + (1.0 - w_c[i]) * c[i]
