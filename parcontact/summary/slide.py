@@ -101,6 +101,21 @@ def errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> 
     return {name: largest(columns[name][row] for row in rows) for name in ERRORS if name in columns}
 
 
+def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Return the relative errors of friction and contact area that the end of a run tells of its slide: means over the
+    distance slid, of friction in proportion to it. Without a slide that of the area in the last row; nan where no error
+    is known."""
+    if measure(history, columns) is None:
+        return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
+    rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
+    for name, weight in zip(ERRORS, (columns["friction"], np.ones(len(columns["time"]))), strict=True):
+        error = np.asarray(columns.get(name, np.full(len(weight), np.nan)), float)[rows[1:]]
+        far = np.where(np.isnan(error), 0.0, np.diff(np.asarray(columns["distance"], float)[rows]))
+        counted = far * np.asarray(weight, float)[rows[1:]]
+        found[name] = float(np.nansum(counted * error) / counted.sum()) if counted.any() else math.nan
+    return found
+
+
 def largest(values: Iterable[float]) -> float:
     """Return the largest of those that are known, else nan."""
     return max((value for value in values if value == value), default=math.nan)

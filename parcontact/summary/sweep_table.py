@@ -113,7 +113,7 @@ def _results(case: Case) -> dict[str, Any]:
             row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
-            row |= slide.errors(case.job.history, columns)
+            row |= slide.mean_errors(case.job.history, columns)
             within = slide.absolute_errors(case.job.history, columns, case.job.grid.dx)
             row |= {name: within.get(name.removesuffix("_error"), math.nan) for name in FRICTION_ERRORS}
     return row

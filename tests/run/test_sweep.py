@@ -82,6 +82,16 @@ def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     assert len(csv.read_text().splitlines()) == len(whole.splitlines())
 
 
+def test_errors_are_those_that_the_end_of_a_run_tells(cases: tuple[Case, ...]) -> None:
+    """To the three digits of its sentences."""
+    assert main(["job.yaml", "--case", "0", "--quiet"]) == 0
+    log = (cases[0].job.output.directory / "run.log").read_text()
+    for name, what in (("error_friction", "friction"), ("error_area", "the corrected contact area")):
+        told = re.search(f"estimated error of {what}: ([0-9.]+) %", log)
+        assert told is not None
+        assert 100.0 * float(table()[0][name]) == pytest.approx(float(told[1]), rel=6e-3)
+
+
 def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> None:
     assert seeds_done(cases, {2: 3}) == (3, [1, 2, 3])
 
