@@ -15,13 +15,15 @@ from ..job.sections.listing import plain_job
 from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
+from ..physics.budget import exceeds
+from ..printed import per_cent
 from ..storage import marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
 from ..summary import sweep_table
 from . import watch
 from .run import DONE, STOPPED_EARLY
-from .sweep_warnings import SweepWarnings
+from .sweep_warnings import SweepWarnings, name_cases
 
 FAILED = 1
 ELSEWHERE = -1  # no exit code: of a case that another program runs
@@ -75,7 +77,22 @@ class Sweep:
                 print_line(f"results of all cases: {sweep_table.results(_directory(self.cases))}")
             elif self.groups.count > 1 and not self.quiet:
                 print_line("stopped early; run again to go on")
+            if self.runs and STOPPED_EARLY not in codes and len(chosen) > 1:
+                self._tell_errors(chosen)
         return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
+
+    def _tell_errors(self, chosen: Sequence[Case]) -> None:
+        """Say how wrong the results are at most, and warn of cases that are more so than they ask for; root only."""
+        asked = {case.number: case.job.numerics.asked.both for case in chosen}
+        for k, found in enumerate(sweep_table.errors(chosen)):
+            if not found:
+                continue
+            worst, what = max(found, key=lambda number: found[number]), ("friction", "the corrected contact area")[k]
+            if not self.quiet:
+                print_line(f"largest estimated error of {what}: {per_cent(found[worst], 3)}, in case {worst}")
+            if beyond := [number for number, error in found.items() if exceeds(error, asked[number][k])]:
+                more = f"the estimated error of {what} is more than numerics.accuracy asks for in {name_cases(beyond)}"
+                print_line(f"warning: {more}; the log of each says what would make it smaller", sys.stderr)
 
     def _take(self, own: Sequence[Case], signals: Signals) -> int:
         """Do the cases of the group; returns the exit code. If it stops early, so do the others."""

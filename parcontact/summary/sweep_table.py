@@ -81,6 +81,17 @@ def read(path: Path) -> list[dict[str, Any]]:
         raise InputError(f"{path} cannot be read: {error}; {MEND}") from error
 
 
+def errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
+    """Yield of each column of errors the largest one of each case that is done, by its number, as far as known."""
+    rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
+    for name in slide.ERRORS:
+        found: dict[int, float] = {}
+        for row in rows:
+            if row["state"] == "done" and (error := row.get(name, math.nan)) == error:
+                found[row["case"]] = max(error, found.get(row["case"], 0.0))
+        yield found
+
+
 def fail(case: Case, reason: str) -> None:
     """Leave in the directory of a case why it has failed, or that it has not; root only."""
     path = case.job.output.directory / FAILURE

@@ -1,5 +1,6 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +17,7 @@ from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import sweep, watch
-from parcontact.summary import info, sweep_table
+from parcontact.summary import info, slide, sweep_table
 
 
 @pytest.fixture
@@ -90,6 +91,28 @@ def test_errors_are_those_that_the_end_of_a_run_tells(cases: tuple[Case, ...]) -
         told = re.search(f"estimated error of {what}: ([0-9.]+) %", log)
         assert told is not None
         assert 100.0 * float(table()[0][name]) == pytest.approx(float(told[1]), rel=6e-3)
+
+
+def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    """And warns of the cases in which they are more than the accuracy, here one between those of two cases."""
+    two = "sweep={surface.seed: [1, 2]}"
+
+    def end(*words: str) -> tuple[list[str], list[str]]:
+        assert main(["job.yaml", "--set", two, *words]) == 0
+        said = capsys.readouterr()
+        lines = [line for line in said.out.splitlines() if line.startswith("largest estimated error of ")]
+        return lines[-2:], [line for line in said.err.splitlines() if "more than numerics.accuracy asks for" in line]
+
+    told, warned = end("--set", "numerics.accuracy=0.5")
+    for column, what, line in zip(slide.ERRORS, ("friction", "the corrected contact area"), told, strict=True):
+        errors = [float(row[column]) for row in table()]
+        worst = errors.index(max(errors))
+        assert line == f"largest estimated error of {what}: {100 * max(errors):.3g} %, in case {worst}"
+        assert max(errors) < 0.5
+        _, beyond = end("--set", f"numerics.accuracy={math.sqrt(errors[0] * errors[1])}")
+        warning = f"warning: the estimated error of {what} is more than numerics.accuracy asks for in case {worst};"
+        assert any(text.startswith(warning) for text in beyond)
+    assert not warned
 
 
 def test_a_case_that_stops_early_stops_the_sweep(cases: tuple[Case, ...]) -> None:
@@ -192,7 +215,7 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
     here = tmp_path / "out" / "job"
     assert [row["state"] for row in table(directory=here)] == ["-", "-", "-", "-", "done", "-"]
     before = (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns
-    done = run_parcontact(["job.yaml"], ranks=2)
+    done = run_parcontact(["job.yaml", "--set", "numerics.accuracy=0.5"], ranks=2)
     assert (done.returncode, done.stderr) == (0, "")
     assert "case 5: history.1.velocity = 0.1, surface.seed = 3 (of 6)\n" in done.stdout
     assert "case 5: done\n" in done.stdout

@@ -28,7 +28,7 @@ def test_a_case_that_another_program_runs(
     where.mkdir(parents=True)
     with (where / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        assert main(["job.yaml", "--quiet"]) == 0
+        assert main(["job.yaml", "--quiet", "--set", "numerics.accuracy=0.5"]) == 0
         in_use = f"the output directory {where} is in use by another run (just started)\n"
         assert capsys.readouterr().err == f"parcontact: case 1 is being run by another program: {in_use}"
         assert [row["state"] for row in table()] == ["done", "-", *["done"] * 4]
