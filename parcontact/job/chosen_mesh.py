@@ -20,6 +20,7 @@ from .contact_guess import guesses
 from .model import Job, prepared
 from .sections.calculation import Accuracy, Grid, Numerics
 from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
+from .sections.listing import plain
 from .sections.materials import Material
 from .sections.part import Origin, Part
 from .sections.quantities import AUTO_POINTS, FROM_SURFACE
@@ -67,7 +68,14 @@ def choose_points(source: Source, origin: Origin) -> Origin:
     return origin
 
 
-def _choose(scenery: Scenery, box: Grid, data: dict[str, Any], origin: Origin) -> tuple[list[int], str]:
+def points_for(job: Job, accuracy: float) -> tuple[int, int]:
+    """Return the points along x and y that `auto` takes for a job at another accuracy. Raises InputError."""
+    numerics = job.numerics.model_copy(update={"accuracy": accuracy})
+    (nx, ny), _ = _choose(job.model_copy(update={"numerics": numerics}), job.grid, plain(job), job.origin)
+    return nx, ny
+
+
+def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Origin) -> tuple[list[int], str]:
     """Return points along x and y, and a sentence. Raises InputError where the surface has no shortest wave."""
     wave = min((_shortest(shape, box, data, origin) for shape in scenery.surface), default=math.inf)
     if not math.isfinite(wave):

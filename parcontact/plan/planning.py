@@ -41,10 +41,10 @@ class Planner:
         if job.history:
             yield from report.maps(job, self.ranks)
             yield ""
-            yield from self._tell(job, slab)
+            yield from self._tell(job, slab, job)
         if job.steady:
             yield from [""] * bool(job.history)
-            yield from self._tell(only_steady_states(job), slab)
+            yield from self._tell(only_steady_states(job), slab, job)
 
     def plan_sweep(self, cases: Sequence[Case], groups: Groups) -> Iterator[str]:
         """Lines of the plan of all cases, of which each group of ranks runs one at a time; collective like `plan`."""
@@ -64,7 +64,8 @@ class Planner:
         times = case_times(cases, {index: costs.case for index, costs in tried.items()})
         whole = tried[0].sample.starting + max(sum(times) / groups.count, *times)
         yield f"sweep of {len(cases)} cases: {', '.join(str(cases[index].number) for index in tried)} were tried"
-        yield f"the others are assumed to be like them; the longest takes {max(times) / times[0]:.3g} times the first"
+        others = "the others are assumed to be like them; " if len(tried) < len(cases) else ""
+        yield f"{others}the longest takes {max(times) / times[0]:.3g} times the first"
         how = f"{groups.count} cases at a time" if groups.count > 1 else "one case after the other"
         on = report.ranks_text(groups.everyone.size)
         yield f"on {on}: {report.duration_text(whole)} in all, {how}"
@@ -80,8 +81,8 @@ class Planner:
         wisdom.keep(choices(tried).transforms, own)
         return costs_of(job, seen, slab.agree(measure_write_rate(job.output.directory) if slab.root else 0.0))
 
-    def _tell(self, job: Job, slab: Slab) -> Iterator[str]:
-        """Lines on the costs of the steps, or the steady states, of a job; collective."""
+    def _tell(self, job: Job, slab: Slab, whole: Job) -> Iterator[str]:
+        """Lines on the costs of the steps, or the steady states, of a `whole` job; collective."""
         bar = progress.Bar(1, f"trying the job for some {self.seconds:g} s", "trial", slab.root)
         try:
             costs = self.try_job(job, slab)
@@ -94,7 +95,7 @@ class Planner:
         yield from report.steps(costs)
         yield from report.times(costs)
         yield ""
-        yield from price.table(costs)
+        yield from price.table(costs, whole)
 
 
 def only_steady_states(job: Job) -> Job:

@@ -22,6 +22,7 @@ from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
 from ..job.checks.advice import STEPS_PER_WAVE
 from ..job.checks.cells import ASIDE, cells_across, cells_per_wave, fast_length, one_cell
+from ..job.chosen_mesh import points_for
 from ..job.sections.listing import plain
 from ..physics.mesh_error import SPOTS_ORDER
 from ..physics.time_error import TIME_ORDER
@@ -38,13 +39,15 @@ EDGE_ORDER = 1.0  # accuracy: of the cell, in which the error of the contact are
 CALLS_PER_DECADE = 1.5  # tuning: for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 BETWEEN_CELLS = 1.4  # times the calls of steps of whole cells: their start is not moved with the surface exactly
 LONGER, COARSER, FINER = 4.0, 8.0, 16.0  # times the own steps, and the own cells, at most: no trial tells of more
+NAMES = {"friction": "friction", "area": "the contact area"}
 SAME = 1e-9  # rounding: relative: numbers this close are the same
 
 
-def offer(costs: Costs, accuracy: float) -> Costs:
-    """Return the costs of the job at another accuracy."""
-    own, sample = costs.job, costs.sample
-    job = _on_mesh(own, accuracy, mesh_for(own, sample, accuracy))
+def offer(costs: Costs, accuracy: float, whole: Job | None = None) -> Costs:
+    """Return the costs of the job, or of a part of the `whole` job, at another accuracy."""
+    own, sample, given = costs.job, costs.sample, whole or costs.job
+    points = points_for(given, accuracy) if given.origin.mesh else mesh_for(own, sample, accuracy)
+    job = _on_mesh(own, accuracy, points)
     return Costs(job, _scaled(sample, own, job), costs.write_rate)
 
 
@@ -163,31 +166,41 @@ def _with_calls(cost: StageCost, times: float) -> StageCost:
 # -- text --------------------------------------------------------------------------------------------------------------
 
 
-def table(costs: Costs) -> Iterator[str]:
+def table(costs: Costs, whole: Job | None = None) -> Iterator[str]:
     """Mesh, steps, precision, memory and time of each accuracy on these ranks, and how far to trust them."""
-    rows = [("this job", costs), *((per_cent(accuracy), offer(costs, accuracy)) for accuracy in ACCURACIES)]
+    chosen = bool((whole or costs.job).origin.mesh)
+    rows = [("this job", costs), *((per_cent(accuracy), offer(costs, accuracy, whole)) for accuracy in ACCURACIES)]
     unit, size = unit_of(max(each.held for _, each in rows))
     sample = costs.sample
     slides = sample.total("friction weight") > 0.0
+    both = "friction and the contact area" if chosen else "friction"
     yield "cost of an accuracy of " + (
-        "friction (area: error of the contact area then)" if slides else "the contact area"
+        f"{both} (area: error of the contact area then)" if slides else "the contact area"
     )
     heads = (("area", 9), ("mesh", 14), ("steps" if costs.job.history else "states", 9))
     head = "".join(f"{text:>{width}}" for text, width in heads if slides or text != "area")
     yield f"  {'accuracy':9}{head}  precision{f'maps [{unit}]':>11} {ranks_text(sample.ranks):>11}"
     for name, each in rows:
-        grid, whole = each.job.grid, duration_text(each.whole)
+        grid, lasts = each.job.grid, duration_text(each.whole)
         area = f"{per_cent(area_error(sample, each.job)):>9}" if slides else ""
         numbers = f"{f'{grid.nx} x {grid.ny}':>14}{each.sample.steps:9d}  {each.job.numerics.precision:9}"
-        yield f"  {name:9}{area}{numbers}{each.held / size:11.4g} {whole:>11}"
-    mesh = mesh_error(sample, "friction")
-    mesh = mesh_error(sample, "area") if mesh is None else mesh
-    errors = [] if sample.job.steady else [f"time steps {per_cent(time_error(StageCost(0), sample))}"]
-    errors.append("mesh unknown" if mesh is None else f"mesh {per_cent(mesh)}")
-    points, word = " x ".join(map(str, sample.job.grid.points)), "state" if sample.job.steady else "step"
+        yield f"  {name:9}{area}{numbers}{each.held / size:11.4g} {lasts:>11}"
+    found = " and ".join(filter(None, (_errors(sample, *names) for names in NAMES.items())))
+    errors = f"errors of {found}" if found else "errors unknown"
+    points, word = " x ".join(map(str, sample.job.grid.points)), "step" if sample.job.history else "state"
     calls = sample.total("operator") / max(sample.steps, 1)
-    yield f"measured on {points} points: times, {calls:.3g} operator calls a {word}, errors ({', '.join(errors)})"
+    yield f"measured on {points} points: times, {calls:.3g} operator calls a {word}, {errors}"
+    how = "as points: auto takes it" if chosen else "by the shortest wave or contact spot"
     yield (
-        "estimated from these: the mesh by the shortest wave or contact spot, the number of steps by the order of the "
-        f"integrator, {CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time in proportion to N log N"
+        f"estimated from these: the mesh {how}, the number of steps by the order of the integrator, "
+        f"{CALLS_PER_DECADE:g} times the calls for a tenth of the tolerance, time in proportion to N log N"
     )
+
+
+def _errors(sample: Sample, name: str, what: str) -> str:
+    """Return what time steps and the mesh of a sample make wrong with friction or the area, empty if there is none."""
+    weight, mesh = sample.total(f"{name} weight"), mesh_error(sample, name)
+    if not weight:
+        return ""
+    steps = f"time steps {per_cent(sample.total(f'{name} time error') / weight)}, " if sample.job.history else ""
+    return f"{what} ({steps}{'mesh unknown' if mesh is None else f'mesh {per_cent(mesh)}'})"

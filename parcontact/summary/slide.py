@@ -108,10 +108,10 @@ def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]
     if measure(history, columns) is None:
         return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
     rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
-    for name, weight in zip(ERRORS, (columns["friction"], np.ones(len(columns["time"]))), strict=True):
-        error = np.asarray(columns.get(name, np.full(len(weight), np.nan)), float)[rows[1:]]
-        far = np.where(np.isnan(error), 0.0, np.diff(np.asarray(columns["distance"], float)[rows]))
-        counted = far * np.asarray(weight, float)[rows[1:]]
+    far, friction = np.diff(np.asarray(columns["distance"], float)[rows]), np.asarray(columns["friction"], float)
+    for name, weight in zip(ERRORS, (friction, np.ones(friction.size)), strict=True):
+        error = np.asarray(columns.get(name, np.full(weight.size, np.nan)), float)[rows[1:]]
+        counted = np.where(np.isnan(error), 0.0, far * weight[rows[1:]])
         found[name] = float(np.nansum(counted * error) / counted.sum()) if counted.any() else math.nan
     return found
 

@@ -1,6 +1,7 @@
 """What other accuracies cost, scaled from a trial: meshes, steps and calls, also against runs at what is offered."""
 
 import math
+import re
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +11,7 @@ from marching import marched
 from mpi4py import MPI
 
 from parcontact.history.timeline import Timeline
-from parcontact.job import Job
+from parcontact.job import Job, load_cases
 from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.sections.listing import plain
 from parcontact.parallel.slab import Slab
@@ -19,6 +20,7 @@ from parcontact.physics.mesh_error import SPOTS_ORDER
 from parcontact.physics.time_error import TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.costs import Costs, costs_of
+from parcontact.plan.planning import only_steady_states
 from parcontact.plan.sample import Sample, sample
 
 from .planned import alike
@@ -69,6 +71,23 @@ def test_meshes_of_spots_go_by_their_error() -> None:
     assert (
         price.offer(costs(ball, mesh=price.MESH_SHARE * 0.02, of="area"), 0.01).job.grid.nx == 128
     )  # at rest, in the first order
+
+
+def test_with_points_auto_meshes_are_those_of_auto() -> None:
+    """Of the whole job also where its steady states alone are priced; its own accuracy has its own mesh."""
+    steady = {"velocities": [1e-2], "pressures": [1e4]}
+    given = {**plain(job(steady=steady)), "grid": {"points": "auto", "size": 1e-3}}
+
+    def at(accuracy: float) -> Job:
+        return load_cases({**given, "numerics": {"accuracy": accuracy}})[0].job
+
+    planned = at(price.ACCURACIES[0])
+    for seen in (costs(planned), costs_of(only_steady_states(planned), costs(planned).sample, 1e30)):
+        lines = list(price.table(seen, planned))
+        meshes = [re.findall(r"\d+ x \d+", line)[0] for line in lines[2:-2]]
+        expected = ["{} x {}".format(*at(accuracy).grid.points) for accuracy in price.ACCURACIES]
+        assert meshes == [expected[0], *expected]
+        assert lines[0].startswith("cost of an accuracy of friction and the contact area (area: ")
 
 
 def test_heights_from_a_file_stay(tmp_path: Any) -> None:
