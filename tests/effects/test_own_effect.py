@@ -172,18 +172,6 @@ def test_mistakes_have_their_place(installed: Path, comm: MPI.Intracomm) -> None
         assert any(f"{path}:1{expected}" in mistake for mistake in error.value.mistakes), error.value.mistakes
 
 
-@pytest.mark.parametrize("code", ["import nothing_like_this", "class Wear: section = int"])
-def test_an_effect_that_cannot_be_used(installed: Path, comm: MPI.Intracomm, code: str) -> None:
-    """The job names it, so the mistake is the job's."""
-    comm.Barrier()
-    if comm.rank == 0:
-        (installed / "tread_wear.py").write_text(code)
-        (installed / "bad.yaml").write_text(yaml.safe_dump(WEAR, sort_keys=False))
-    comm.Barrier()
-    with pytest.raises(JobError, match=r"wear belongs to the effect tread_wear:Wear, which cannot be used"):
-        job.load(installed / "bad.yaml")
-
-
 def test_plan_tells_of_it(
     installed: Path, comm: MPI.Intracomm, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -199,22 +199,6 @@ def test_steady_start(tmp_path: Path) -> None:
     assert (job.initial.state, job.initial.velocity, job.initial.pressure) == ("steady", (0.01, 0.0), 1e5)
 
 
-def test_overrides_of_every_kind(tmp_path: Path) -> None:
-    (tmp_path / "road.npy").touch()
-    job = job_of(
-        tmp_path, CONTRACT, "grid.points=[512, 256]", "history.0.pressure=2e5", "material.branches.1.modulus=7",
-        "numerics.tolerance=0.01", "steady.velocities=[1, 2]", "title=a = b", "history.1.distance=null",
-        "history.1.duration=1", "surface.0.short_wavelength=2e-5",
-    )  # fmt: skip
-    assert job.grid.points == (512, 256)
-    assert job.history[0].load.start == 2e5
-    assert job.material.branches[1].modulus == 7.0
-    assert (job.numerics.tolerance, job.title) == (0.01, "a = b")
-    assert job.steady is not None
-    assert job.steady.velocities == (1.0, 2.0)
-    assert (job.history[1].distance, job.history[1].seconds) == (None, 1.0)
-
-
 ROUND_TRIPS = {
     "small": SMALL,
     "contract": CONTRACT,

@@ -94,9 +94,6 @@ def test_one_case(path: Path) -> None:
         load(path, ["sweep=null"], case=0)
 
 
-PLACE = "job.yaml:7"
-
-
 @pytest.mark.parametrize(
     ("line", "mistake"),
     [

@@ -11,7 +11,6 @@ from parcontact.job.text.overrides import read_job
 from .texts import SMALL, mistakes_of, with_material, with_stage, with_surface
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 1e-4, rms_slope: 0.1, seed: %s}"
-WORDS = "pressure | displacement | gap"
 
 
 @pytest.mark.parametrize("value", ["false", "3", "0.5", "{a: 1}"])

@@ -26,7 +26,6 @@ from parcontact.theory import full_contact, westergaard
 
 STIFF = 2 * HEIGHT  # pressure amplitude of a wave in full contact over modulus and wavenumber
 CELLS = 6
-EDGE = 2e-3  # of the largest pressure: what solves to 1e-5 leave to single points near the edge of contact
 
 
 def shortest_wave(bench: Bench) -> None:

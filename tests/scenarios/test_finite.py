@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from conftest import Main
 from marching import begun
 from short_job import JOB
 
-from parcontact.__main__ import main
 from parcontact.history.timeline import Timeline
 from parcontact.march.failure import StepError
 from parcontact.physics.measures import Measures
@@ -58,22 +58,20 @@ def overflowing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Probe, "measure", overflow)
 
 
-@pytest.mark.usefixtures("overflowing")
-def test_no_run_ends_well_with_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
-    assert main(["job.yaml", "--quiet"]) == 1
-    assert "step 1 at t = 0 s (stage 'press'): force_y would not be finite" in capsys.readouterr().err
+CURVE = ("steady", "--velocities", "0.1,1", "--pressures", "1e4")
 
 
 @pytest.mark.usefixtures("overflowing")
-def test_no_point_of_a_curve_is_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("words", "said", "times"),
+    [
+        (("run",), "step 1 at t = 0 s (stage 'press'): force_y would not be finite", 1),
+        (CURVE, "its results would not be finite", 2),  # of each point
+    ],
+)
+def test_no_run_and_no_point_of_a_curve_is_one(
+    main: Main, tmp_path: Path, words: tuple[str, ...], said: str, times: int
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
-    assert main(["steady", "job.yaml", "--velocities", "0.1,1", "--pressures", "1e4", "--quiet"]) == 1
-    said = capsys.readouterr()
-    assert (said.out + said.err).count("its results would not be finite") == 2
+    code, shown, errors = main(words[0], "job.yaml", *words[1:], "--quiet")
+    assert (code, (shown + errors).count(said)) == (1, times)

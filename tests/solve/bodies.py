@@ -68,10 +68,10 @@ class Bench:
         return self.solver.solve(self.problem(h, control), start, length)
 
 
-def rough(points: int, seed: int = 1) -> Map:
-    """SOLVER.md's surface: Hurst 0.9, four longest waves in the box, the shortest of 8 cells, rms slope 1."""
+def rough(points: int, seed: int = 1, cells: int = 8) -> Map:
+    """Hurst 0.9, four longest waves in the box, the shortest of so many cells, rms slope 1."""
     fft = FFT(Slab(MPI.COMM_SELF, points, points))
-    waves = Roughness(0.9, 0.25, 0.25, 8 / points, seed, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
+    waves = Roughness(0.9, 0.25, 0.25, cells / points, seed, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
     return np.asarray(fft.backward(waves, np.empty((points, points))), dtype=np.float64)
 
 
