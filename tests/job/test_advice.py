@@ -22,6 +22,16 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(("size", "warned"), [("[5e-2, 5e-2]", False), ("[1.0, 5e-2]", True)])
+def test_warning_of_a_box_that_is_out_of_proportion(tmp_path: Path, size: str, warned: bool) -> None:
+    """With cells enough: 400 of the longest waves along a side, and 8000; one in mm, taken for m, has 1000 and more."""
+    rough = ROUGH.replace("5e-4", "1.25e-4")
+    text = replaced(SMALL, surface=rough, grid=f"{{points: 1, size: {size}}}")
+    found = job_of(tmp_path, text, "grid.points=[32000, 2400]").warnings
+    told = "grid.size has a side of 1 m, 8000 times surface.0.long_wavelength, 0.000125 m; is it in m?"
+    assert [warning.startswith(told) for warning in found if warning.startswith("grid.size")] == [True] * warned
+
+
 def test_no_warning_of_a_few_points_that_lack(tmp_path: Path) -> None:
     """64^2 points are 8 cells per shortest wave; 3 and 6 % of them lack on 63^2 and on 62^2."""
     text = replaced(SMALL, surface=ROUGH.replace("5e-4", "2.5e-4").replace("6.25e-5", "1.25e-4"))

@@ -106,6 +106,8 @@ def test_roughness() -> None:
         f"{wave}=3e-4": f"{wave} must not be longer than long_wavelength and rolloff_wavelength, 0.0002 m, got 0.0003",
         f"{wave}=3.1e-5": f"{wave} must be at least two cells, 3.125e-05 m (Nyquist), got 3.1e-05, which needs "
         "65 points along x",
+        "grid.size=1": "grid.size has a side of 1 m, 5000 times surface.0.long_wavelength, 0.0002 m; is it in m? 1 mm "
+        "would be 0.001",
         "surface.rolloff_wavelength=3e-4": "surface.rolloff_wavelength must not be longer than "
         "long_wavelength, 0.0002 m, got 0.0003",
         "surface.long_wavelength=-1": "surface.long_wavelength must be a positive wavelength [m], got -1",

@@ -17,6 +17,7 @@ from . import Sections
 from .cells import ASIDE, Vector, needed, one_cell
 
 LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)
+MOST_LONG_WAVES = 500  # tuning: along the box; more of them are a mistake in its unit
 STEPS_PER_WAVE = 4  # accuracy: fewer skip over the shortest waves while sliding
 SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
 LITTLE = 0.05  # tuning: points that lack, as a share of all; so few are not worth another mesh
@@ -34,6 +35,7 @@ def resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = 
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
             yield from _long_waves(index, shape, grid)
+            yield from (f"grid.size {text}" for text in [out_of_proportion(index, shape, grid)] if text)
             if not chosen:
                 yield from _short_waves(index, shape, grid, numerics.asked, directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
@@ -57,6 +59,15 @@ def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[str]:
             f"{name}, and a representative surface has at least {LONG_WAVES}; use a grid.size of "
             f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
         )
+
+
+def out_of_proportion(index: int, shape: Rough, grid: Grid) -> str:
+    """Return what to say of a box that is so large over the longest wave as no box is meant to be, or ''."""
+    length = max((length for _, length, _ in _directions(grid)), default=0.0)
+    if length <= MOST_LONG_WAVES * shape.long_wavelength:
+        return ""
+    times = f"{length / shape.long_wavelength:.4g} times surface.{index}.long_wavelength, {shape.long_wavelength:g} m"
+    return f"has a side of {length:g} m, {times}; is it in m? {length:g} mm would be {length / 1000:g}"
 
 
 def _short_waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:

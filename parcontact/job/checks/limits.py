@@ -14,7 +14,7 @@ from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
-from .advice import SAME_LENGTH
+from .advice import SAME_LENGTH, out_of_proportion
 from .cells import one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
@@ -49,6 +49,9 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
     cell, size, axis, _ = max((one for one in steps if one[-1] > 1), key=itemgetter(0), default=(0.0, 0.0, "", 0))
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - SAME_LENGTH):
+            if text := out_of_proportion(index, shape, grid):
+                yield Fault(text, ("grid", "size"))
+                continue
             needed = math.ceil(2 * size / shape.short_wavelength * (1 - SAME_LENGTH))
             got = f"got {shape.short_wavelength!r}, which needs {needed} points along {axis}"
             sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), {got}"
