@@ -109,7 +109,10 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
     texts = from_python or isinstance(overrides, Mapping)
     origin = Origin(path.absolute(), included, not from_python, texts, names_directory)
     take_grid(source, origin)
-    origin = choose_points(source, origin)
+    stages = source.data.get("history") if isinstance(source.data, dict) else None
+    count = len(stages) if isinstance(stages, list) else 0
+    written = tuple(str(source.locate(("history", index, "approach")).place) for index in range(count))
+    origin = choose_points(source, origin)._replace(approaches=written)
     try:
         job = Job.model_validate(source.data, context=origin)
     except ValidationError as error:

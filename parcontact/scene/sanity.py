@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..effects.adhesion_doubts import beyond_heights
-from ..errors import InputError, RunError
+from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
 from ..job.checks import advice, layer, meaning, size
@@ -99,11 +99,15 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
 
 
 def refuse_beyond_full_contact(setup: Setup) -> None:
-    """Raise InputError for stages whose approach goes beyond the full contact of the surface where it begins."""
+    """Raise JobError for stages whose approach goes beyond the full contact of the surface where it begins."""
+    mistakes = []
     for index, stage in enumerate(setup.job.history if has_full_contact(setup) else ()):
         most = max(stage.load.start, stage.load.end)
         if stage.control == "approach" and (text := beyond_full_contact(setup, most, setup.heights.mean)):
-            raise InputError(f"history.{index}: {text}")
+            place = next(iter(setup.job.origin.approaches[index:]), "")
+            mistakes.append(f"{place}: history.{index}: {text}" if place else f"history.{index}: {text}")
+    if mistakes:
+        raise JobError(mistakes)
 
 
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------

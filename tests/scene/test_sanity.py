@@ -254,3 +254,14 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
     long = job_of(WAVE, [{**PRESS, "duration": 9e4, "time_step": 1e-3}], output={"fields": ["gap"], "every": 64})
     with pytest.raises(InputError, match=r"1\.406e\+06 instants of fields .* use every: 91 or more"):
         sanity.refuse_impossible(long, Timeline.of(long))
+
+
+def test_approaches_beyond_full_contact_are_told_with_their_places(tmp_path: Path) -> None:
+    """All of them at once, each with its line and column."""
+    path = tmp_path / "job.yaml"
+    stages = "{approach: 1e-7}\n  - {name: up, approach: {from: 0, to: 1e-6}, duration: 1}"
+    path.write_text(SMALL.replace("{pressure: 1e4}", stages))
+    with pytest.raises(JobError) as caught:
+        sanity.refuse_beyond_full_contact(scene.set_up(load(path), Slab(MPI.COMM_SELF, 64, 64)))
+    found = [text.partition(" an approach")[0] for text in caught.value.mistakes]
+    assert found == [f"{path}:5:16: history.0:", f"{path}:6:26: history.1:"]
