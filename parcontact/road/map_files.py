@@ -19,6 +19,7 @@ from ..parallel.slab import Array
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may say the others too
 PLAIN = (".npy", ".txt", ".xyz")  # formats without units
+OF_NUMPY = ("npy", "npz")  # which SurfaceTopography reads with the first direction along x
 LARGEST_FILE = 4_000_000_000  # tuning: bytes
 IRREGULAR = 1e-3  # accuracy: of a step: positions of a .xyz file further from a grid than this are on none
 FEWEST = 4  # tuning: points along a direction
@@ -143,6 +144,8 @@ def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | Non
     except (CannotDetectFileFormat, CorruptFile, UnknownFileFormat) as error:
         why = datafiles.foreign_numbers(path) or "it is damaged, or of no format that SurfaceTopography knows"
         raise InputError(f"{path} cannot be read: {why}") from error
+    if reader.format() in OF_NUMPY:
+        raise InputError(f"{path} may have x or y first; save its array by numpy.save as .npy, whose rows are along x")
     names = [found.name for found in reader.channels]
     if channel is not None and channel not in names:
         raise InputError(f"{path} has no channel {channel!r}; it has {', '.join(map(str, names))}")

@@ -26,7 +26,7 @@ def find(columns: Columns, detached: bool = False) -> list[PullOff]:
     """Return the pull-offs of a run in their order, from its columns `pressure`, `max_pressure`, `approach` and
     `contact_area`; it may have ended as its surfaces `detached`.
 
-    A pull begins with the highest load of a contact, or when the surfaces last came nearer before it was lost: an
+    A pull begins where the surfaces of a contact are nearest, or when they last came nearer before it was lost: an
     earlier pull that it has held is no pull-off. It ends where the surfaces part no more: those that have come off may
     pull each other harder than before, and what they do when they come near again is not of the pull.
     """
@@ -42,12 +42,12 @@ def find(columns: Columns, detached: bool = False) -> list[PullOff]:
 def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], last: int, start: int, end: int) -> PullOff:
     """Return the lowest load of a contact from the row `start` to before the row `end`, lost if that is not after the
     `last` one."""
-    highest, stop, lost = start + int(np.argmax(pressure[start:end])), end, end <= last
-    if lost and (nearer := np.flatnonzero(np.diff(approach[highest:end]) > 0.0)).size:
-        highest += int(nearer[-1]) + 1
+    begin, stop, lost = start + int(np.argmax(approach[start:end])), end, end <= last
+    if lost and (nearer := np.flatnonzero(np.diff(approach[begin:end]) > 0.0)).size:
+        begin += int(nearer[-1]) + 1
     while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 where nothing held
         stop += 1
-    row = highest + int(np.argmin(pressure[highest:stop]))
+    row = begin + int(np.argmin(pressure[begin:stop]))
     near = pressure[max(row - 1, start) : min(row + 2, stop)]
     return PullOff(row, float(np.abs(near - pressure[row]).max()), end if lost else None)
 

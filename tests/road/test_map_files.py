@@ -58,7 +58,8 @@ def test_missing_points(tmp_path: Path) -> None:
 
 
 def save(path: Path, values: object) -> None:
-    np.save(path, np.asarray(values), allow_pickle=True)
+    with path.open("wb") as file:
+        np.save(file, np.asarray(values), allow_pickle=True)
 
 
 SQUARE = "".join(f"{x} {y} 0\n" for x in range(6) for y in range(6))
@@ -100,6 +101,7 @@ BAD = {
     "few positions": ("road.xyz", "0 0 1\n1 1 1\n2 2 1\n", ("m", None, None), "has 3 positions along x"),
     "a size twice": ("road.xyz", "0 0 1\n", ("m", SIZE, None), "give no size"),
     "an unknown format": ("road.abc", "what is this", (None, None, None), "of no format that SurfaceTopography knows"),
+    "an array in a file of another name": ("road.npz", HEIGHTS, ("m", SIZE, None), "may have x or y first; save its"),
     "a unit twice": ("road.nc", None, ("um", None, None), "give no unit"),
     "its size twice": ("road.nc", None, (None, SIZE, None), "give no size"),
     "an unknown channel": ("road.nc", None, (None, None, "Gloss"), "has no channel 'Gloss'; it has Default"),

@@ -34,6 +34,13 @@ def test_surfaces_that_pull_hardest_when_they_have_come_off() -> None:
     assert find(rows) == [PullOff(6, 2.0, 6)]
 
 
+def test_a_contact_under_tension_throughout() -> None:
+    """Its load is highest at the end of the pull, where little still holds."""
+    under_tension = [(-1.0, -1e-6, 0.1), (-2.0, 0.0, 0.3), *PULL, (-0.5, -3e-6, 0.05)]
+    assert find(table(*under_tension, *OFF)) == [PullOff(2, 1.0, 5)]
+    assert find(table(*under_tension)) == [PullOff(2, 1.0, None)]
+
+
 def test_under_a_load() -> None:
     """What is beside the last load that held is the one before: open surfaces carry none."""
     rows = table(*NEAR, *PULL, (0.0, -5e-6, 0.0), (0.0, -5e-6, 0.0))
