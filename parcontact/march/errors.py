@@ -26,6 +26,7 @@ from ..solve.contact import Contact
 from .sticking import StuckContact
 
 PAIR, VIEWS, FRICTION = "budget/look", "budget/views", "budget/friction"  # in a checkpoint
+REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are all alike
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 ALIKE_STEPS = 4  # tuning: of one stage and one length, to which one look at the embedded pair applies at most
 ALIKE_VIEWS = 5  # tuning: the same of the two views of friction; odd, as steps may be quarters of a cell
@@ -208,7 +209,8 @@ def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony |
     cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # across a line of points there is nothing
     cells = min(waves) / max(cell) if waves else None
     straight = 1 in job.grid.points or _ridges(job.surface)
-    return RunProperties(cells, straight, folded, exponential, prony, cell, job.grid.boundary == "free")
+    alike = 1 in job.grid.points or all(isinstance(shape, REGULAR) for shape in job.surface)
+    return RunProperties(cells, straight, folded, exponential, prony, cell, job.grid.boundary == "free", alike)
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:
@@ -216,7 +218,7 @@ def _ridges(shapes: Sequence[Any]) -> bool:
     across = {"y" if shape.axis == "x" else "x" for shape in shapes if isinstance(shape, Cylinder)}
     waves = [shape.waves for shape in shapes if isinstance(shape, Wave)]
     across |= {axis for x, y in waves for axis, count in (("x", x), ("y", y)) if count}
-    return len(across) == 1 and all(isinstance(shape, Cylinder | Wave | Flat) for shape in shapes)
+    return len(across) == 1 and all(isinstance(shape, REGULAR) for shape in shapes)
 
 
 def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:
