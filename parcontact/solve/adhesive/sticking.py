@@ -64,7 +64,8 @@ class StickingSolver:
         if isinstance(control, MeanPressure):
             found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance)
             return self._contact(found, out, iterations), found.detached
-        start = gap.copy(), lag.copy()
+        start = self.workspace.pressure, self.workspace.other_displacement  # in double precision with adhesion
+        start[0][...], start[1][...] = gap, lag
         found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance, most=MANY)
         if found.failure:
             gap[...], lag[...] = start

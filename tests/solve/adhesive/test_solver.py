@@ -1,5 +1,7 @@
 """The solver of gaps on an operator that is a matrix: conditions of contact, and an energy that is not undercut."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -8,10 +10,13 @@ from numpy.testing import assert_allclose
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.adhesive.iterate import GapOperators
+from parcontact.solve.adhesive.iterate import GapOperators, GapSolution
 from parcontact.solve.adhesive.law import Law
 from parcontact.solve.adhesive.solver import GapSolver
+from parcontact.solve.adhesive.sticking import StickingSolver
+from parcontact.solve.certificate import Certificate
 from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.solve.workspace import Workspace
 
 NX, NY = 24, 20
 WEAK = Law(0, 0.4, 0.2)
@@ -91,3 +96,39 @@ def test_nothing_holds_a_load_that_pulls_too_much() -> None:
     h, gap = heights(slab), slab.zeros()
     gap[...] = np.maximum(-h - 0.1, 0.0)
     assert solve.solve(WEAK, h, MeanPressure(-1.01 * WEAK.strength), gap, 1e-3).detached
+
+
+class Failing:
+    """A solver of gaps of which the first solve fails; what it was given."""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[np.ndarray, np.ndarray]] = []
+        self.held: list[int] = []
+
+    def solve(
+        self, law: Law, heights: np.ndarray, control: Approach, gap: np.ndarray, tolerance: float, compliance: float
+    ) -> GapSolution:
+        self.held.append(tracemalloc.get_traced_memory()[0])
+        self.given.append((gap.copy(), heights.copy()))
+        gap += 1.0
+        failure = "" if len(self.given) > 1 else "on purpose"
+        return GapSolution(gap, np.zeros_like(gap), 0.0, Certificate(0.0, 0.0, 0.0), 1, failure)
+
+
+def test_passes_that_begin_again_have_the_same_start_and_no_maps_of_their_own() -> None:
+    """Under an approach, of a free body: the gap is that of the first pass, and what is lagged differs by a number.
+    Meanwhile there is one map more, heights that are lagged."""
+    slab, operators, _ = solver(free=True)
+    gaps, workspace = Failing(), Workspace(slab, 1e-3)
+    gap, lag, out = (np.random.default_rng(k).random(slab.shape) for k in range(3))
+    sticking = StickingSolver(gaps, workspace, 1e-3, operators.operator)  # type: ignore[arg-type]
+    h = heights(slab)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    sticking.solve(WEAK, h, Approach(0.1), gap, lag, out)
+    tracemalloc.stop()
+    first, second = gaps.given[:2]
+    assert_allclose(second[0], first[0], rtol=0.0, atol=0.0)
+    apart = second[1] - first[1]
+    assert_allclose(apart, apart[0, 0], rtol=0.0, atol=1e-12)
+    assert gaps.held[0] - before < 1.5 * gap.nbytes
