@@ -17,6 +17,7 @@ from ..parallel.slab import Array, allocate
 from ..parallel.tally import Tally
 
 SIDE = 32  # tuning: points of a tile; twice as many in its transforms
+REACH_OF_INVERSE = 1  # tuning: tiles
 LONGEST_CELL = 2.0  # tuning: times its width: beyond it too many tiles are near each other
 
 
@@ -70,6 +71,12 @@ class TileConvolution:
         self._backward = make(self._sums, self._padded, direction="FFTW_BACKWARD")
         self._backward_of_one = make(self._sums[:1], self._padded[:1], direction="FFTW_BACKWARD")
         self._symbols = _symbols(quadrant, reach, tally)
+
+    @staticmethod
+    def footprint(count: int, reach: int) -> int:
+        """Bytes that it holds for so many tiles."""
+        waves = 16 * 2 * SIDE * (SIDE + 1)
+        return count * (8 * (2 * SIDE) ** 2 + 2 * waves) + (2 * reach + 1) ** 2 * waves
 
     def apply(self, field: Array, out: Array) -> Array:
         """Apply it to a stacked map; both may be the same."""
@@ -130,7 +137,7 @@ def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally:
         2.0 * np.pi * np.fft.fftfreq(length, each / count) for each, count in zip(size, tiles.points, strict=True)
     )
     kernel = np.fft.ifft2(np.hypot(qx[None, :], qy[:, None]) / (1.0 - poisson)).real
-    return TileConvolution(tiles, 1, kernel[: 2 * SIDE, : 2 * SIDE], tally)
+    return TileConvolution(tiles, REACH_OF_INVERSE, kernel[: 2 * SIDE, : 2 * SIDE], tally)
 
 
 @loop

@@ -19,6 +19,7 @@ from ..march.sudden import tolerance_of_start
 from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
 from ..parallel.slab import deal, dealt_to
+from ..physics import tile_operator
 from ..physics.body import ElasticBody, ZenerBody
 from ..physics.convolution import Convolution, MirroredConvolution
 from ..physics.energy import ElasticPressure
@@ -26,13 +27,16 @@ from ..physics.entries import MapCount
 from ..physics.halfspace import HalfSpace
 from ..physics.layer import Layer
 from ..physics.lowest import shape_of
+from ..physics.tiles import REACH_OF_INVERSE, SIDE, TileConvolution, Tiles
 from ..scene import choices
 from ..scene.rigid_surface import highest_waves
 from ..solve.adhesive.solver import GapSolver
 from ..solve.contact import ContactSolver
+from ..solve.fallback.cold_start import WORTHWHILE
 from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.preconditioner.cell_sums import CellSums
 from ..solve.preconditioner.extension import grids_for, pairs_for
+from ..solve.tiles import BLOCKS, LARGER_CELLS, LARGEST_PERIODIC_SHARE, LARGEST_SHARE, LEAST, SHARE
 from ..steady_sliding.sliding import tolerance_of
 
 FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
@@ -108,6 +112,25 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     for coarse in coarser_points(*points):
         held += sum(footprint(coarse, coarse, np.float64, ranks, part.number)[:2]) + 8 * part.cells(coarse)
     return held
+
+
+def on_tiles(job: Job) -> int:
+    """Bytes that rank 0 holds at most, beside those of `holdings`, while a dilute first contact is solved on tiles; 0
+    for a run that does not try that."""
+    chosen, (nx, ny), free = choices(job), job.grid.points, choices(job).isolated.on
+    body = _Part(job, 1, 0).half_space
+    cold = bool(job.history) and not chosen.steady_start.on and chosen.adhesion is None
+    large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
+    has_tiles = free or (job.numerics.kernel == "spectral" and nx % SIDE == ny % SIDE == 0)
+    if not (cold and large and has_tiles and body.works_on_tiles(nx, ny)):
+        return 0
+    count = int((LARGEST_SHARE if free else LARGEST_PERIODIC_SHARE) * nx * ny / SIDE**2)
+    places = np.zeros(count, np.intp)
+    tiles = Tiles((nx, ny), places, places, periodic=not free)
+    tolerance = max(SHARE * job.numerics.tolerance, LEAST)
+    held = ContactSolver.footprint(SIDE, count * SIDE, tolerance, 1, 0, LARGER_CELLS)
+    held += tile_operator.footprint(tiles, body.size) + TileConvolution.footprint(count, REACH_OF_INVERSE)
+    return held + 2 * 8 * SIDE**2 * count  # the heights and the start
 
 
 def saved(job: Job) -> int:

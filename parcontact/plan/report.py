@@ -17,6 +17,7 @@ OF_STEADY_STATES = (
     *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
     *("interface", "thermal"),
 )
+ON_TILES = "more on rank 0 (tiles), at most"
 STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
 
 
@@ -33,7 +34,8 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     """Bytes that a rank holds, for what."""
     columns = [memory.holdings(job, count) for count in ranks]
     before = STEADY_STARTS if choices(job).steady_start.on else ()
-    width = max(map(len, (*columns[0], *(what for what, _ in before))))
+    tiles = memory.on_tiles(job)
+    width = max(map(len, (*columns[0], *(what for what, _ in before), *[ON_TILES] * bool(tiles))))
     totals = [sum(column.values()) for column in columns]
     unit, size = unit_of(max(totals))
     yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f" {ranks_text(count):>12}" for count in ranks)
@@ -43,6 +45,8 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
     for what, sets in before:
         held = (memory.steady_start(job, count, sets=sets) / size for count in ranks)
         yield f"  {what:{width}}" + "".join(f"{number:13.4g}" for number in held)
+    if tiles:
+        yield f"  {ON_TILES:{width}}" + f"{tiles / size:13.4g}" * len(ranks)
     yield f"a checkpoint has {_bytes(memory.saved(job))}"
 
 
