@@ -187,7 +187,7 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    told = drawing.describe(job, heights, base.preparation_notes, base.shortest, picture)
+    told = drawing.describe(job, heights, base.told.notes, base.shortest, picture)
     started = measured_maps.start(job, given, options.start) if alone else ()
     print("\n".join([*told, *(f"warning: {text}" for text in doubts), *started]))
     return DONE

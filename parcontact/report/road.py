@@ -68,10 +68,10 @@ def section(job: Job) -> Section:
         made, told = rigid_surface.make_surface(job, FFT(slab))
     except InputError as error:
         return Section("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
-    heights = made.heights((0.0, 0.0), slab.empty())
+    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*told.notes, *told.doubts]
     found = statistics.describe(heights, job.grid.size)
     if not found.rms_height:
-        return Section("Surface", [*told, "The surface is flat."], [shapes])
+        return Section("Surface", [*sentences, "The surface is flat."], [shapes])
     rows = [
         ("rms height", units.text(found.rms_height, "m", 4)),
         ("rms slope", f"{found.rms_slope:.4g}"),
@@ -82,4 +82,4 @@ def section(job: Job) -> Section:
     tables = [shapes, Table(("on the grid of the job", "value"), rows)]
     sketch = surface.Sketch(heights, job.grid.size, found)
     pictures = [draw_panel(partial(panel, sketch=sketch), caption) for caption, panel in surface.PANELS.items()]
-    return Section("Surface", told, tables, pictures)
+    return Section("Surface", sentences, tables, pictures)

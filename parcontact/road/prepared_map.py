@@ -9,7 +9,7 @@ from ..job import Grid, Topography
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..printed import per_cent, quantity
-from . import map_files, treatment
+from . import map_files, statistics, treatment
 from .treatment import Treated
 
 SLACK = 1e-6  # accuracy: of a length: a box this much longer than the map is as long
@@ -33,14 +33,6 @@ class Prepared:
         lines = [f"road: {nx} x {ny} points of the map, {lx} x {ly}, are used"]
         if done.missing:
             lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / self.cut.size)}) were filled")
-        if done.outliers:
-            lines.append(
-                f"road: {done.outliers} points stick out of their neighbours by far; they are as measured. "
-                "Missing points have to be nan in the file"
-            )
-            height, count = treatment.repeated(self.cut)
-            if count:
-                lines[-1] += f": {quantity(height, 'm', 4)}, far from all others, occurs {count} times"
         if len(done.trend) > 1:
             tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], self.size, strict=True)]
             lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")
@@ -50,6 +42,25 @@ class Prepared:
                 f"{per_cent(done.enlarged - 1.0)} larger than measured, so that the rms height of the box stays"
             )
         return lines
+
+    @property
+    def doubt(self) -> str:
+        """Return what to say of points that stick out of their neighbours, or ''."""
+        odd = self.treated.outliers
+        if not odd.any():
+            return ""
+        slope, without = (
+            statistics.describe(treatment.treat(heights, "tilt", "smooth").heights, self.size).rms_slope
+            for heights in (self.cut, np.where(odd, np.nan, self.cut))
+        )
+        height, count = treatment.repeated(self.cut)
+        repeated = f"; {quantity(height, 'm', 4)}, far from all others, occurs {count} times" if count else ""
+        return (
+            f"surface: {odd.sum()} points of the map stick out of their neighbours by more than {treatment.OUTLIER:g} "
+            f"times the median deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, "
+            "and they carry load; where they are no part of the surface, write nan for them in the file, and they are "
+            "filled"
+        )
 
 
 def prepare(part: Topography, grid: Grid) -> Prepared:
@@ -96,9 +107,15 @@ def _range(part: Topography, axis: int, length: float, available: float, count: 
     return slice(first, first + wanted)
 
 
-def rows_of(part: Topography, grid: Grid, slab: Slab) -> tuple[Array, list[str]]:
-    """This rank's rows of the heights [m], and on root what was done; collective. Raises InputError on every rank."""
+def rows_of(part: Topography, grid: Grid, slab: Slab) -> tuple[Array, list[str], str]:
+    """This rank's rows of the heights [m], on root what was done, and what to doubt; collective. Raises InputError on
+    every rank."""
     found: list[Prepared] = []
-    on_root(slab.comm, lambda: found.append(prepare(part, grid)))
+
+    def make() -> str:
+        found.append(prepare(part, grid))
+        return found[0].doubt
+
+    doubt = on_root(slab.comm, make)
     rows = slab.from_root(found[0].heights if found else None)
-    return rows, found[0].notes if found else []
+    return rows, found[0].notes if found else [], doubt

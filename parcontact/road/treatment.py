@@ -15,20 +15,20 @@ from ..parallel.slab import Array
 
 Detrend = Literal["none", "mean", "tilt", "curvature"]
 Periodic = Literal["none", "smooth", "window", "mirror"]
-OUTLIER = 16.0  # accuracy: times the median deviation of heights from their neighbours: further off is told
+OUTLIER = 16.0  # accuracy: times the median deviation of heights from their neighbours: further off gets a warning
 TAPER = 0.1  # tuning: share of each side over which a window falls to 0
 SWEEPS = 200  # accuracy: of relaxation that fill holes smoothly, on each of the coarser maps
 
 
 @dataclass(frozen=True)
 class Treated:
-    """A map without missing points, and what was done to it: counts of missing points and outliers, the plane or
-    paraboloid taken off (coefficients of 1, x, y, x^2, x y, y^2 over the box from -1 to 1, in units of height), by
-    which factor a window has `enlarged` what is inside."""
+    """A map without missing points, and what was done to it: how many points were missing, which are outliers,
+    the plane or paraboloid taken off (coefficients of 1, x, y, x^2, x y, y^2 over the box from -1 to 1, in units of
+    height), by which factor a window has `enlarged` what is inside."""
 
     heights: Array
     missing: int
-    outliers: int
+    outliers: NDArray[np.bool_]
     trend: tuple[float, ...]
     enlarged: float
 
@@ -39,7 +39,7 @@ def treat(heights: Array, detrend: Detrend, periodic: Periodic) -> Treated:
     trend = find_trend(heights, known, detrend)
     level = heights - surface_of(trend, heights.shape)
     filled = fill(level, known)
-    odd = count_outliers(filled)
+    odd = find_outliers(filled)
     make = {"smooth": make_periodic, "window": taper, "mirror": mirror}.get(periodic)
     made = np.ascontiguousarray(make(filled) if make else filled)
     enlarged = 1.0 / _window(made.shape)[1] if periodic == "window" else 1.0
@@ -96,11 +96,13 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
     return np.asarray(found)
 
 
-def count_outliers(heights: Array) -> int:
-    """Points that stick out of the median of their neighbours by far more than the median deviation."""
-    apart = np.abs(heights - ndimage.median_filter(heights, 3, mode="nearest"))
+def find_outliers(heights: Array) -> NDArray[np.bool_]:
+    """Return which points stick out of the median of their neighbours by far more than the median deviation; beyond the
+    edges slopes go on."""
+    padded = np.pad(heights, 1, mode="reflect", reflect_type="odd")
+    apart = np.abs(heights - ndimage.median_filter(padded, 3)[1:-1, 1:-1])
     typical = float(np.median(apart[apart > 0.0])) if np.any(apart > 0.0) else 0.0
-    return int(np.count_nonzero(apart > OUTLIER * max(typical, np.finfo(float).tiny)))
+    return np.asarray(apart > OUTLIER * max(typical, np.finfo(float).tiny))
 
 
 def make_periodic(heights: Array) -> Array:

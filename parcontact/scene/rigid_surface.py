@@ -23,12 +23,18 @@ ROUNDING = 1e-8  # accuracy: relative, of the shortest wavelength of a table
 FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
 
-def make_surface(job: Job, fft: FFT) -> tuple[Surface, list[str]]:
-    """Return the rigid surface of a job, and on root notes on how measured maps were prepared; collective. Raises
-    InputError."""
-    grid, notes = job.grid, list[str]()
+class Told(NamedTuple):
+    """What to say of measured maps: notes on how they were prepared, on root; doubts, on every rank."""
+
+    notes: list[str]
+    doubts: list[str]
+
+
+def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
+    """Return the rigid surface of a job, and what to say of its measured maps; collective. Raises InputError."""
+    grid, told = job.grid, Told([], [])
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
-    waves = reduce(add, (_waves(part, grid, fft, notes) for part in spectral)) if spectral else None
+    waves = reduce(add, (_waves(part, grid, fft, told) for part in spectral)) if spectral else None
     shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
     differences = job.numerics.slope == "finite-difference"
     surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
@@ -36,7 +42,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, list[str]]:
     if surface.waves is not None:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))
         fft.slab.tally.hold(surface.waves)
-    return surface, notes
+    return surface, told
 
 
 def _round(part: jobs.Sphere | jobs.Cylinder, grid: Grid) -> Round:
@@ -92,17 +98,18 @@ def highest_waves(job: Job) -> tuple[int, int]:
     return max(x for x, _ in found), max(y for _, y in found)
 
 
-def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
-    """Return the spectrum of one part of a surface, with `notes` on how it was prepared; collective."""
+def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
+    """Return the spectrum of one part of a surface, adding to what is `told` of it; collective."""
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.RoughSpectrum):
-        return _measured_spectrum(part, grid, fft, notes)
+        return _measured_spectrum(part, grid, fft, told.notes)
     if isinstance(part, jobs.Topography):
         from ..road import prepared_map as road  # with much of scipy, which is slow to import
 
-        rows, done = road.rows_of(part, grid, fft.slab)
-        notes += done
+        rows, done, doubt = road.rows_of(part, grid, fft.slab)
+        told.notes.extend(done)
+        told.doubts.extend([doubt] if doubt else [])
         return _transform(rows, fft)
     if isinstance(part, jobs.HeightFile):
         return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)

@@ -61,6 +61,7 @@ def check_heights(setup: Setup) -> list[str]:
 def _check_heights(setup: Setup) -> Iterator[str]:
     if setup.roughness and (text := meaning.steep(setup.roughness.rms_slope)) and text not in setup.job.warnings:
         yield text
+    yield from setup.told.doubts
     seams: list[str] = []
     if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
         seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
@@ -73,7 +74,8 @@ def _check_heights(setup: Setup) -> Iterator[str]:
     if law and setup.roughness and not setup.surface.shapes and (text := beyond_heights(law, span)):
         yield text
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
-        yield from advice.measured(setup.grid, setup.shortest, setup.choices.numerics.asked, setup.job.directions)
+        asked, spiky = setup.choices.numerics.asked, bool(setup.told.doubts)
+        yield from advice.measured(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
 
 
 # -- full contact -----------------------------------------------------------------------------------------------------

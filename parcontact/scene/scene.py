@@ -41,7 +41,7 @@ from ..solve.problem import Operators
 from ..solve.tiles import LARGER_CELLS, OnTiles, SolverOnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
-from .rigid_surface import Heights, heights_of, make_surface, shortest_measured
+from .rigid_surface import Heights, Told, heights_of, make_surface, shortest_measured
 
 
 @dataclass
@@ -50,8 +50,8 @@ class Setup:
 
     `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
     of a cell if it is flat); `shortest` [m] is the shortest wave of what is measured of it, None where nothing is;
-    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `preparation_notes`
-    say, on root, what was done to measured maps.
+    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `told` is
+    what to say of measured maps.
     """
 
     choices: Choices
@@ -62,7 +62,7 @@ class Setup:
     shortest: float | None
     heights: Heights
     units: Units
-    preparation_notes: list[str]
+    told: Told
 
     @property
     def job(self) -> Job:
@@ -177,13 +177,13 @@ def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
     """The surface of a job, to be marched to the end of its history or, if later, to `until` [s], and what it is
     measured in; collective. Raises InputError for files that do not fit."""
     chosen, fft = choices(job, until), FFT(slab)
-    surface, notes = make_surface(job, fft)
+    surface, told = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     shortest = shortest_measured(job, surface)
     heights = heights_of(surface)
     units = Units.near(heights.span, job.grid.lx, chosen.prony.modulus_inf + float(chosen.prony.moduli.sum()))
     surface.rescale(units.height)
-    return Setup(chosen, slab, fft, surface, roughness, shortest, heights, units, notes)
+    return Setup(chosen, slab, fft, surface, roughness, shortest, heights, units, told)
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
@@ -233,7 +233,7 @@ def solver_on_tiles(setup: Setup) -> OnTiles | None:
 
 def describe_scene(scene: Scene) -> Iterator[str]:
     """Yield what a user should know: how maps were prepared, branches folded, steps chosen; the surface's moments."""
-    yield from scene.setup.preparation_notes
+    yield from scene.setup.told.notes
     yield from describe_folded_branches(scene.folded, scene.choices.prony)
     yield from scene.job.facts
     if steps := describe_steps(scene.job):

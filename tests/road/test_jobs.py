@@ -1,5 +1,6 @@
 """A measured road in a job: the truth comes back, on any number of ranks, and mistakes name their key."""
 
+import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from parcontact import job as jobs
 from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
+from parcontact.scene import sanity
 
 from . import truth
 
@@ -230,3 +232,26 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     assert code == 2
     assert "does not say the unit of its heights" in err
     assert "--set surface.unit=um" in err
+
+
+@pytest.mark.mpi
+def test_points_that_stick_out(shared_path: Path, comm: MPI.Intracomm, communicators: list[MPI.Intracomm]) -> None:
+    """Every rank warns of them, with the slope of the truth, and that of the truth and two single points. To 2 %: edges
+    are joined. The advice on the mesh says that its wave may be theirs."""
+    heights, high = truth.rough(POINTS, LENGTH, 2.5e-4, 4e-5, SLOPE), 20e-6
+    spiked = heights.copy()
+    spiked[[60, 90], [70, 100]] += high, -high
+    squares = (2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)) ** 2  # a point has all waves alike
+    expected = math.sqrt(SLOPE**2 + 2 * (high / POINTS) ** 2 * 2 * squares.mean())
+    if comm.rank == 0:
+        np.save(shared_path / "road.npy", spiked * 1e6)
+        (shared_path / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=""))
+    comm.barrier()
+    job = jobs.load(shared_path / "job.yaml")
+    for group in communicators:
+        doubts = sanity.check_heights(scene.set_up(job, Slab(group, POINTS, POINTS)))
+        assert group.allgather(doubts) == [doubts] * group.size
+        assert doubts[0].startswith("surface: 2 points of the map stick out of their neighbours by more than 16 times")
+        found = [float(text) for text in re.findall(r"([0-9.]+) with(?:out)?\b", doubts[0])]
+        assert found == pytest.approx([expected, SLOPE], rel=0.02)
+        assert "by the spectrum of the heights with the points that stick out" in doubts[1]

@@ -75,9 +75,13 @@ def _short_waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directio
     yield from _few_cells(f"surface.{index}", shape.short_wavelength, "", otherwise, grid, asked, directions)
 
 
-def measured(grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
-    """Yield what to say of the shortest wave [m] of a measured surface that slides along these directions."""
-    known = f" ({wave:.3g} m, by the spectrum of the heights)"
+def measured(
+    grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector], spiky: bool = False
+) -> Iterator[str]:
+    """Yield what to say of the shortest wave [m] of a measured surface that slides along these directions; of a `spiky`
+    one it may be that of the points that stick out."""
+    spikes = " with the points that stick out" if spiky else ""
+    known = f" ({wave:.3g} m, by the spectrum of the heights{spikes})"
     otherwise = ", to which a topography is interpolated (resample an array yourself), "
     otherwise += "or heights without waves shorter than {:.4g} m"
     yield from _few_cells("surface", wave, known, otherwise, grid, asked, directions)
