@@ -130,8 +130,7 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
     if (claim := directory.claim) is None or not directory.results():
         return False
     if different := marker.told(marker.differences(claim.job, plain, (*SAME, "steady"))):
-        points = str(claim.job["grid"]["points"]).replace(" ", "")
-        kept = f"give --set grid.points={points} to keep its mesh, or " if "grid.points" in different else ""
+        kept = marker.keep_mesh(claim.job, different)
         raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {kept}{ADVICE}")
     return True
 

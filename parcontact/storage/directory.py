@@ -244,8 +244,8 @@ def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mappin
     for verb, claim in claims.items():
         if found := marker.told(marker.differences(claim.job, data, SCENE)):
             raise InputError(
-                f"the output directory {directory} holds {VERBS[verb]} of another job: {found}; give --out for "
-                "another directory"
+                f"the output directory {directory} holds {VERBS[verb]} of another job: {found}; "
+                f"{marker.keep_mesh(claim.job, found)}give --out for another directory"
             )
 
 

@@ -114,6 +114,12 @@ def told(differences: Iterator[str]) -> str:
     return "; ".join(first) + (f"; and {more} more" if more else "")
 
 
+def keep_mesh(job: Mapping[str, Any], different: str) -> str:
+    """Return how to keep the mesh of a job, as plain data, where that is among what is `different`; '' elsewhere."""
+    points = str(job["grid"]["points"]).replace(" ", "")
+    return f"give --set grid.points={points} to keep its mesh, or " if "grid.points" in different else ""
+
+
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Yield the values of nested mappings, and of lists of these, by their keys: `surface.0.seed`."""
     if isinstance(value, list) and value and all(isinstance(part, dict) for part in value):

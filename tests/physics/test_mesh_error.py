@@ -10,7 +10,7 @@ from parcontact.physics.time_error import RunProperties, StepObservation, count_
 
 KNOWN = RunProperties(8.0, False, 1e-4, True)
 SEEN = StepObservation(1e-3, 4e-4, 2.0, 0.02, 0.02, 0.1, 0.095)
-MESH = 0.25 / 19 + 0.6 / 19**2  # of the area of SEEN, corrected by a 19th
+EDGES = 0.25 / 19 + 0.6 / 19**2  # of the area of SEEN, corrected by a 19th
 LONG = replace(KNOWN, cell=(1.0, 4.0))  # 8 cells per wave along y, 32 along x
 
 
@@ -30,8 +30,9 @@ def test_the_mesh_along_the_sliding_and_across_it(way: tuple[float, float], alon
 
     assert found.friction.along == pytest.approx(0.94 * squares(along))
     assert found.friction.across == pytest.approx(0.06 * squares(across))
-    assert found.area.mesh == pytest.approx(MESH)
-    assert found.area.across == pytest.approx(MESH * (0.8 if along > across else 0.2))
+    mesh = EDGES + 0.25 / radius**1.6 / spots**0.5
+    assert found.area.mesh == pytest.approx(mesh)
+    assert found.area.across == pytest.approx(mesh * (0.8 if along > across else 0.2))
 
 
 def test_squares_are_as_at_rest() -> None:

@@ -68,7 +68,8 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
     (out / "notes.txt").unlink()
     make(directory_at(out), job)
     make(directory_at(out, "steady"), job)
-    with pytest.raises(InputError, match=r"holds a run of another job: grid.points was \[8, 8\], is \[9, 9\]"):
+    keep = r"grid.points was \[8, 8\], is \[9, 9\]; give --set grid.points=\[8,8\] to keep its mesh, or give --out"
+    with pytest.raises(InputError, match=keep):
         make(directory_at(out, "study"), job, {**PLAIN, "grid": {"points": [9, 9]}})
     (out / marker.MARKER).write_text("{")
     with pytest.raises(InputError, match="is damaged, so that the owner of"):
