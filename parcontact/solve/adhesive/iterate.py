@@ -21,7 +21,8 @@ LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to le
 class GapOperators(NamedTuple):
     """The operator of a body and its inverse K, which is 0 for mean values; `mean` is the displacement over a uniform
     pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive.
-    `size` of the box and `compliance` of waves are those of the body."""
+    Both are infinite where K is the inverse for mean values, too. `size` of the box and `compliance` of waves are those
+    of the body."""
 
     operator: Operator
     inverse: Operator
@@ -50,7 +51,7 @@ class GapSolution:
 @dataclass
 class Iterate:
     """A gap in numbers: its mean and its lowest value, the uniform part m of the pressure, the approach; under which
-    load or mean gap. `mean` and `least_mean` are those of the operators, or a share of them.
+    load or mean gap; on which body.
 
     The last step went `share` of its way, which moves the mean gap by `moved`, and m by `change`; it was that of Newton
     if it was `stable`. The next one is first tried with the length `step`.
@@ -60,10 +61,9 @@ class Iterate:
     heights: Array
     mean_height: float
     control: Control
+    operators: GapOperators
     given: float | None
     mean_gap: float
-    mean: float
-    least_mean: float
     m: float = 0.0
     d: float = 0.0
     lowest: float = 0.0

@@ -78,11 +78,17 @@ class GapSolver:
         return (7 * 8 + 1) * cells
 
     def solve(
-        self, law: Law, heights: Array, control: Control, gap: Array, tolerance: float, compliance: float = 1.0
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        tolerance: float,
+        operators: GapOperators | None = None,
     ) -> GapSolution:
-        """Solve from the `gap`, in whose place the solution will be; mean values move by the share `compliance` of what
-        the operators say; collective."""
-        it = self._begin(law, heights, control, gap, compliance)
+        """Solve from the `gap`, in whose place the solution will be; for a body of other `operators` than its own, if
+        they are given; collective."""
+        it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
         best, scale, iteration, stuck = (math.inf, 0), 0.0, 0, False
         while True:
@@ -110,13 +116,13 @@ class GapSolver:
 
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
-    def _begin(self, law: Law, heights: Array, control: Control, gap: Array, compliance: float) -> Iterate:
+    def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> Iterate:
         """Give the start its mean where that is given, find its pressure, and forget the last direction."""
         self._t.fill(0.0)
         sums = self.slab.sum(maps.total(heights), maps.total(gap))
         mean_h, mean_g = (each / self.slab.points for each in sums)
         given = None
-        if isinstance(control, Approach) and self.operators.mean == 0.0:
+        if isinstance(control, Approach) and operators.mean == 0.0:
             given = max(-mean_h - control.value, 0.0)
             if mean_g > 0.0:
                 maps.scale(gap, given / mean_g)
@@ -124,16 +130,16 @@ class GapSolver:
                 gap.fill(given)
             mean_g = given
         np.add(gap, heights, out=self._q)
-        self.operators.inverse.apply(self._q, self._q)
+        operators.inverse.apply(self._q, self._q)
         kernels.attract(law, gap, self._sigma)
-        means = compliance * self.operators.mean, compliance * self.operators.least_mean
-        return Iterate(law, heights, mean_h, control, given, mean_g, *means)
+        d = control.value if isinstance(control, Approach) else 0.0
+        return Iterate(law, heights, mean_h, control, operators, given, mean_g, d=d)
 
     def _uniform(self, it: Iterate, mean_gap: float) -> float:
         """The uniform part m of the pressure, where it is not a multiplier."""
         if isinstance(it.control, MeanPressure):
             return it.control.value
-        return (mean_gap + it.mean_height + it.control.value) / it.mean
+        return (mean_gap + it.mean_height + it.control.value) / it.operators.mean
 
     def _find_residual(self, it: Iterate, g: Array) -> tuple[float, bool]:
         """Let the pressure follow the last step, and find the working set and c on it, in the map of the way; the size
@@ -150,9 +156,11 @@ class GapSolver:
             it.m -= total / members
             kernels.centre(self._working, total / members, self._way)
         it.change = it.m - before
-        it.d = it.mean * it.m - it.mean_gap - it.mean_height
         it.lowest = -least
-        if not isinstance(it.control, MeanPressure) or it.lowest <= 0.0:
+        if isinstance(it.control, Approach):
+            return members, False
+        it.d = it.operators.mean * it.m - it.mean_gap - it.mean_height
+        if it.lowest <= 0.0:
             return members, False
         held = attracted / self.slab.points  # with all points open it only falls from here on
         return members, held < HELD * -it.m or (held < -it.m and it.lowest > FAR * it.law.range)
@@ -195,7 +203,7 @@ class GapSolver:
             certificate = certify(self.slab, it, self._working, g, self._q, self._sigma, z)
             if not certificate.complementarity <= near:
                 return certificate, False
-        self.operators.operator.apply(self._way, z)
+        it.operators.operator.apply(self._way, z)
         return certify(self.slab, it, self._working, g, self._q, self._sigma, z), True
 
     def _turn(self, it: Iterate, members: float, scale: float, z: Array) -> float:
@@ -249,11 +257,11 @@ class GapSolver:
     def _newton(self, it: Iterate, g: Array) -> tuple[float, float]:
         """The share of the way that is the step of Newton, or the majorized one, and the most that gaps allow;
         collective."""
-        self.operators.inverse.apply(self._way, self._image)
+        it.operators.inverse.apply(self._way, self._image)
         *sums, fastest = kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
         slope, stiff, soft, total, fastest = self.slab.reduce(sums, [fastest])
         it.moved = total / self.slab.points
-        own, loaded = self.slab.points * it.moved**2 / it.least_mean, isinstance(it.control, MeanPressure)
+        own, loaded = self.slab.points * it.moved**2 / it.operators.least_mean, isinstance(it.control, MeanPressure)
         true, major = stiff - soft + (0.0 if loaded else own), stiff + (LOOSE if loaded else 1.0) * own
         it.stable = true > LEAST_CURVATURE * major
         wanted = slope / (true if it.stable else major) if major > 0.0 else 0.0

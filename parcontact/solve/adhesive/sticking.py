@@ -1,15 +1,17 @@
 """Contacts that stick, for the body of a run: on a body that repeats itself, or on one with nothing around its box.
 
-The solver of gaps needs the inverse of its operator. That of a free body has none on its box: there the operator B of a
-body that repeats itself takes its place, by the shortest way between two points (`HalfSpace.gap_operators`), and what
-it lacks is lagged: `h - (A - B) p` of the last pass are the heights of the next. Within half a box both are the same,
-so that one pass or two do as a rule.
+The solver of gaps needs the inverse of its operator. That of a free body has no symbol on its box: there the operator B
+of a body that repeats itself takes its place, by the shortest way between two points (`HalfSpace.gap_operators`), and
+what it lacks is lagged: `h - (A - B) p` of the last pass are the heights of the next. Within half a box both are the
+same, so that one pass or two do as a rule.
 
-A contact that fills its box is softer on B than on A. Near a snap a pass may then jump over an equilibrium, and the
-passes go round between two states. Under an approach they begin again with half of the compliance of B for mean values:
-a stiffer body takes shorter ways, and passes settle wherever an equilibrium is stable.
+A contact that fills its box may be softer on B than on A, in its mean or in waves whose ends meet across the edges. An
+equilibrium that is stable on A then is none on B: passes jump over it, and go round between the two states beside it.
+Under an approach such a solve begins again from its start with the operator A itself, whose inverse takes some
+iterations (`free_inverse`). So E falls, and no equilibrium is passed over.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,13 +21,15 @@ from ..contact import Contact
 from ..problem import Approach, Control, MeanPressure, Operator
 from ..workspace import Workspace
 from . import kernels
+from .free_inverse import FreeInverse
 from .iterate import SHARPER, GapSolution
 from .law import Law
 from .solver import GapSolver
 
 MAX_PASSES = 100  # accuracy: of a free body; one to three do as a rule, and many where it is about to snap
-MANY = 12  # tuning: passes after which a solve under an approach begins again, on a stiffer body
-STIFFER = 0.5  # tuning: share of the compliance of B for mean values
+MANY = 12  # tuning: passes after which a solve under an approach begins again, with the operator of the body itself
+LEFT = 0.8  # accuracy: of the tolerance, for such a solve; the rest is for the inverse
+DIGITS = 0.01  # accuracy: of the inverse, over the tolerance
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
 
 
@@ -61,24 +65,14 @@ class StickingSolver:
             np.add(gap, heights, out=u)
             u += found.d
             return self._contact(found, out, found.iterations), found.detached
-        if isinstance(control, MeanPressure):
-            found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance)
-            return self._contact(found, out, iterations), found.detached
-        start = self.workspace.pressure, self.workspace.other_displacement  # in double precision with adhesion
-        start[0][...], start[1][...] = gap, lag
-        found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance, most=MANY)
-        if found.failure:
-            gap[...], lag[...] = start
-            lag += (1.0 - STIFFER) * self._mean_way(heights - lag, control, gap)
-            found, more = self._settle(law, heights, control, gap, lag, out, tolerance, STIFFER)
-            lag -= (1.0 / STIFFER - 1.0) * self._mean_way(heights - lag, control, gap)
-            iterations += more
+        start, most = self.workspace.pressure, MANY if isinstance(control, Approach) else MAX_PASSES
+        start[...] = gap
+        found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance, most)
+        if found.failure and isinstance(control, Approach):
+            gap[...] = start
+            found = self._solve_free(law, heights, control, gap, lag, out, tolerance)
+            iterations += found.iterations
         return self._contact(found, out, iterations), found.detached
-
-    def _mean_way(self, heights: Array, control: Approach, gap: Array) -> float:
-        """By how much the uniform part of the pressure moves a body with such heights; collective."""
-        slab = self.workspace.slab
-        return slab.sum(float((gap + heights).sum()))[0] / slab.points + control.value
 
     def _settle(
         self,
@@ -89,28 +83,58 @@ class StickingSolver:
         lag: Array,
         out: Array,
         tolerance: float,
-        compliance: float = 1.0,
-        most: int = MAX_PASSES,
+        most: int,
     ) -> tuple[GapSolution, int]:
         """Repeat the solve of a free body until what is lagged changes no more, in so many passes at most; returns the
         solution and the iterations of all passes; collective."""
-        assert self.free is not None
         iterations, share, last = 0, 1.0, lag
         for passes in range(1, most + 1):
-            found = self.gaps.solve(law, heights - lag, control, gap, tolerance, compliance)
+            found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
             iterations += found.iterations
-            out[...] = found.p
-            change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
-            change -= found.d
-            found, worst = self._judge(control, found, out, change)
+            found, change, worst = self._compare(heights, control, gap, found, out)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
             last = change
             lag += share * change
             if found.failure or found.detached or worst <= tolerance:
                 return found, iterations
-        asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
-        failure = f"did not settle in {most} passes of a free body: changes are {asked}"
-        return replace(found, failure=failure), iterations
+        return replace(found, failure=_unsettled(f"{most} passes", worst, tolerance)), iterations
+
+    def _solve_free(
+        self,
+        law: Law,
+        heights: Array,
+        control: Approach,
+        gap: Array,
+        lag: Array,
+        out: Array,
+        tolerance: float,
+    ) -> GapSolution:
+        """Solve with the operator of a free body itself, and find what is lagged; collective."""
+        assert self.free is not None
+        work, repeated = self.workspace, self.gaps.operators
+        maps = work.pressure, work.displacement, work.other_displacement, lag  # in double precision with adhesion
+        inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps)
+        operators = repeated._replace(operator=self.free, inverse=inverse, mean=math.inf, least_mean=math.inf)
+        found = self.gaps.solve(law, heights + control.value, Approach(0.0), gap, LEFT * tolerance, operators)
+        found = replace(found, d=control.value)
+        found, _, worst = self._compare(heights, control, gap, found, out)
+        repeated.operator.apply(out, lag)
+        np.subtract(work.displacement, lag, out=lag)
+        if not found.failure and worst > tolerance:
+            return replace(found, failure=_unsettled("the solve", worst, tolerance))
+        return found
+
+    def _compare(
+        self, heights: Array, control: Control, gap: Array, found: GapSolution, out: Array
+    ) -> tuple[GapSolution, Array, float]:
+        """Put the pressure into `out`, and return by how much it moves a free body more than the solution says, also in
+        its certificate; collective."""
+        assert self.free is not None
+        out[...] = found.p
+        change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
+        change -= found.d
+        found, worst = self._judge(control, found, out, change)
+        return found, change, worst
 
     def _judge(self, control: Control, found: GapSolution, p: Array, change: Array) -> tuple[GapSolution, float]:
         """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
@@ -134,3 +158,7 @@ class StickingSolver:
     def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
         """The solution as a contact, whose displacement is in the workspace."""
         return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)
+
+
+def _unsettled(what: str, worst: float, tolerance: float) -> str:
+    return f"did not settle in {what} of a free body: changes are {worst:.3g} where {tolerance:.3g} was asked for"
