@@ -4,18 +4,21 @@ import errno
 import gc
 import os
 import resource
+import signal
 import sys
 import time
 import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn
 
 from .command import ranks
 from .command.arguments import parse_arguments
 from .command.verbs import BAD_INPUT, DONE, FAILED
 from .errors import InputError, JobError, RunError
+from .parallel.signals import STOP
 from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
@@ -41,10 +44,21 @@ def program() -> int:
     imported and at the end among what ends with the process anyway. Steps leave none.
     """
     gc.set_threshold(UNCOLLECTED_OBJECTS)
+    for number in STOP:
+        if signal.getsignal(number) == signal.SIG_DFL:  # neither Ctrl-C nor what nohup ignores
+            signal.signal(number, _end_by_signal)
     try:
         return main()
     finally:
         gc.freeze()
+
+
+def _end_by_signal(number: int, frame: FrameType | None) -> None:
+    """Say that a signal has come while no run noted it, and end by it as without this."""
+    if all(os.environ.get(name, "0") == "0" for name in ranks.RANKS):  # MPI may just be starting: it is not asked
+        os.write(2, f"parcontact: ended by {signal.Signals(number).name}, with nothing to save\n".encode())
+    signal.signal(number, signal.SIG_DFL)
+    signal.raise_signal(number)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -160,14 +160,14 @@ def test_mpirun_that_is_killed(here: Path, outside_mpi: dict[str, str]) -> None:
 
 
 def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> None:
-    """There is nothing to save yet: it ends the process at once."""
+    """There is nothing to save yet: it ends the process at once, which says so."""
     (here / "out").mkdir()
     for name in ("theory.csv", "theory.yaml"):
         (here / "out" / name).touch()
     process = start(["job.yaml", "--out", "out", *LONG, "--set", "grid.points=[2048, 1536]"], outside_mpi)
     wait_for(process, lambda: (here / "out" / ".lock").exists())
     process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=SECONDS)
+    assert process.communicate(timeout=SECONDS)[1] == "parcontact: ended by SIGTERM, with nothing to save\n"
     assert process.returncode == -signal.SIGTERM
     assert not (here / "out" / "measures.csv").exists()
 
