@@ -117,9 +117,19 @@ def test_so_does_a_table_without_a_column(cases: tuple[Case, ...]) -> None:
     for case, name in zip(cases, ("contact_area", "area"), strict=False):
         case.job.output.directory.mkdir(parents=True)
         head = f"step,time,distance,friction,{name},residual,seconds"
-        (case.job.output.directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5\n")
+        rows = "0,0,0,0,0,0,0\n1,1,0,0.1,0.2,2e-5,0.5\n"
+        (case.job.output.directory / "measures.csv").write_text(f"{head}\n{rows}")
     sweep_table.write(Path("out/job"), cases)
     assert [(row["state"], row["contact_area"]) for row in table()[:2]] == [("begun", "0.2"), ("damaged", "")]
+
+
+def test_the_start_is_no_result(cases: tuple[Case, ...]) -> None:
+    """Of a case that failed in its first step: areas of 0 would count in means."""
+    cases[0].job.output.directory.mkdir(parents=True)
+    head = "step,time,distance,friction,contact_area,residual,seconds"
+    (cases[0].job.output.directory / "measures.csv").write_text(f"{head}\n0,0,0,0,0,0,0\n")
+    sweep_table.write(Path("out/job"), cases)
+    assert [table()[0][name] for name in ("contact_area", "residual", "seconds")] == ["", "", ""]
 
 
 def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
