@@ -68,6 +68,13 @@ class RunParcontact(Protocol):
 
 
 @pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's cache directory, which is not there yet."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
 def outside_mpi() -> dict[str, str]:
     """The environment of a process outside MPI."""
     return outside.environment()

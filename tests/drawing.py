@@ -9,6 +9,7 @@ from matplotlib.text import Text
 from mpi4py import MPI
 
 from parcontact import job
+from parcontact.__main__ import main
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
 from parcontact.run.run import Options
@@ -56,6 +57,11 @@ def ran(tmp_path: Path, text: str) -> Path:
     loaded = job.load(path, [f"output.directory={tmp_path / 'out'}"])
     assert runner.run(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points), Options(quiet=True)) == 0
     return tmp_path / "out"
+
+
+def asked(*words: str | Path) -> int:
+    """The exit code of `parcontact plot` with these words."""
+    return main(["plot", *map(str, words)])
 
 
 def panels(figure: Figure) -> list[str]:

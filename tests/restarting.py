@@ -1,6 +1,5 @@
 """Short jobs, their runs, and what a run has left, for tests of runs that are cut into pieces."""
 
-import csv
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 import h5py
 import yaml
+from csv_rows import measures as rows
 from mpi4py import MPI
 
 from parcontact import job
@@ -90,12 +90,6 @@ class Bench:
         self.comm.Barrier()
         loaded = job.load(path, [f"output.directory={out}"])
         return runner.run(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
-
-
-def rows(out: Path) -> list[dict[str, str]]:
-    """All that a run measured but the wall time."""
-    with (out / "measures.csv").open(newline="") as file:
-        return [{key: text for key, text in row.items() if key != "seconds"} for row in csv.DictReader(file)]
 
 
 def maps(path: Path) -> dict[str, bytes]:

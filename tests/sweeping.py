@@ -1,7 +1,8 @@
 """A sweep of six cases, and the tables that it writes."""
 
-import csv
 from pathlib import Path
+
+from csv_rows import Rows, rows
 
 JOB = """\
 grid: {points: 34, size: 1.0e-3}
@@ -16,6 +17,5 @@ sweep:
 """
 
 
-def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> list[dict[str, str]]:
-    with (directory / name).open(newline="") as file:
-        return list(csv.DictReader(file))
+def table(name: str = "sweep.csv", directory: Path = Path("out/job")) -> Rows:
+    return rows(directory / name)

@@ -63,7 +63,7 @@ class Bounded:
                 break
             factor = (total - held) / free
         if free + held > total:
-            kernels.scale(p, total / (free + held))
+            p *= total / (free + held)
         else:
             share = (total - free - held) / (self.highest * slab.points - free - held)
             p += share * (self.highest - p)

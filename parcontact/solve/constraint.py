@@ -84,7 +84,7 @@ class NonNegative:
         scale_cells(p, cells, total / load * kept)
 
     def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
-        kernels.scale(p, total / load)
+        p *= total / load
 
     def clip(self, p: Array) -> float:
         return float(clip(p))

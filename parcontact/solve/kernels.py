@@ -78,11 +78,3 @@ def total(a):
             row += a[j, i]
         result += row
     return result
-
-
-@loop
-def scale(p, factor):
-    """`p <- factor p`."""
-    for j in range(p.shape[0]):
-        for i in range(p.shape[1]):
-            p[j, i] *= factor

@@ -1,6 +1,5 @@
 """Branches without a map in whole runs: what they save and cost, and that restarts wake them."""
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import yaml
+from csv_rows import rows
 from marching import begun, column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
@@ -171,8 +171,7 @@ class Place:
         runner.run(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
 
     def friction(self, name: str = "out") -> list[str]:
-        with (self.where / name / "measures.csv").open(newline="") as file:
-            return [row["friction"] for row in csv.DictReader(file)]
+        return [row["friction"] for row in rows(self.where / name / "measures.csv")]
 
     def maps(self, step: int, name: str = "out") -> dict[str, bytes]:
         """The maps of a checkpoint."""

@@ -1,9 +1,5 @@
-"""An effect of a user's own, with a section of the job, a map, memory and a column: the one that the manual shows.
+"""An effect of a user's own, with a section of the job, a map, memory and a column: the one that the manual shows."""
 
-It is installed as a package would install it: a module on the path and an entry point, nothing of ours being touched.
-"""
-
-import csv
 import pickle
 import re
 import sys
@@ -14,17 +10,19 @@ from typing import Any
 import h5py
 import pytest
 import yaml
+from csv_rows import Rows, rows
 from marching import begun, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact import __main__, job, scene
-from parcontact.job import Job, JobError, added_sections, model
-from parcontact.manual import texts
+from parcontact.job import Job, JobError
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import runner
 from parcontact.run.run import Options
+
+from .tread_wear import forget, install, shown
 
 pytestmark = pytest.mark.mpi(2)
 
@@ -41,24 +39,11 @@ DATA: dict[str, Any] = {
 WEAR = {**DATA, "wear": {"coefficient": COEFFICIENT}}
 
 
-def forget() -> None:
-    """What was found before is looked for anew."""
-    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
-        found.cache_clear()
-    sys.modules.pop("tread_wear", None)
-
-
 @pytest.fixture
 def installed(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The directory in which the manual's effect is installed."""
     if comm.rank == 0:
-        shown = texts.page("effects")
-        (shared_path / "tread_wear.py").write_text(re.findall(r"```python\n(# tread_wear.py\n.*?)```", shown, re.S)[0])
-        entry = re.findall(r'```toml\n\[project.entry-points."parcontact.effects"\]\n(.*?)\n```', shown, re.S)[0]
-        package = shared_path / "tread_wear-1.0.dist-info"
-        package.mkdir()
-        (package / "METADATA").write_text("Metadata-Version: 2.1\nName: tread-wear\nVersion: 1.0\n")
-        (package / "entry_points.txt").write_text(f"[parcontact.effects]\n{entry.replace(chr(34), '')}\n")
+        install(shared_path, shown())
     comm.Barrier()
     monkeypatch.syspath_prepend(str(shared_path))
     forget()
@@ -66,7 +51,7 @@ def installed(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.Monkey
     forget()
 
 
-def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> list[dict[str, str]]:
+def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> Rows:
     """Run the job with wear into a directory that all ranks see; the rows of measures.csv."""
     path = where / f"{name}.yaml"
     if comm.rank == 0:
@@ -75,8 +60,7 @@ def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> list[dic
     loaded = job.load(path, [f"output.directory={where / name}"])
     runner.run(loaded, Slab(comm, NX, NY), Options(quiet=True, **options))
     comm.Barrier()
-    with (where / name / "measures.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
+    return rows(where / name / "measures.csv")
 
 
 def test_column_is_archards_law(installed: Path, comm: MPI.Intracomm) -> None:
@@ -105,8 +89,7 @@ def test_restart_on_another_number_of_ranks(installed: Path, comm: MPI.Intracomm
     for name in ("whole", "fewer", "more"):
         with h5py.File(installed / name / "checkpoint" / "step-15.h5") as file:
             depths[name] = file["wear/depth"][()]
-        with (installed / name / "measures.csv").open(newline="") as file:
-            columns[name] = [float(row["wear_depth"]) for row in csv.DictReader(file)]
+        columns[name] = [float(row["wear_depth"]) for row in rows(installed / name / "measures.csv")]
     assert len(whole) == len(columns["whole"]) == 16
     for name in ("fewer", "more"):
         assert_allclose(depths[name], depths["whole"], rtol=0, atol=1e-7 * depths["whole"].max())

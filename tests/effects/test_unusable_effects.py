@@ -5,24 +5,17 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
+import short_job
 import yaml
 from conftest import WORLD, Main
 
-from parcontact.job import added_sections, model
-from parcontact.manual import texts
+from .tread_wear import forget, install, shown
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 
-JOB: dict[str, Any] = {
-    "grid": {"points": 16, "size": 1e-3},
-    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
-    "material": {"model": "elastic", "shear_modulus": 1e6},
-    "history": [{"pressure": 1e4}],
-    "wear": {"coefficient": 1e-12},
-}
+JOB = {**short_job.JOB, "wear": {"coefficient": 1e-12}}
 BAD_INPUT = 2
 MEMBER = 'section, columns = WearSection, ("wear_depth",)'
 CHANGES = {
@@ -38,28 +31,17 @@ CHANGES = {
 }
 
 
-def forget() -> None:
-    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
-        found.cache_clear()
-    sys.modules.pop("tread_wear", None)
-
-
 @pytest.fixture
-def install(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], None]]:
+def changed(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], None]]:
     """Install the manual's effect with a change, beside two jobs of which one asks for it."""
-    package = tmp_path / "tread_wear-1.0.dist-info"
-    package.mkdir()
-    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: tread-wear\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text("[parcontact.effects]\nwear = tread_wear:Wear\n")
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     (tmp_path / "plain.yaml").write_text(yaml.safe_dump({key: JOB[key] for key in JOB if key != "wear"}))
-    shown = re.findall(r"```python\n(# tread_wear.py\n.*?)```", texts.page("effects"), re.S)[0]
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def change(old: str, new: str) -> None:
-        assert old in shown
-        (tmp_path / "tread_wear.py").write_text(shown.replace(old, new))
+        assert old in shown()
+        install(tmp_path, shown().replace(old, new))
         forget()
 
     yield change
@@ -68,10 +50,10 @@ def install(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
 @pytest.mark.parametrize("name", CHANGES)
 def test_refused_where_a_job_asks_for_it(
-    main: Main, install: Callable[[str, str], None], tmp_path: Path, name: str
+    main: Main, changed: Callable[[str, str], None], tmp_path: Path, name: str
 ) -> None:
     old, new, reason = CHANGES[name]
-    install(old, new)
+    changed(old, new)
     before = set(tmp_path.rglob("*"))
     code, _, said = main("job.yaml", "--quiet", "--out", "out")
     assert code == BAD_INPUT
@@ -80,8 +62,8 @@ def test_refused_where_a_job_asks_for_it(
     assert set(tmp_path.rglob("*")) == before
 
 
-def test_the_rest_works_without_it(main: Main, install: Callable[[str, str], None]) -> None:
-    install("import numpy as np", "import import")
+def test_the_rest_works_without_it(main: Main, changed: Callable[[str, str], None]) -> None:
+    changed("import numpy as np", "import import")
     assert main("plain.yaml", "--quiet", "--out", "out")[0] == 0
     assert main("plan", "plain.yaml", "--seconds", "0.01", "--ranks", "1")[0] == 0
     code, shown, said = main("schema")

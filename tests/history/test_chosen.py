@@ -1,13 +1,13 @@
 """Steps that choose themselves: they follow the error asked for, end with their stages, and do not depend on how a run
 was cut into pieces or on how many ranks made it."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from csv_rows import measures
 from marching import SLS, begun, column, marched
 from mpi4py import MPI
 
@@ -210,8 +210,7 @@ def run(
     assert runner.run(load(path), Slab(comm, POINTS, POINTS), Options(True, until=until)) == 0
     if comm.rank:
         return []
-    with (where / name / "measures.csv").open() as file:
-        return [{key: value for key, value in row.items() if key != "seconds"} for row in csv.DictReader(file)]
+    return measures(where / name)
 
 
 @pytest.mark.mpi(3)

@@ -1,11 +1,11 @@
 """Heights as a numpy array in a job from Python: as good as a file, stored beside results, dealt out to the ranks."""
 
-import csv
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from csv_rows import rows
 from mpi4py import MPI
 
 import parcontact as pc
@@ -84,8 +84,7 @@ def test_heights_with_coordinates() -> None:
 
 
 def frictions(directory: Path) -> list[str]:
-    with (directory / "measures.csv").open(newline="") as file:
-        return [row["friction"] for row in csv.DictReader(file)]
+    return [row["friction"] for row in rows(directory / "measures.csv")]
 
 
 def test_a_run_is_repeated_from_its_directory(nowhere: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,10 +1,10 @@
 """The jobs of the page "Which settings?": each runs, meets its accuracy without a warning, has the numbers there."""
 
-import csv
 import re
 from pathlib import Path
 
 import pytest
+from csv_rows import rows
 
 from manual.printed import compare_lines
 from parcontact import __main__
@@ -34,13 +34,11 @@ def test_a_job(
 
 def compare_table(text: str, path: Path) -> None:
     """Hold each line of a table of columns to a row of measures.csv: three digits are printed, and machines round."""
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
     head = re.search(r"^(\| `\w+` (?:\| `\w+` )+\|)\n\|[-|]+\n((?:\|.*\n)+)", text, re.M)
     if head is None:
         return
     names = re.findall(r"`(\w+)`", head[1])
     for line in head[2].splitlines():
         expected = [float(cell) for cell in line.strip("|").split("|")]
-        found = [[float(row[name] or "nan") for name in names] for row in rows]
+        found = [[float(row[name] or "nan") for name in names] for row in rows(path)]
         assert any(each == pytest.approx(expected, rel=0.05, abs=1e-40) for each in found), (names, expected)

@@ -1,6 +1,5 @@
 """`parcontact plot`: a picture with the panels that a job has."""
 
-import csv
 import re
 from pathlib import Path
 
@@ -101,8 +100,7 @@ def test_theory_beside_a_run_with_an_interface(tmp_path: Path, drawn: list[Figur
     plots.plot([out])
     lines = {str(line.get_label()): np.array(line.get_ydata()) for line in drawn[0].axes[0].get_lines()}
     assert np.all(lines["simulation"][1:] > lines["without interface"][1:])
-    with (out / "measures.csv").open(newline="") as file:
-        saved = [float(row["friction_viscous"]) for row in csv.DictReader(file)]
+    saved = tables.read(out / "measures.csv")["friction_viscous"]
     assert np.allclose(lines["without interface"], saved[-len(lines["without interface"]) :])
 
 

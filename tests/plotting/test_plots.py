@@ -17,6 +17,7 @@ from drawing import (
     SPHERE,
     WAVE,
     ZENER,
+    asked,
     panels,
     ran,
     touching,
@@ -24,17 +25,12 @@ from drawing import (
 from matplotlib.figure import Figure
 from PIL import Image
 
-from parcontact.__main__ import main
 from parcontact.plotting import style
 from parcontact.storage import tables
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
 CURVE = "velocity,pressure,friction,contact_area\n"
 POINTS = [(v, p, 0.1 * v, 0.2) for p in (1041.66666, 2.5e5) for v in (0.001, 0.1, 10.0)]
-
-
-def asked(*words: str | Path) -> int:
-    return main(["plot", *map(str, words)])
 
 
 def curve(directory: Path, points: Sequence[Sequence[float]] = POINTS) -> Path:

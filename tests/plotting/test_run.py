@@ -4,19 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import ELASTIC, MAPS, WAVE, ZENER, ran
+from drawing import ELASTIC, MAPS, WAVE, ZENER, asked, ran
 from matplotlib.figure import Figure
-
-from parcontact.__main__ import main
 
 LOADS = "history: [{pressure: 1.0e3}, {pressure: 2.0e3}, {pressure: 3.0e3}]\n"
 CREEP = "history: [{pressure: 1.0e3, duration: 1.0e-2, time_step: 2.0e-3}]\n"
 GROWING = CREEP.replace("time_step: 2.0e-3", "time_step: {first: 1.0e-6, growth: 1.8}")
 SLIDE = ", {pressure: 1.0e3, velocity: 0.1, distance: 1.0e-3, cells_per_step: 0.5}]\n"
-
-
-def asked(*words: str | Path) -> int:
-    return main(["plot", *map(str, words)])
 
 
 def title_and_highest(figure: Figure) -> tuple[str, float]:

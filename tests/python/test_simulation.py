@@ -1,6 +1,5 @@
 """The public Python interface: as good as the command line, on one rank and on several, and without files."""
 
-import csv
 import re
 import subprocess
 import sys
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 import short_job
 import yaml
+from csv_rows import rows as rows_of
 from mpi4py import MPI
 from short_job import STEPS
 
@@ -28,11 +28,6 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def table(directory: Path) -> list[dict[str, str]]:
-    with (directory / "measures.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def numbers(row: Any) -> dict[str, float]:
     """But for the wall time."""
     return {name: value for name, value in row.items() if name != "seconds" and value == value}
@@ -44,7 +39,7 @@ def test_steps_are_rows_of_measures_csv(nowhere: Path) -> None:
     assert list(nowhere.iterdir()) == []
     (nowhere / "job.yaml").write_text(yaml.safe_dump(JOB))
     assert main(["job.yaml", "--quiet"]) == 0
-    written = table(nowhere / "out" / "job")
+    written = rows_of(nowhere / "out" / "job" / "measures.csv")
     assert [row.step for row in rows] == list(range(STEPS + 1))
     for row, line in zip(rows, written, strict=True):
         assert list(row) == list(line)
@@ -155,7 +150,7 @@ def test_a_saved_state_is_a_checkpoint(nowhere: Path) -> None:
         next(steps)
     run.save("state.h5")
     assert main(["job.yaml", "--quiet", "--restart", "state.h5"]) == 0
-    assert [int(row["step"]) for row in table(nowhere / "out" / "job")][-1] == STEPS
+    assert [int(row["step"]) for row in rows_of(nowhere / "out" / "job" / "measures.csv")][-1] == STEPS
     with pytest.raises(pc.InputError, match=r"grid.points was \[16, 12\], is \[8, 8\]"):
         pc.Simulation.restore("state.h5", {"grid.points": 8}, MPI.COMM_SELF)
     with pytest.raises(pc.InputError, match="incomplete or damaged"):
@@ -167,7 +162,7 @@ def test_run_with_files(nowhere: Path) -> None:
     job = JOB | {"output": {"directory": "here", "fields": ["pressure"]}}
     first = pc.Simulation(job, comm=MPI.COMM_SELF)
     assert first.run().step == STEPS
-    assert len(table(nowhere / "here")) == STEPS + 1
+    assert len(rows_of(nowhere / "here" / "measures.csv")) == STEPS + 1
     assert {"fields.h5", "job.yaml", "job.resolved.yaml", "checkpoint"} <= {
         path.name for path in (nowhere / "here").iterdir()
     }
@@ -176,7 +171,7 @@ def test_run_with_files(nowhere: Path) -> None:
     assert again.run().step == STEPS
     assert np.array_equal(again.field("pressure"), first.field("pressure"))
     assert main([str(nowhere / "here" / "job.yaml"), "--quiet", "--out", "again"]) == 0
-    assert len(table(nowhere / "again")) == STEPS + 1
+    assert len(rows_of(nowhere / "again" / "measures.csv")) == STEPS + 1
     begun = pc.Simulation(job, comm=MPI.COMM_SELF)
     next(begun.steps())
     with pytest.raises(pc.InputError, match="must come before the first of steps"):
@@ -239,7 +234,7 @@ def test_a_finished_run_has_its_last_row(nowhere: Path) -> None:
     (nowhere / "job.yaml").write_text(yaml.safe_dump(JOB))
     assert main(["job.yaml", "--quiet"]) == 0
     done = pc.Simulation.restore(nowhere / "out" / "job" / "checkpoint" / f"step-{STEPS}.h5", comm=MPI.COMM_SELF)
-    written = table(nowhere / "out" / "job")[-1]
+    written = rows_of(nowhere / "out" / "job" / "measures.csv")[-1]
     assert numbers(done.row) == {name: float(text) for name, text in written.items() if text and name != "seconds"}
     assert numbers(done.run()) == numbers(done.row)
     assert done.finished

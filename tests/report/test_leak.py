@@ -1,6 +1,5 @@
 """Leakage of runs: the table, the picture, the columns of a run, mistakes, and when random contacts close."""
 
-import csv
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import yaml
+from csv_rows import rows as table
 from mpi4py import MPI
 
 import parcontact as pc
@@ -47,11 +47,6 @@ def run(comm: MPI.Intracomm, where: Path, **changes: Any) -> Path:
     assert __main__.main([str(path), "--quiet"]) == 0
     comm.Barrier()
     return out
-
-
-def table(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.mark.mpi

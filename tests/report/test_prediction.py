@@ -1,6 +1,5 @@
 """`parcontact theory`: the job's waves, history and material in Persson's theory."""
 
-import csv
 import re
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from conftest import RunParcontact
+from csv_rows import rows
 from marching import JOBS, PRONY, SLS, column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
@@ -153,8 +153,7 @@ def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     first, second = done.stdout.splitlines()
     assert first == "Persson's theory, gamma 1, for the spectrum of the surface: here/theory.csv"
     assert re.fullmatch(r"Persson's theory predicts mu_max \S+, mu_dyn \S+, contact area \S+", second)
-    with (tmp_path / "here" / "theory.csv").open(newline="") as file:
-        table = list(csv.DictReader(file))
+    table = rows(tmp_path / "here" / "theory.csv")
     assert tuple(table[0]) == prediction.Instant._fields
     assert float(table[-1]["distance"]) == pytest.approx(4.32e-4)
     assert {path.name for path in (tmp_path / "here").iterdir()} == {"theory.csv", "theory.yaml"}
@@ -237,8 +236,7 @@ def test_theory_of_a_friction_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     before = path.read_bytes()
     found = load_job("job.yaml")
     wanted = [str(row.friction) for row in prediction.predict_steady(found, request(found))]
-    with path.open(newline="") as file:
-        assert [row["friction"] for row in csv.DictReader(file)] == wanted
+    assert [row["friction"] for row in rows(path)] == wanted
     assert main(["steady", "job.yaml", "--quiet"]) == 0
     assert path.read_bytes() == before
     assert main(["theory", "job.yaml", "--gamma", "0.5"]) == 2

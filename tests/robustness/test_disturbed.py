@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import short_job
 import yaml
 from conftest import WORLD
 
@@ -23,10 +24,9 @@ from parcontact.streams import printable
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
 
 JOB: dict[str, Any] = {
+    **short_job.JOB,
     "title": "Gummi µ",
     "grid": {"points": [32, 24], "size": [1e-3, 7.5e-4]},
-    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
-    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
     "history": [{"pressure": 1e4, "velocity": 0.1, "distance": 1.5625e-4, "cells_per_step": 1}],
     "output": {"fields": ["pressure"]},
 }

@@ -1,6 +1,5 @@
 """What happens to a run from outside: signals, a full disk, a second run; the next run always finishes the history."""
 
-import csv
 import os
 import shutil
 import signal
@@ -14,6 +13,7 @@ from pathlib import Path
 import h5py
 import pytest
 from conftest import WORLD, outside
+from csv_rows import measures
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
 
@@ -107,12 +107,7 @@ def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 
 def same(out: Path, whole: Path) -> None:
     """Every digit of the measures and the fields."""
-    tables = []
-    for run in (out, whole):
-        with (run / "measures.csv").open(newline="") as file:
-            table = list(csv.DictReader(file))
-            tables.append([{key: text for key, text in row.items() if key != "seconds"} for row in table])
-    assert tables[0] == tables[1]
+    assert measures(out) == measures(whole)
     with h5py.File(out / "fields.h5") as one, h5py.File(whole / "fields.h5") as other:
         assert one["t"][...].tobytes() == other["t"][...].tobytes()
         assert one["pressure"][...].tobytes() == other["pressure"][...].tobytes()

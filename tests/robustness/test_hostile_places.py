@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import matplotlib as mpl
 import pytest
+import short_job
 import yaml
 from conftest import WORLD, Main
 from matplotlib.figure import Figure
@@ -23,9 +24,8 @@ from parcontact.summary import info
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 
 JOB: dict[str, Any] = {
+    **short_job.JOB,
     "grid": {"points": [32, 24], "size": [1e-3, 7.5e-4]},
-    "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]},
-    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
     "history": [{"pressure": 1e4, "velocity": 0.1, "distance": 1.5625e-4, "cells_per_step": 1}],
     "output": {"fields": ["pressure"]},
 }

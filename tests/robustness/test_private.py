@@ -20,12 +20,6 @@ BIN = Path(sys.executable).parent
 as_others = pytest.mark.skipif(os.geteuid() != 0, reason="only root can be somebody else")
 
 
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
 def test_a_private_directory_is_made(cache: Path) -> None:
     place = private.directory("plans")
     assert place == cache / "parcontact" / "plans"

@@ -62,14 +62,6 @@ def test_dot_and_total(shape: tuple[int, int], dtype: type[np.floating]) -> None
     assert maps.close(loops.dot(maps.u, maps.t), u * t)
 
 
-@SHAPES
-def test_scale(shape: tuple[int, int], dtype: type[np.floating]) -> None:
-    maps = Maps(shape, dtype)
-    expected = 1.7 * maps.wide("p")
-    kernels.scale(maps.p, 1.7)
-    assert np.allclose(maps.p, expected, rtol=4 * ROUNDING[dtype], atol=0.0)
-
-
 def test_sums_are_double_whatever_the_maps_are(dtype: type[np.floating]) -> None:
     """A million equal numbers: to 1e-14, where a running sum in single precision would lose the third digit."""
     p = np.full((1000, 1000), 0.1, dtype=dtype)

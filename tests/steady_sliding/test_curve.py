@@ -1,12 +1,12 @@
 """Friction curves from the command line, and marches that start from steady sliding."""
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import Main
+from csv_rows import rows
 from mpi4py import MPI
 
 from parcontact import job as jobs
@@ -160,8 +160,7 @@ def test_one_point_is_a_flat_surface(main: Main, tmp_path: Path) -> None:
     job.write_text(f"grid: {{points: 1, size: 1.0e-3}}\nsurface: {{shape: flat}}\nmaterial: {material}\n")
     code, _, err = main("steady", job, "--velocities", "0.1", "--pressures", "1e5", "--quiet")
     assert code == 0, err
-    with (tmp_path / "out" / "job" / "steady.csv").open() as file:
-        (row,) = csv.DictReader(file)
+    (row,) = rows(tmp_path / "out" / "job" / "steady.csv")
     assert (float(row["contact_area"]), float(row["friction"]), float(row["max_pressure"])) == (1.0, 0.0, 1e5)
 
 

@@ -20,12 +20,6 @@ history: [{pressure: 1.0e4}]
 """
 
 
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
 @pytest.mark.skipif(os.geteuid() != 0, reason="gives a directory to somebody else")
 def test_plans_in_a_directory_of_others_are_not_read(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(JOB)

@@ -1,6 +1,5 @@
 """Whole studies: of a wave in full contact, whose friction has a closed form, and as a user runs them."""
 
-import csv
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
+from csv_rows import rows
 from mpi4py import MPI
 
 from parcontact.job import load
@@ -164,11 +164,6 @@ def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
     reference = verdict.references(refined, found)
     assert reference["mu_max"].uncertainty == 0.01 * reference["mu_max"].value
     assert verdict.sentences(found, reference, 1)[-1].endswith("(the reference itself is known to 1 %)")
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_path: Path) -> None:

@@ -59,14 +59,6 @@ def residual(g, q, sigma, mean, working, c):
 
 
 @loop
-def centre(working, mean, c):
-    """`c <- c - mean` on the working set."""
-    for j in range(c.shape[0]):
-        for i in range(c.shape[1]):
-            c[j, i] = c[j, i] - mean if working[j, i] else 0.0
-
-
-@loop
 def judge(working, g, h, q, mean, sigma, z):
     """With `p = q + mean` and `c = p + sigma` on the working set: sums of the weights `|p| + |c|`, of these times u and
     u^2, with `u = g + h`, and over the set times |z|; and over the set of |c| and of c."""
@@ -114,14 +106,6 @@ def products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
         e_z += row_e_z
         c_t += row_c_t
     return sum_z, sum_t, c_z, e_z, c_t
-
-
-@loop
-def turn(working, z, beta, mean, t):
-    """`t <- z + beta t - mean` on the working set, 0 elsewhere."""
-    for j in range(t.shape[0]):
-        for i in range(t.shape[1]):
-            t[j, i] = z[j, i] + beta * t[j, i] - mean if working[j, i] else 0.0
 
 
 @loop

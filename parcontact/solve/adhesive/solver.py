@@ -125,7 +125,7 @@ class GapSolver:
         if isinstance(control, Approach) and operators.mean == 0.0:
             given = max(-mean_h - control.value, 0.0)
             if mean_g > 0.0:
-                maps.scale(gap, given / mean_g)
+                gap *= given / mean_g
             else:
                 gap.fill(given)
             mean_g = given
@@ -154,7 +154,7 @@ class GapSolver:
         members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
         if it.given is not None and members:
             it.m -= total / members
-            kernels.centre(self._working, total / members, self._way)
+            maps.turn(self._working, self._way, 0.0, total / members, self._way)
         it.change = it.m - before
         it.lowest = -least
         if isinstance(it.control, Approach):
@@ -219,7 +219,7 @@ class GapSolver:
         if c_z + beta * c_t <= LEAST_DESCENT * c_z:
             beta = 0.0
         mean = (sum_z + beta * sum_t) / members if it.given is not None else 0.0
-        kernels.turn(working, z, beta, mean, self._t)
+        maps.turn(working, z, beta, mean, self._t)
         return c_z
 
     def _descend(self, it: Iterate, g: Array, out: Array) -> bool:

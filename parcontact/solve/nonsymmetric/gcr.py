@@ -64,7 +64,7 @@ class Directions:
                 return step
             t, w = self._pair(step)
             self.preconditioner.apply(working, r, t)
-            _, mean = self.slab.sum(*sum_on(working, t))
+            (mean,) = self.slab.sum(sum_on(working, t))
             kernels.turn(working, t, 0.0, mean / members, t)
             self.operator.apply(t, w)
             self._orthogonalize(working, members, norms, means)
@@ -87,7 +87,7 @@ class Directions:
         t, w = self._pairs[last]
         earlier = self._pairs[:last]
         sums = [_common(working, w, other) for _, other in earlier]
-        total, *common = self.slab.sum(sum_on(working, w)[1], *sums)
+        total, *common = self.slab.sum(sum_on(working, w), *sums)
         for k, (other_t, other_w) in enumerate(earlier):
             beta = (common[k] - total * means[k]) / norms[k]
             _subtract(beta, other_t, t)
@@ -125,16 +125,13 @@ def residual(working, u, h, mean, r):
 
 @loop
 def sum_on(working, z):
-    count, total = 0.0, 0.0
+    total = 0.0
     for j in range(z.shape[0]):
-        row_count, row_total = 0.0, 0.0
+        row = 0.0
         for i in range(z.shape[1]):
-            weight = 1.0 if working[j, i] else 0.0
-            row_count += weight
-            row_total += weight * z[j, i]
-        count += row_count
-        total += row_total
-    return count, total
+            row += z[j, i] if working[j, i] else 0.0
+        total += row
+    return total
 
 
 @loop

@@ -75,7 +75,7 @@ class Projected:
         level, t = total / members, self.t[0]
         residual(working, u, h, level, t)
         self.extended.apply(self.preconditioner, working, t)
-        _, mean = self.slab.sum(*sum_on(working, t))
+        (mean,) = self.slab.sum(sum_on(working, t))
         kernels.turn(working, t, 0.0, mean / members, t)
         self.operator.apply(t, self.w[0])
         sums = np.array(self.slab.sum(*_gram(working, u, h, level, *self.w)))

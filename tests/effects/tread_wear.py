@@ -1,0 +1,31 @@
+"""The effect of a user's own that the manual shows, installed as a package would install it."""
+
+import re
+import sys
+from pathlib import Path
+
+from parcontact.job import added_sections, model
+from parcontact.manual import texts
+
+
+def shown() -> str:
+    """The module, as the manual has it."""
+    found: str = re.findall(r"```python\n(# tread_wear.py\n.*?)```", texts.page("effects"), re.S)[0]
+    return found
+
+
+def install(directory: Path, module: str) -> None:
+    """Put the module and its entry point, as the manual has that, into a directory of the path."""
+    (directory / "tread_wear.py").write_text(module)
+    entry = re.findall(r'\[project.entry-points."parcontact.effects"\]\n(.*?)\n```', texts.page("effects"), re.S)[0]
+    package = directory / "tread_wear-1.0.dist-info"
+    package.mkdir(exist_ok=True)
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: tread-wear\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text(f"[parcontact.effects]\n{entry.replace(chr(34), '')}\n")
+
+
+def forget() -> None:
+    """What was found before is looked for anew."""
+    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
+        found.cache_clear()
+    sys.modules.pop("tread_wear", None)
