@@ -57,7 +57,7 @@ class Console:
     def __init__(self, log: Path | None = None, quiet: bool = True, total: int = 0, speaks: bool = True) -> None:
         self._log = files.open_to_append(log) if log is not None else None
         self._quiet, self._total, self._speaks = quiet, total, speaks
-        self._first, self._began, self._last_time_left = 0, 0.0, 0.0
+        self._rows, self._first, self._began, self._last_time_left = 0, 0, 0.0, 0.0
         self._bar: tqdm[None] | None = None
 
     def say(self, text: str) -> None:
@@ -84,10 +84,12 @@ class Console:
         self.log(text)
         if self._quiet:
             return
-        if not self._began:
-            print(HEAD)
+        self._rows += 1
+        if self._rows <= 2:  # the first step makes much that is made once
             self._first, self._began = row.step, time.monotonic()
             self._last_time_left = self._began
+        if self._rows == 1:
+            print(HEAD)
             if sys.stderr.isatty() and self._total > 1:
                 self._bar = tqdm(
                     total=self._total, initial=row.step, unit="step", leave=False, mininterval=EVERY_SECONDS
@@ -99,7 +101,7 @@ class Console:
             self._say_time_left(row.step)
 
     def _say_time_left(self, step: int) -> None:
-        """Say now and then how long it takes if steps go on to take as long as they did."""
+        """Say now and then how long it takes if steps go on to take as long as they did after the first one."""
         now = time.monotonic()
         if now - self._last_time_left >= LEFT_SECONDS and self._first < step < self._total:
             self._last_time_left = now
