@@ -19,7 +19,7 @@ from .checks import advice, cells, layer, limits, meaning, size
 from .sections import height_arrays, listing
 from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
-from .sections.materials import Dma, Material, Zener, heated
+from .sections.materials import Dma, Material, Zener, describe_temperature, heated
 from .sections.part import Instead, Origin, Part, Rule
 from .sections.stages import Initial, Stage, Steady
 from .text.overrides import Included
@@ -138,8 +138,8 @@ class Job(Part):
 
     @property
     def facts(self) -> tuple[str, ...]:
-        """Sentences of effects about what their sections mean in this job."""
-        return tuple(self._told("facts"))
+        """At which temperature the material is, and sentences of effects about what their sections mean in this job."""
+        return tuple(filter(None, (describe_temperature(self.material), *self._told("facts"))))
 
     def _told(self, what: str) -> Iterator[str]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""

@@ -112,7 +112,9 @@ class Compound:
             f"# Measured frequencies{to}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",
             *([f"# Measured at {', '.join(f'{t:.4g}' for t in temperatures)} C."] if temperatures else []),
             "# Moduli are shear moduli [Pa], times are in s"
-            + (f" at {shift.reference:g} C; `temperature: T` in a job shifts them." if shift is not None else "."),
+            + (
+                f" at {shift.reference:g} C, where a job is that has no `temperature: T`." if shift is not None else "."
+            ),
         ]
         branches = section.pop("branches")
         lines += [f"{key}: {_flow(value)}" for key, value in section.items()]

@@ -10,6 +10,7 @@ from ..effects.interface import InterfaceColumns
 from ..effects.thermal import ThermalColumns
 from ..job import Job
 from ..job.checks.advice import describe_sample
+from ..job.sections.materials import describe_temperature
 from ..physics.budget import advice, describe, exceeds
 from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
@@ -75,6 +76,8 @@ class CurveTable:
         self._bar = progress.Bar(0, "")
         if self._job.origin.mesh:
             self.say(self._job.origin.mesh)
+        if not heated and (text := describe_temperature(self._job.material)):
+            self.say(text)
         self.say(f"{HEAD}   T [C]" if heated else HEAD)
 
     def _read(self) -> list[Wanted]:

@@ -210,6 +210,16 @@ def test_a_job_beyond_the_measured_frequencies() -> None:
     assert "1.4 decades below" in slow
 
 
+def test_a_job_says_its_temperature() -> None:
+    """The reference where it gives none; a_T by the formula of Williams, Landel and Ferry."""
+    assert rubber(0.1).facts == (
+        "material: at 20 C, the reference of its shift, as the job gives no material.temperature",
+    )
+    shift_factor = 10.0 ** (-8.86 * 20.0 / 121.6)
+    assert rubber(0.1, temperature=40.0).facts == (f"material: at 40 C (a_T = {shift_factor:.4g}, reference 20 C)",)
+    assert rubber(0.1, shift=None).facts == ()
+
+
 def test_temperatures_beyond_the_measured_ones() -> None:
     job = rubber(0.1, band=None)
     (text,) = describe_beyond(job, [-60.0, -40.0, 20.0, 120.0])

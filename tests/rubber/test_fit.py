@@ -38,6 +38,7 @@ def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
     code, out, err = main(*words)
     assert code == 0, err
     assert "12 branches" in out
+    assert "times are in s at 20 C, where a job is that has no `temperature: T`" in out
     assert "warning: the job's frequencies reach 1.8 decades above the measured band" in out
     job.write_text(JOB)
     found = jobs.load(job).material

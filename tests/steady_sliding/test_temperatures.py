@@ -151,3 +151,17 @@ def test_temperatures_beyond_computing(tmp_path: Path, law: str, temperature: fl
     changes = [f"material.shift={law}", f"steady.temperatures=[{temperature}]"]
     with pytest.raises(InputError, match=told):
         request(jobs.load(tmp_path / "job.yaml", changes))
+
+
+def test_a_curve_says_its_temperature(tmp_path: Path, main: Main) -> None:
+    """Before its points, unless each point has one of its own."""
+    (tmp_path / "job.yaml").write_text(WAVE.replace(", temperatures: [-5.0, 20.0, 60.0]", ""))
+    words = ["steady", tmp_path / "job.yaml", "--velocities", "0.3"]
+    for degrees, expected in ((20.0, "material: at 20 C, the reference"), (60.0, "material: at 60 C (a_T = ")):
+        more = [] if degrees == REFERENCE else ["--set", f"material.temperature={degrees}"]
+        code, out, err = main(*words, *more, "--set", f"output.directory=out{degrees}")
+        assert code == 0, err
+        assert expected in out
+    code, out, err = main(*words, "--temperatures", "20", "--set", "output.directory=own")
+    assert code == 0, err
+    assert "material: at" not in out

@@ -214,6 +214,17 @@ class Dma(Part):
         return self._fitted
 
 
+def describe_temperature(material: Elastic | Zener | Dma) -> str:
+    """Return at which temperature a material is, '' of one that says nothing of temperatures."""
+    body = material.fitted
+    if not isinstance(body, Zener) or body.shift is None:
+        return ""
+    reference = body.shift.made.reference
+    if body.temperature is None:
+        return f"material: at {reference:g} C, the reference of its shift, as the job gives no material.temperature"
+    return f"material: at {body.temperature:g} C (a_T = {body.time_factor:.4g}, reference {reference:g} C)"
+
+
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
     """Return a material at another temperature [deg C]. Raises InputError where nothing says how it depends on it."""
     body = material.fitted
