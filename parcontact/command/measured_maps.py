@@ -3,12 +3,14 @@
 import math
 import os
 from collections.abc import Iterator, Sequence
+from operator import le
 from pathlib import Path
 from typing import Any
 
 from .. import job as jobs
 from ..errors import InputError, RunError
 from ..job import Job
+from ..job.chosen_mesh import points_for
 from ..job.sections.listing import plain
 from ..job.text import yamltext
 from ..storage import files
@@ -17,6 +19,7 @@ JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those
 MANY_POINTS = 2**20  # tuning: of a job to start from, at most
 UNSAID = ("give unit", "give size")  # in messages about maps that do not say all
 HOW = "on the command line: --set surface.unit=um --set surface.size=[1e-3,1e-3]"
+ACCURACIES = (0.01, 0.02, 0.05, 0.1, 0.2)  # tuning: of a job to start from, the first that its points keep
 LOAD = {"pressure": 1.0e5}
 
 
@@ -47,9 +50,9 @@ def start(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     found["surface"].setdefault("periodic", "smooth")
     coarser = math.ceil(math.sqrt(grid.nx * grid.ny / MANY_POINTS))
     found["grid"] = {"points": [grid.nx // coarser, grid.ny // coarser], "size": list(grid.size)}
-    found["numerics"] = {"accuracy": job.numerics.accuracy}
     found["history"].append({"name": "slide", **LOAD, "velocity": 0.1, "distance": float(f"{grid.lx / 4:.3g}")})
-    text = yamltext.dump(found)
+    accuracy, why = _accuracy(job, found | {"surface": found["surface"] | {"path": str(path)}})
+    text = yamltext.dump(found | {"numerics": {"accuracy": accuracy}}).rstrip() + f"{why}\n"
     if target is None:
         yield f"\na job to start from, which --job FILE writes:\n\n{text.rstrip()}"
         return
@@ -59,6 +62,20 @@ def start(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     except OSError as error:
         raise RunError(f"{target} cannot be written: {error}") from error
     yield f"job: {target}"
+
+
+def _accuracy(job: Job, data: dict[str, Any]) -> tuple[Any, str]:
+    """Return the accuracy of the command line, or one that the points of the job to start from, `data`, keep with a
+    comment that says so."""
+    accuracy = job.numerics.accuracy
+    if "accuracy" in job.numerics.model_fields_set:
+        return accuracy, ""
+    try:
+        whole = jobs.load(data)
+        kept = [a for a in ACCURACIES if all(map(le, points_for(whole, a), whole.grid.points))]
+    except InputError:  # nothing is known before of heights without a shortest wave
+        return accuracy, ""
+    return (kept[0], "  # what these points keep, by a guess") if kept else (accuracy, "  # needs more points")
 
 
 def _job_of(path: str) -> dict[str, Any]:

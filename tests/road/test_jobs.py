@@ -225,13 +225,39 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     found = jobs.load(road / "start/job.yaml")
     assert (found.grid.points, found.grid.size) == ((POINTS, POINTS), (LENGTH, LENGTH))
     written = (road / "start/job.yaml").read_text()
-    for line in (f"points: [{POINTS}, {POINTS}]", "detrend: tilt", "periodic: smooth", "accuracy: 0.01"):
+    for line in (f"points: [{POINTS}, {POINTS}]", "detrend: tilt", "periodic: smooth"):
         assert line in written
     assert main(*words, "--job", "start/job.yaml")[0] == 2
     code, _, err = main("surface", "road.npy")
     assert code == 2
     assert "does not say the unit of its heights" in err
     assert "--set surface.unit=um" in err
+
+
+@pytest.mark.parametrize(
+    ("cells", "more", "written"),
+    [
+        (16, "", "accuracy: 0.05}  # what these points keep, by a guess"),
+        (2, "", "accuracy: 0.01}  # needs more points"),
+        (3, "numerics.accuracy=0.03", "accuracy: 0.03}\n"),
+    ],
+)
+def test_a_job_to_start_from_asks_for_what_its_points_keep(
+    shared_path: Path, main: "Main", monkeypatch: pytest.MonkeyPatch, cells: int, more: str, written: str
+) -> None:
+    """Of the accuracies it writes the smallest for which `points: auto` takes no more points than the map has."""
+    np.save(shared_path / "road.npy", truth.rough(POINTS, LENGTH, 2.5e-4, cells * LENGTH / POINTS, SLOPE) * 1e6)
+    monkeypatch.chdir(shared_path)
+    words = ["surface", "road.npy", "--set", "surface.unit=um", "--set", "surface.size=[1e-3, 1e-3]"]
+    code, _, err = main(*words, *(["--set", more] if more else []), "--job", "job.yaml")
+    assert code == 0, err
+    assert written in (shared_path / "job.yaml").read_text()
+    if "keep" in written:
+        finer, kept = (
+            jobs.load(shared_path / "job.yaml", ["grid.points=auto", f"numerics.accuracy={a}"]).grid.points
+            for a in (0.02, 0.05)
+        )
+        assert max(kept) <= POINTS < max(finer)
 
 
 @pytest.mark.mpi
