@@ -17,6 +17,7 @@ from ..solve.contact import Contact
 ROUNDINGS = 4.0  # accuracy: times the rounding of the largest length, below which no certificate is sure to be
 FINITE = "look for heights, loads or moduli that are not finite or too far apart"
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
+USEFUL = 0.1  # accuracy: tolerances above it say nothing of a contact
 MANY_CELLS = 1.5  # tuning: by which a surface moves in a long step
 
 
@@ -57,7 +58,7 @@ def of_solve(
     `moved` is by how many cells the surface went in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
-    changes = ", or ".join(_changes(scene, step, failed, last, h, moved))
+    changes = ", or ".join(_changes(scene, step, failed, last, h, moved)) or FINITE
     return StepError(f"{where(scene, step)}: the contact solve {failed.failure}{also}; {changes}")
 
 
@@ -69,7 +70,8 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
         return
     reach = reach_of(scene, last, h, last.u.dtype)
     if numerics.tolerance < reach:
-        yield f"{numerics.precision} precision reaches only about {reach:.1g} here: try a larger numerics.tolerance"
+        change = "try a larger numerics.tolerance" if reach <= USEFUL else FINITE
+        yield f"{numerics.precision} precision reaches only about {reach:.1g} here: {change}"
         return
     if "max_iterations" in failed.failure:
         yield f"try numerics.max_iterations above {numerics.max_iterations}"
@@ -77,7 +79,8 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
         yield f"try smaller steps: in this one the surface moves by {moved:.3g} cells"
     elif step.dt > 0.0:
         yield "try smaller steps"
-    yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
+    if last.certificate.worst <= USEFUL:
+        yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
 
 
 def reach_of(scene: Scene, last: Contact, h: Array, dtype: DTypeLike) -> float:

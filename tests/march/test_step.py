@@ -214,7 +214,12 @@ def test_an_approach_beyond_full_contact_is_refused_before_the_first_step(bench:
 
 RUBBER = {"model": "elastic", "shear_modulus": 1e6}
 ADVICE: list[tuple[dict[str, Any], dict[str, Any], str]] = [
-    ({"max_iterations": 1}, {}, "try numerics.max_iterations above 1, or try numerics.tolerance above "),
+    ({"max_iterations": 1}, {}, "try numerics.max_iterations above 1"),
+    (
+        {"max_iterations": 2, "tolerance": 1e-9},
+        {},
+        "try numerics.max_iterations above 2, or try numerics.tolerance above ",
+    ),
     ({"tolerance": 1e-18}, {}, "double precision reaches only about "),
     ({"tolerance": 1e-18, "precision": "mixed"}, {}, "mixed precision reaches only about "),
 ]
@@ -223,8 +228,10 @@ ADVICE: list[tuple[dict[str, Any], dict[str, Any], str]] = [
 @pytest.mark.parametrize(("numerics", "changes", "advice"), ADVICE)
 def test_advice(numerics: dict[str, Any], changes: dict[str, Any], advice: str) -> None:
     data = {"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [{"pressure": 1e4}], "numerics": numerics}
-    with pytest.raises(StepError, match=re.escape(advice)):
+    with pytest.raises(StepError, match=re.escape(advice)) as failure:
         marched(data | changes)
+    asked = re.search(r"numerics\.tolerance above (\S+)", str(failure.value))
+    assert not asked or float(asked[1]) <= 0.1
 
 
 def test_advice_on_long_steps() -> None:
@@ -234,7 +241,7 @@ def test_advice_on_long_steps() -> None:
     with pytest.raises(
         StepError,
         match=r"step 2 .*; try numerics\.max_iterations above \d+, or try smaller steps: in this "
-        r"one the surface moves by 2\.\d+ cells, or ",
+        r"one the surface moves by 2\.\d+ cells$",
     ):
         run(march, [lambda now: setattr(now.scene.solver, "max_iterations", now.row.step == 0 and 500)])
 
