@@ -25,7 +25,7 @@ from ..storage.provenance import Link, read_budget, read_chain
 from . import pull_off, slide, sweep_table, theory_beside, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
-SHOWN = 20  # tuning: numbers of one name at most
+SHOWN = 20  # tuning: numbers of one name, or failed cases, at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
 
 
@@ -230,9 +230,14 @@ def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    states = Counter(str(row["state"]) for row in sweep_table.read(path))
+    rows = sweep_table.read(path)
+    states = Counter(str(row["state"]) for row in rows)
     counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
     yield f"  sweep of {states.total()} cases: {counts}"
+    failed = [int(row["case"]) for row in rows if row["state"] == "failed"]
+    yield from (f"  case {case} failed: {sweep_table.why_failed(path.parent, case)}" for case in failed[:SHOWN])
+    if len(failed) > SHOWN:
+        yield f"  and {len(failed) - SHOWN} more"
 
 
 def _study(path: Path, claims: dict[str, Claim]) -> Iterator[str]:

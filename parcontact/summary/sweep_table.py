@@ -16,6 +16,7 @@ from typing import Any
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
+from ..job.reading import CASES
 from ..storage import curve_points, files, marker, tables
 from . import pull_off, slide
 
@@ -101,6 +102,13 @@ def fail(case: Case, reason: str) -> None:
             path.write_text(f"{reason}\n")
         else:
             path.unlink(missing_ok=True)
+
+
+def why_failed(directory: Path, number: int) -> str:
+    """Return the first sentence of why a case of a sweep has failed, '' if that is not known."""
+    with suppress(OSError):
+        return (directory / CASES / f"{number:03d}" / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
+    return ""
 
 
 def _row(case: Case) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, lis
     def act(job: Job, slab: Slab) -> int:
         begun.append(job.surface[0].seed)  # type: ignore[union-attr]
         if (code := codes.get(len(begun) - 1, 0)) == 1:
-            raise RunError("the third law does not hold")
+            raise RunError("the third law does not hold; try another planet")
         return code
 
     return go(cases, act), begun
@@ -58,8 +58,10 @@ def test_a_case_that_fails_does_not_stop_the_others(
     cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert seeds_done(cases, {1: 1}) == (1, [1, 2, 3, 1, 2, 3])
-    assert capsys.readouterr().err == "parcontact: case 1: the third law does not hold\n"
+    assert capsys.readouterr().err == "parcontact: case 1: the third law does not hold; try another planet\n"
     assert [row["state"] for row in table()] == ["-", "failed", "-", "-", "-", "-"]
+    told, _ = info.describe(cases[0].job.output.directory.parent.parent)
+    assert told.splitlines()[-1] == "  case 1 failed: the third law does not hold"
     assert seeds_done(cases, {})[0] == 0
     assert [row["state"] for row in table()] == ["-"] * 6
 
