@@ -2,7 +2,8 @@
 
 Those of a sweep of friction curves are over velocity, or what else has several values in each curve.
 
-Points are cases, lines their means over seeds and other keys that do not tell lines apart.
+Points are cases, lines their means over seeds and other keys that do not tell lines apart. A colour is a value of the
+second key, in all panels; what is drawn of it has its own marks and dashes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,7 @@ UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N"
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
 MAX_LINES = 3  # of a second key
+MARKERS, DASHES = ("o", "s"), ("--", ":")  # of means and theories of the first and the second column of a panel
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 PANELS = (  # measures and their columns by the names of lines
     ("friction", "friction coefficient", {"highest": "mu_max", "dynamic": "mu_dyn"}),
@@ -54,12 +56,14 @@ def charts(directory: Path) -> list[Chart]:
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, title, columns in panels:
         split = _split_curves(rows, key) if panels is CURVE_PANELS else _split(rows, others)
-        wanted = [(name, part, own, column) for part, own in split for name, column in columns.items()]
-        series = [line for k, one in enumerate(wanted) for line in _make_lines(*one, key, style.line(k)["color"])]
+        series, lines = list[Series](), list(split)
+        for j, (part, own) in enumerate(lines):
+            for k, (name, column) in enumerate(columns.items()):
+                look = {"color": style.line(j if len(lines) > 1 else k)["color"]}
+                theory = f"theory, {name}" if len(columns) > 1 else "theory"
+                series += _make_lines((name + part, theory), own, column, key, look, k)
         if series:
-            dots = next((k for k, one in enumerate(series) if one.look.get("marker") == "."), None)
-            if dots is not None:
-                series[dots] = replace(series[dots], name="each case")
+            series = list(_name_once(series))
             values = np.concatenate([one.x for one in series])
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
             found.append(Chart(panel, x, Axis(title), series, log_x=wide))
@@ -117,18 +121,28 @@ def _named(key: str, value: Any) -> str:
     return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
 
 
-def _make_lines(name: str, part: str, rows: Rows, column: str, key: str, color: str) -> Iterator[Series]:
-    """Yield means as a line with its points, all cases as small dots, and the theory."""
+def _make_lines(
+    names: tuple[str, str], rows: Rows, column: str, key: str, look: dict[str, Any], number: int
+) -> Iterator[Series]:
+    """Yield means as a line with its points, all cases as small dots, and the theory, of the column of a number."""
     theirs = "contact_area" if column == CORRECTED else column
     x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
         at, means = _average(x[there], y[there])
-        yield Series(name + part, at, means, {"marker": "o", "linestyle": "-", "color": color})
+        yield Series(names[0], at, means, look | {"marker": MARKERS[number], "linestyle": "-"})
         if at.size < there.sum():
-            look = {"marker": ".", "linestyle": "none", "color": color, "alpha": 0.5, "markersize": 3}
-            yield Series("", x[there], y[there], look)
+            dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
+            yield Series("each case", x[there], y[there], look | dots)
     if (there := np.isfinite(theory)).any():
-        yield Series("theory" + part, *_average(x[there], theory[there]), {"linestyle": "--", "color": color})
+        yield Series(names[1], *_average(x[there], theory[there]), look | {"linestyle": DASHES[number]})
+
+
+def _name_once(series: Sequence[Series]) -> Iterator[Series]:
+    """Yield lines of which only the first with a name has it: dots and theories are alike but for their colours."""
+    known = set[str]()
+    for one in series:
+        yield replace(one, name="" if one.name in known else one.name)
+        known.add(one.name)
 
 
 def _average(x: Array, y: Array) -> tuple[Array, Array]:

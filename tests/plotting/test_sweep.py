@@ -38,7 +38,7 @@ def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
     assert cases.y.tolist() == [3.0, 5.0, 7.0]
     assert theory.y.tolist() == [0.5, 0.7]
     assert {one.look["color"] for one in (highest, cases, theory)} == {highest.look["color"]}
-    assert [one.name for one in (highest, theory, *dynamic)] == ["highest", "theory", "dynamic", ""]
+    assert [one.name for one in (highest, theory, *dynamic)] == ["highest", "theory, highest", "dynamic", ""]
     assert np.allclose(area.series[0].y, 0.2)
 
 
@@ -91,15 +91,21 @@ def test_dots_of_cases_have_a_key(tmp_path: Path, drawn: list[Figure]) -> None:
     plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 7.0))], Options())
     legends = [figure.axes[0].get_legend() for figure in drawn]
     names = [[text.get_text() for text in legend.get_texts()] for legend in legends if legend is not None]
-    assert names == [["highest", "each case", "theory", "dynamic"], ["highest", "theory", "dynamic"]]
+    assert names == [["highest", "each case", "theory, highest", "dynamic"], ["highest", "theory, highest", "dynamic"]]
     assert not touching(drawn[0])
 
 
 def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Three values of a second key, means, cases and theories: thirteen names on the page, and none over a line."""
+    """Three values of a second key, means, cases and theories of all: none is over a line or over another key, and a
+    colour means the same value in both panels."""
+    head = (*HEAD, "theory_mu_max", "theory_mu_dyn", "theory_contact_area")
     rows = [case(v, seed, v * seed + 1e3 * size, size) for v in (1.0, 2.0) for seed in (1, 2) for size in SIZES]
-    plot([saved(tmp_path, *rows)], Options())
+    plot([saved(tmp_path, *((*row, 0.4, 0.3) for row in rows), head=head)], Options())
     (figure,) = drawn
+    keys = [legend.get_window_extent() for axes in figure.axes if (legend := axes.get_legend())]
+    assert keys[1].y1 < keys[0].y0
+    colours = [{(str(line.get_label())[-4:], line.get_color()) for line in axes.lines} for axes in figure.axes]
+    assert {each for each in colours[0] if "mm" in each[0]} == {each for each in colours[1] if "mm" in each[0]}
     assert not touching(figure)
     assert not outside(figure)
     for axes in figure.axes:
