@@ -104,7 +104,12 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
         ),
         ("gap", Axis("mean gap", UNITS["mean_gap"]), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
         ("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": columns["max_pressure"]}, True),
-        ("load", load_axis, {"": load}, run.lasts and np.ptp(load) > 1e-9 * np.abs(load).max()),
+        (
+            "load",
+            load_axis,
+            {"": load},
+            run.lasts and along.axis != load_axis and np.ptp(load) > 1e-9 * np.abs(load).max(),
+        ),
         (
             "temperature",
             Axis("temperature rise", "K"),

@@ -36,6 +36,7 @@ LOOKS = {
     "height": Look("m", "cividis", note=" (up is into the body)"),
     "temperature": Look("K", "hot", note=" rise"),
 }
+TENSION = "RdBu_r"  # colours of pressures that pull at some points
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
@@ -114,12 +115,14 @@ def _find_window(pressure: Array | None) -> Window:
 def find_range(values: Array) -> tuple[float, float]:
     """Return the range of the colours: from 0 if nothing is negative; few very high points do not darken all others.
 
+    Where pressures pull at some points and push at others, both sides are seen: the high points are those above 0.
     Where no point has a value the range is empty, from inf to -inf.
     """
     finite = values[np.isfinite(values)]
     if not finite.size:
         return np.inf, -np.inf
-    most, highest = float(np.percentile(finite, BRIGHTEST)), float(finite.max())
+    above = finite[finite > 0.0] if finite.min() < 0.0 < finite.max() else finite
+    most, highest = float(np.percentile(above, BRIGHTEST)), float(above.max())
     return min(float(finite.min()), 0.0), highest if highest < OUTLIER * most else most
 
 
@@ -128,6 +131,8 @@ def _draw_map(
 ) -> Callable[[Array], None]:
     """Draw an empty map in colours; returns what fills it. Colours of one number have one tick, of none no scale."""
     look, (low, high) = LOOKS[name], limits
+    if name == "pressure" and low < 0.0:  # white where nothing pulls or pushes
+        look, low, high = look._replace(colors=TENSION), min(low, -high), max(-low, high)
     width = 1.0 if high < low else (high - low or abs(high) or 1.0)
     norm = Normalize(low, low + width) if low <= high else Normalize(0.0, width)
     x, y = (np.append(along, 2 * along[-1] - along[-2]) for along in points)

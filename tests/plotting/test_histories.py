@@ -156,3 +156,10 @@ def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: 
     assert len(legend.get_texts()) == 5
     drawn[0].draw_without_rendering()
     assert legend.get_window_extent().y0 >= found["energy"].get_window_extent().y1
+
+
+def test_a_load_is_not_drawn_over_itself(tmp_path: Path, drawn: list[Figure]) -> None:
+    out = ran(tmp_path, SPHERE + ELASTIC + "history: [{force: {from: 0, to: 0.1}, duration: 1.0, time_step: 0.25}]\n")
+    for over, there in (("time", 1), ("load", 0)):
+        plots.plot([out], plots.Options(over=over))
+        assert [axes.get_ylabel()[:5] for axes in drawn[-1].axes].count("force") == there

@@ -136,3 +136,14 @@ def test_contacts_that_stick_are_closed_where_their_gap_is_zero() -> None:
     assert np.isnan(maps.mask("gap", gap, pressure)).tolist() == [[True, True, False, False]]
     assert np.array_equal(maps.mask("pressure", pressure, None), pressure)
     assert np.isnan(maps.mask("gap", gap, np.abs(pressure))).all()
+
+
+def test_the_colours_of_pressures_that_pull_and_push_show_both() -> None:
+    """Where most of the box is open, too: the range has the lowest, and the highest but for few, and 0 is white."""
+    pressure = np.zeros((64, 64))
+    pressure[8:12, 8:12], pressure[9:11, 9:11] = -2.0, 5.0
+    assert maps.find_range(pressure) == (-2.0, 5.0)
+    assert maps.find_range(-np.abs(pressure)) == (-5.0, 0.0)
+    axes = Figure().subplots()
+    maps._draw_map(axes, "pressure", (np.arange(65.0), np.arange(65.0)), (-2.0, 5.0))
+    assert mesh(axes).norm(np.zeros(1)) == 0.5
