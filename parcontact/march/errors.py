@@ -210,7 +210,8 @@ def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony |
     cells = min(waves) / max(cell) if waves else None
     straight = 1 in job.grid.points or _ridges(job.surface)
     alike = 1 in job.grid.points or all(isinstance(shape, REGULAR) for shape in job.surface)
-    return RunProperties(cells, straight, folded, exponential, prony, cell, job.grid.boundary == "free", alike)
+    free, measured = job.grid.boundary == "free", setup.shortest is not None
+    return RunProperties(cells, straight, folded, exponential, prony, cell, free, alike, measured)
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:

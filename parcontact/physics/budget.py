@@ -28,8 +28,7 @@ the two views over the slope of the surface, cells per shortest wave, and cells 
 mostly the error of friction by slopes, so that all of it counts in marches, and BY_ENERGY of it here. Of 223 other
 states of rough surfaces and spheres the estimate is then half of the error at least in 99.6 %, 0.42 in one, and 5
 times in the median; with all of it that was 7.7. Contacts of waves and cylinders are alike, and so are their errors, of
-up to 1.2 of the difference: all of it counts. With less than 4 cells, and with maps on grids that lack their shortest
-waves, both views may be wrong by 5 to 50 %: what cells per wave make of marches is then added in full.
+up to 1.2 of the difference: all of it counts. Of cells per wave a share counts (`mesh_error`).
 """
 
 import math
@@ -51,9 +50,8 @@ SOLVER_AREA, SOLVER_AREA_POWER = 0.1, 0.7  # times this power of it
 PENETRATING = 0.8  # of the points that penetrate without pressure are missing in the contact, but for those in excess
 CORRECTED_ORDER = 1.0  # of the corrected area
 NOISE = 0.4  # of the slope of the surface, times the complementarity: tangential force where there is no friction
-BY_ENERGY, BY_ENERGY_WAVES = 0.3, 0.2  # of the difference of the views, and of what waves make, in steady sliding
+BY_ENERGY = 0.3  # of the difference of the views, in steady sliding
 PRESSURES = 0.3  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
-FEW_WAVES = 6.0  # power of 4 cells over those of the shortest wave, with which that share rises to all of it
 ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
 AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
 LEAST_WAY = 1e-60  # m: smaller weights are those of rest
@@ -147,11 +145,10 @@ def _with_interface(
 
 
 def _steady_friction(run: RunProperties, observed: StepObservation, points: int) -> Parts:
-    share = min(max(1.0, 4.0 / (run.cells_per_wave or 4.0)) ** FEW_WAVES * BY_ENERGY_WAVES, 1.0)
     apart = observed.views_apart * (1.0 if run.alike else BY_ENERGY)
     views = apart / max(observed.friction, PRESSURES * observed.slope)
     lost = lost_at_edges(run, observed, points, steady=True)
-    along, across = friction_by_mesh(run, observed, points, share)
+    along, across = friction_by_mesh(run, observed, points, steady=True)
     solver = SOLVER_FRICTION * observed.complementarity / count_spots(run, observed, points) ** SPOTS_POWER
     return Parts(solver, 0.0, run.folded, max(views, lost) + along + across, across, lost)
 
@@ -160,7 +157,7 @@ def _friction(run: RunProperties, observed: StepObservation, points: int, time: 
     spots, steep = count_spots(run, observed, points), max(1.0, observed.slope / observed.friction)
     solver = SOLVER_FRICTION * observed.complementarity * math.sqrt(steep) / spots**SPOTS_POWER
     noise = NOISE * max(observed.complementarity, ROUNDING) * observed.slope / observed.friction / math.sqrt(spots)
-    along, across = friction_by_mesh(run, observed, points)
+    along, across = friction_by_mesh(run, observed, points, steady=False)
     lost = lost_at_edges(run, observed, points, steady=False)
     mesh = max(observed.views_apart / observed.friction, lost) + along + across
     return Parts(max(solver, noise), time, run.folded, mesh, across, lost)

@@ -68,7 +68,7 @@ class RunProperties:
     `cells_per_wave` of the shortest wave of a rough surface, None without one; `straight`: on a grid of one row or
     column every edge of contact follows the grid; `folded`: the bound; `exponential`: the integrator; `prony`: what
     relaxes, None of an elastic body; `cell`: its sides [m]; `free`: the box; `alike`: all contacts are, as
-    those of waves. `cells_per_wave` counts the longer sides.
+    those of waves; `measured`: the surface has a map. `cells_per_wave` counts the longer sides.
     """
 
     cells_per_wave: float | None
@@ -79,6 +79,7 @@ class RunProperties:
     cell: Vector = (1.0, 1.0)
     free: bool = False
     alike: bool = False
+    measured: bool = False
 
     @property
     def mean_cell(self) -> float:

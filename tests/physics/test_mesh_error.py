@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from parcontact.physics.budget import ErrorSums, estimate
+from parcontact.physics.mesh_error import friction_by_mesh
 from parcontact.physics.time_error import RunProperties, StepObservation, count_spots, spot_radius
 
 KNOWN = RunProperties(8.0, False, 1e-4, True)
@@ -33,6 +34,22 @@ def test_the_mesh_along_the_sliding_and_across_it(way: tuple[float, float], alon
     mesh = EDGES + 0.25 / radius**1.6 / spots**0.5
     assert found.area.mesh == pytest.approx(mesh)
     assert found.area.across == pytest.approx(mesh * (0.8 if along > across else 0.2))
+
+
+@pytest.mark.parametrize(("cells", "counts"), [(8.0, 0.2), (3.5, 0.2 * (4.0 / 3.5) ** 6), (2.5, 1.0)])
+def test_waves_of_steady_sliding(cells: float, counts: float) -> None:
+    """Of the module of `mesh_error`: of what waves make in a march a fifth, by the root of what is open, a point of
+    10 000 at least. A map may lack waves, so that it counts in full contact, too, and rises below 4 cells."""
+    for area in (0.1, 0.9999, 1.0):
+        seen, known = replace(SEEN, area=area, corrected=area, way=(1.0, 0.0)), replace(KNOWN, cells_per_wave=cells)
+        bare = sum(friction_by_mesh(replace(known, cells_per_wave=None), seen, 10_000, steady=True))
+        march = sum(friction_by_mesh(known, seen, 10_000, steady=False)) - bare
+        rough, measured = (
+            sum(friction_by_mesh(replace(known, measured=map_), seen, 10_000, steady=True)) - bare
+            for map_ in (False, True)
+        )
+        assert measured == pytest.approx(counts * march)
+        assert rough == pytest.approx(0.2 * march * math.sqrt(max(1.0 - area, 1e-4)))
 
 
 def test_squares_are_as_at_rest() -> None:
