@@ -19,13 +19,17 @@ MAX_STEPS = 100  # accuracy: a dozen do
 @dataclass(frozen=True)
 class FreeInverse:
     """The inverse of `free`, with the operators of the body that repeats itself; the energy of what is wrong with it is
-    less than that of the whole by the square of the `tolerance`. It works in four `maps`."""
+    less than that of the whole by the square of the `tolerance`. It works in four `maps`.
+
+    Without `means` it has no load, and is 0 for mean values: the inverse on pressures whose mean is 0.
+    """
 
     slab: Slab
     free: Operator
     repeated: GapOperators
     tolerance: float
     maps: tuple[Array, Array, Array, Array]
+    means: bool
 
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""
@@ -48,9 +52,9 @@ class FreeInverse:
         return out
 
     def _precondition(self, r: Array, z: Array) -> Array:
-        (total,) = self.slab.sum(float(r.sum()))
         self.repeated.inverse.apply(r, z)
-        z += total / self.slab.points / self.repeated.least_mean
+        if self.means:
+            z += self.slab.sum(float(r.sum()))[0] / self.slab.points / self.repeated.least_mean
         return z
 
     def _product(self, a: Array, b: Array) -> float:

@@ -7,8 +7,9 @@ same, so that one pass or two do as a rule.
 
 A contact that fills its box may be softer on B than on A, in its mean or in waves whose ends meet across the edges. An
 equilibrium that is stable on A then is none on B: passes jump over it, and go round between the two states beside it.
-Under an approach such a solve begins again from its start with the operator A itself, whose inverse takes some
-iterations (`free_inverse`). So E falls, and no equilibrium is passed over.
+Such a solve begins again from its start with the operator A itself, whose inverse takes some iterations
+(`free_inverse`). So E falls, and no equilibrium is passed over. Under a given mean pressure P, `p = K (g + h - P A 1) +
+P` with the inverse K of A on pressures whose mean is 0.
 """
 
 import math
@@ -26,8 +27,7 @@ from .iterate import SHARPER, GapSolution
 from .law import Law
 from .solver import GapSolver
 
-MAX_PASSES = 100  # accuracy: of a free body; one to three do as a rule, and many where it is about to snap
-MANY = 12  # tuning: passes after which a solve under an approach begins again, with the operator of the body itself
+MAX_PASSES = 12  # tuning: of a free body, before its own operator is used; one to three do as a rule
 LEFT = 0.8  # accuracy: of the tolerance, for such a solve; the rest is for the inverse
 DIGITS = 0.01  # accuracy: of the inverse, over the tolerance
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
@@ -65,10 +65,10 @@ class StickingSolver:
             np.add(gap, heights, out=u)
             u += found.d
             return self._contact(found, out, found.iterations), found.detached
-        start, most = self.workspace.pressure, MANY if isinstance(control, Approach) else MAX_PASSES
+        start = self.workspace.pressure
         start[...] = gap
-        found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance, most)
-        if found.failure and isinstance(control, Approach):
+        found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance)
+        if found.failure:
             gap[...] = start
             found = self._solve_free(law, heights, control, gap, lag, out, tolerance)
             iterations += found.iterations
@@ -83,12 +83,11 @@ class StickingSolver:
         lag: Array,
         out: Array,
         tolerance: float,
-        most: int,
     ) -> tuple[GapSolution, int]:
-        """Repeat the solve of a free body until what is lagged changes no more, in so many passes at most; returns the
-        solution and the iterations of all passes; collective."""
+        """Repeat the solve of a free body until what is lagged changes no more; returns the solution and the iterations
+        of all passes; collective."""
         iterations, share, last = 0, 1.0, lag
-        for passes in range(1, most + 1):
+        for passes in range(1, MAX_PASSES + 1):
             found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
             iterations += found.iterations
             found, change, worst = self._compare(heights, control, gap, found, out)
@@ -97,13 +96,13 @@ class StickingSolver:
             lag += share * change
             if found.failure or found.detached or worst <= tolerance:
                 return found, iterations
-        return replace(found, failure=_unsettled(f"{most} passes", worst, tolerance)), iterations
+        return replace(found, failure=_unsettled(f"{MAX_PASSES} passes", worst, tolerance)), iterations
 
     def _solve_free(
         self,
         law: Law,
         heights: Array,
-        control: Approach,
+        control: Control,
         gap: Array,
         lag: Array,
         out: Array,
@@ -113,10 +112,16 @@ class StickingSolver:
         assert self.free is not None
         work, repeated = self.workspace, self.gaps.operators
         maps = work.pressure, work.displacement, work.other_displacement, lag  # in double precision with adhesion
-        inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps)
-        operators = repeated._replace(operator=self.free, inverse=inverse, mean=math.inf, least_mean=math.inf)
-        found = self.gaps.solve(law, heights + control.value, Approach(0.0), gap, LEFT * tolerance, operators)
-        found = replace(found, d=control.value)
+        inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps, isinstance(control, Approach))
+        operators = repeated._replace(operator=self.free, inverse=inverse)
+        if isinstance(control, Approach):
+            operators = operators._replace(mean=math.inf, least_mean=math.inf)
+            found = self.gaps.solve(law, heights + control.value, Approach(0.0), gap, LEFT * tolerance, operators)
+            found = replace(found, d=control.value)
+        else:
+            work.displacement.fill(1.0)
+            lifted = heights - control.value * self.free.apply(work.displacement, work.displacement)
+            found = self.gaps.solve(law, lifted, control, gap, LEFT * tolerance, operators)
         found, _, worst = self._compare(heights, control, gap, found, out)
         repeated.operator.apply(out, lag)
         np.subtract(work.displacement, lag, out=lag)

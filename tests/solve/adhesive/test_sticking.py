@@ -14,7 +14,7 @@ from parcontact.solve.adhesive.iterate import GapOperators
 from parcontact.solve.adhesive.law import Law
 from parcontact.solve.adhesive.solver import GapSolver
 from parcontact.solve.adhesive.sticking import StickingSolver
-from parcontact.solve.problem import Approach, Operator
+from parcontact.solve.problem import Approach, Control, MeanPressure, Operator
 from parcontact.solve.workspace import Workspace
 
 TIGHT = 1e-6
@@ -37,12 +37,18 @@ def stiffness(points: int) -> Map:
     return np.linalg.inv(np.array(columns))
 
 
-def fallen(law: Law, heights: Map, approach: float, gap: Map) -> Map:
-    """The gap to which the energy falls from another one, in steps that are too short to pass over an equilibrium."""
-    k, lifted, g = stiffness(len(heights)), heights.ravel() + approach, gap.ravel()
+def fallen(law: Law, heights: Map, control: Control, gap: Map) -> Map:
+    """The gap to which the energy falls from another one, in steps that are too short to pass over an equilibrium.
+    Under a load the body is free to move evenly, which the pressures of an even displacement do not resist."""
+    k, h, g = stiffness(len(heights)), heights.ravel(), gap.ravel()
+    even = k.sum(axis=1)
+    if isinstance(control, Approach):
+        given = even * control.value
+    else:
+        k, given = k - np.outer(even, even) / even.sum(), even / even.mean() * control.value
     step = 1.0 / np.linalg.eigvalsh(k)[-1]
     for _ in range(100_000):
-        pushed = k @ (g + lifted) + law.strength * np.exp(-g / law.range)
+        pushed = k @ (g + h) + given + law.strength * np.exp(-g / law.range)
         last, g = g, np.maximum(g - step * pushed, 0.0)
         if abs(g - last).max() < 1e-13:
             break
@@ -50,37 +56,55 @@ def fallen(law: Law, heights: Map, approach: float, gap: Map) -> Map:
 
 
 @pytest.mark.mpi
+@pytest.mark.parametrize("means", [True, False])
 @pytest.mark.parametrize("points", [4, 24])
-def test_inverse_of_a_free_body(comm: MPI.Intracomm, points: int) -> None:
-    """It gives back the pressure that was applied. Its tolerance is that of the energy's root, which bounds pressures
-    by the root of the largest compliance over the smallest: below 10 on these grids."""
+def test_inverse_of_a_free_body(comm: MPI.Intracomm, points: int, means: bool) -> None:
+    """It gives back the pressure that was applied, also but for what moves all points alike, where its load is 0. The
+    tolerance is that of the energy's root, which bounds pressures by the root of the largest compliance over the
+    smallest: below 10 on these grids."""
     slab, free, solver = sticking(comm, points)
-    p = slab.zeros()
-    p[...] = np.random.default_rng(1).normal(size=(points, points))[slab.rows]
+    p, pressures = slab.zeros(), np.random.default_rng(1).normal(size=(points, points))
+    p[...] = (pressures if means else pressures - pressures.mean())[slab.rows]
     u = free.apply(p, slab.zeros())
+    u += 0.0 if means else 3.0
     maps = slab.zeros(), slab.zeros(), slab.zeros(), slab.zeros()
-    back = FreeInverse(slab, free, solver.gaps.operators, 1e-9, maps).apply(u, u)
+    back = FreeInverse(slab, free, solver.gaps.operators, 1e-9, maps, means).apply(u, u)
     assert_allclose(back, p, rtol=0.0, atol=1e-8 * points)
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("points", "law"), [(4, Law(0, 16.7, 1.16)), (7, Law(0, 32.2, 1.3))])
-def test_a_state_that_is_stable_on_the_free_body_alone(comm: MPI.Intracomm, points: int, law: Law) -> None:
-    """A wave that fills its box, about to snap. The body that repeats itself is softer, as neighbours are across the
+@pytest.mark.parametrize(
+    ("points", "law", "control"),
+    [
+        (4, Law(0, 16.7, 1.16), Approach(-3.0)),
+        (7, Law(0, 32.2, 1.3), Approach(-3.0)),
+        (4, Law(0, 5.4, 0.57), MeanPressure(0.7)),
+        (6, Law(0, 13.4, 0.81), MeanPressure(-2.1)),
+    ],
+    ids=str,
+)
+def test_a_state_that_is_stable_on_the_free_body_alone(
+    comm: MPI.Intracomm, points: int, law: Law, control: Control
+) -> None:
+    """A wave that fills its box, near a snap. The body that repeats itself is softer, as neighbours are across the
     edge, and passes go round. The gap is that of the matrix, to 30 tolerances: so near to a snap little moves much."""
-    heights, approach = np.tile(np.cos(2.0 * np.pi * np.arange(points) / points), (points, 1)), -3.0
-    start = np.maximum(-heights - approach, 0.0)
-    expected = fallen(law, heights, approach, start)
+    heights = np.tile(np.cos(2.0 * np.pi * np.arange(points) / points), (points, 1))
+    start = heights.max() - heights
+    if isinstance(control, Approach):
+        start = np.maximum(-heights - control.value, 0.0)
+    expected = fallen(law, heights, control, start)
     slab, free, solver = sticking(comm, points)
     gap, lag, p = slab.zeros(), slab.zeros(), slab.zeros()
     gap[...] = start[slab.rows]
-    contact, detached = solver.solve(law, heights[slab.rows], Approach(approach), gap, lag, p)
+    contact, detached = solver.solve(law, heights[slab.rows], control, gap, lag, p)
     assert not contact.failure
     assert not detached
     assert contact.certificate.worst <= TIGHT
     assert_array_equal(gap == 0.0, expected[slab.rows] == 0.0)
     assert 0.0 < np.mean(expected == 0.0) < 1.0
     assert_allclose(gap, expected[slab.rows], rtol=0.0, atol=30.0 * TIGHT * law.range)
-    assert_allclose(free.apply(p, slab.zeros()), gap + heights[slab.rows] + approach, rtol=0.0, atol=TIGHT)
+    given = contact.d if isinstance(control, Approach) else slab.sum(float(p.sum()))[0] / slab.points
+    assert_allclose(given, control.value, rtol=1e-12)
+    assert_allclose(free.apply(p, slab.zeros()), gap + heights[slab.rows] + contact.d, rtol=0.0, atol=10.0 * TIGHT)
     repeated = solver.gaps.operators.operator.apply(p, slab.zeros())
     assert_allclose(lag, free.apply(p, slab.zeros()) - repeated, rtol=0.0, atol=TIGHT)
