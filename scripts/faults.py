@@ -28,7 +28,6 @@ from typing import Any
 import campaign
 import h5py
 import runs
-from mpi4py import MPI
 
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
@@ -231,7 +230,7 @@ def datasets(file: h5py.File) -> list[h5py.Dataset]:
 def contents(path: Path) -> Any:
     """All that a checkpoint says; raises InputError for one that is not sound."""
     found = checkpoint.inspect(path)
-    if problem := checkpoint.verify(found, Slab(MPI.COMM_SELF, *found.shape[::-1])):
+    if problem := checkpoint.verify(found, Slab.alone(*found.shape[::-1])):
         raise InputError(problem)
     with h5py.File(path) as file:
         maps = {name: file[name][...].tobytes() for name in found.maps}

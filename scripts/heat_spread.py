@@ -8,8 +8,6 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from mpi4py import MPI
-
 from parcontact import job, scene
 from parcontact.parallel.slab import Slab
 from parcontact.physics.flash import flash_of, spread_over
@@ -23,7 +21,7 @@ PRESSURE, COLD = 5e5, 20.0
 
 def states(*overrides: str) -> SteadySliding:
     made = job.load(JOB, overrides)
-    return SteadySliding(scene.set_up(made, Slab(MPI.COMM_SELF, *made.grid.points)))
+    return SteadySliding(scene.set_up(made, Slab.alone(*made.grid.points)))
 
 
 def at_depth(sliding: SteadySliding, point: Point, times: float) -> float:

@@ -16,7 +16,6 @@ from typing import Any
 
 import campaign
 import numpy as np
-from mpi4py import MPI
 from runs import ROOT
 
 sys.path.insert(0, str(ROOT / "tests"))
@@ -59,7 +58,7 @@ def drawn(random: np.random.Generator) -> tuple[dict[str, Any], float, float]:
 def trial(asked: Any, counts: Counter[str], calls: list[float], number: int) -> Iterator[str]:
     made, speed, pressure = drawn(np.random.default_rng([asked.seed, number]))
     points = made["grid"]["points"]
-    sliding = SteadySliding(scene.set_up(job.load(made), Slab(MPI.COMM_SELF, points, points)))
+    sliding = SteadySliding(scene.set_up(job.load(made), Slab.alone(points, points)))
     point = sliding.solve((speed, 0.0), pressure)
     counts["solved"] += 1
     calls.append(point.operator_calls)

@@ -6,7 +6,6 @@ from pathlib import Path
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from mpi4py import MPI
 
 from parcontact import job
 from parcontact.__main__ import main
@@ -55,7 +54,7 @@ def ran(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "job.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'out'}"])
-    assert runner.run(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points), Options(quiet=True)) == 0
+    assert runner.run(loaded, Slab.alone(*loaded.grid.points), Options(quiet=True)) == 0
     return tmp_path / "out"
 
 

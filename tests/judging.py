@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact import scene
@@ -31,7 +30,7 @@ def of_file(path: Path, heights: NDArray[np.floating], **sections: Any) -> list[
     np.save(path, heights)
     grid = {"points": list(heights.shape[::-1]), "size": 1e-3}
     job = job_of({"shape": "file", "path": str(path)}, [{"pressure": 1e4}], grid=grid, **sections)
-    return sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    return sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points)))
 
 
 def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.floating]:
@@ -48,7 +47,7 @@ def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.flo
 
 def run(job: Job, steps: int | None = None) -> list[str]:
     """What is said of the contacts of a job's steps."""
-    march = March(scene.build(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    march = March(scene.build(job, Slab.alone(*job.grid.points)))
     watch, said = sanity.ContactWatch(job.numerics.strict, Timeline.of(job)), []
     for step in list(Timeline.of(job))[:steps]:
         said += watch.judge(step.number, march.advance(step).measures)

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact import job, scene
@@ -18,7 +17,7 @@ Fields = dict[str, NDArray[Any]]
 def run(path: Path, *overrides: str) -> list[tuple[Row, Fields]]:
     """What each step of a job gave: its row and fields. The steps of these jobs are static solves."""
     loaded = job.load(path, overrides)
-    ready = March(scene.build(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points)))
+    ready = March(scene.build(loaded, Slab.alone(*loaded.grid.points)))
     steps = []
 
     def note(state: March) -> None:

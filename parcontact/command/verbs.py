@@ -81,14 +81,13 @@ def _doubts(job: Job) -> list[str]:
     """Return the doubts about a job, also those that only a look at heights and measured moduli raises."""
     if not job.depends_on_heights and not job.measured:
         return list(job.warnings)
-    from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..scene import sanity, set_up
     from ..scene.measured_range import describe_beyond
 
     if not sanity.is_quickly_made(job):
         return [*job.warnings, *describe_beyond(job)]
-    setup = set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    setup = set_up(job, Slab.alone(*job.grid.points))
     sanity.refuse_beyond_full_contact(setup)
     return sanity.find_doubts(setup)
 
@@ -170,7 +169,6 @@ def surface(options: argparse.Namespace) -> int:
     """Say what the surface of a job, or a measured map, is like; draw it."""
     from pathlib import Path
 
-    from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
     from ..report import road as drawing
     from ..scene import sanity, set_up
@@ -183,7 +181,7 @@ def surface(options: argparse.Namespace) -> int:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
     measured_maps.refuse_taken(options.start)
     job = measured_maps.load(given, options.set) if alone else _load(options)
-    base = set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    base = set_up(job, Slab.alone(*job.grid.points))
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..effects.relaxation import relaxation_of
-from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..physics import prony
 from ..scene import set_up
@@ -27,7 +26,7 @@ def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
     files that do not fit.
     """
     job = of_parts(surface=surface, grid=grid)
-    base = set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    base = set_up(job, Slab.alone(*job.grid.points))
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     return np.asarray(heights * base.units.height + base.surface.datum)
 

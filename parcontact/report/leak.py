@@ -99,7 +99,7 @@ class Gaps:
         """Return the gap [m] of the undeformed surface that just touches; raises InputError where its heights are not
         there any more."""
         job = reading.load(self.directory / RESOLVED)
-        setup = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+        setup = scene.set_up(job, Slab.alone(*job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 

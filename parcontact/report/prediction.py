@@ -15,7 +15,6 @@ from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..history.timeline import Span, Timeline
 from ..job import Job
-from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..physics.layer import Layer
 from ..physics.prony import Prony, complex_modulus
@@ -131,7 +130,7 @@ def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     settings = TheorySettings(gamma, waves)
     if not job.history:
         return _foretell_curve(job, settings)
-    path = write(job, predict(job, Slab(MPI.COMM_SELF, *job.grid.points), gamma, waves), settings)
+    path = write(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
     beside = theory_beside.describe(path.parent, job.history, job.grid.dx)
     return [f"Persson's theory, {settings.sentence}: {path}", *beside]
 

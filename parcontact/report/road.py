@@ -10,7 +10,6 @@ from ..errors import InputError, RunError
 from ..job import Job, Topography
 from ..job.sections import listing
 from ..parallel.fft import FFT
-from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
 from ..plotting import style, surface, units
 from ..printed import per_cent, quantity
@@ -63,7 +62,7 @@ def section(job: Job) -> Section:
     shapes = Table(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
     if job.grid.nx * job.grid.ny > MOST_POINTS:
         return Section("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
-    slab = Slab(MPI.COMM_SELF, *job.grid.points)
+    slab = Slab.alone(*job.grid.points)
     try:
         made, told = rigid_surface.make_surface(job, FFT(slab))
     except InputError as error:

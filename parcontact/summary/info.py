@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..job import Job
 from ..job.resolved import RESOLVED, shown_job
-from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..printed import quantity
 from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
@@ -67,7 +66,7 @@ def _checkpoint(path: Path) -> tuple[str, bool]:
     except InputError as error:
         return str(error), False
     ny, nx = contents.shape
-    problem = checkpoint.verify(contents, Slab(MPI.COMM_SELF, nx, ny))
+    problem = checkpoint.verify(contents, Slab.alone(nx, ny))
     lines = [f"{path}: checkpoint after step {contents.step}, t = {contents.time:g} s, {nx} x {ny} points"]
     lines += _runs(contents.chain)
     lines += [f"  map    {name} ({dtype.name})" for name, dtype in contents.maps.items()]

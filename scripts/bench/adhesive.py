@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from mpi4py import MPI
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
@@ -31,7 +30,7 @@ class Sticky:
     """Cold solves of the surface of `Cold` from an even gap, whose mean is given: the standard deviation of heights."""
 
     def __init__(self, points: int) -> None:
-        self.slab = Slab(MPI.COMM_SELF, points, points)
+        self.slab = Slab.alone(points, points)
         self.heights = Cold(points).heights
         self.heights -= self.heights.mean()
         work = STRENGTH * MODULUS * 8 / points

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 from runs import ROOT, Json, begun, marched
 
 import parcontact as pc
@@ -132,7 +131,7 @@ def folded(points: int, *_: object) -> Iterator[Line]:
 
 
 def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    base = scene.set_up(load(sliding_job(points, 1)), Slab(MPI.COMM_SELF, points, points))
+    base = scene.set_up(load(sliding_job(points, 1)), Slab.alone(points, points))
     for speed in (0.01, 0.3, 10.0):
         yield Line(
             f"cold at {speed:g} m/s: operator calls", SteadySliding(base).solve((speed, 0.0), 1e5).operator_calls

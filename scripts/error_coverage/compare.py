@@ -15,7 +15,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import runs
-from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.errors import InputError, RunError
@@ -104,7 +103,7 @@ def _within(errors: object, means: list[float]) -> dict[str, dict[str, float]]:
 
 def _steady(job: Job) -> Series:
     wanted = curve.request(job)
-    sliding = SteadySliding(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    sliding = SteadySliding(scene.set_up(job, Slab.alone(*job.grid.points)))
     speed, pressure, _ = wanted.points[0]
     point = sliding.solve(wanted.velocity(speed), pressure)
     means = [point.friction, point.measures.contact_area_corrected]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.errors import InputError
@@ -62,7 +61,7 @@ def test_a_range_above_the_roughness() -> None:
     for share, told in ((0.99, False), (1.01, True)):
         wave = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}
         one = job(surface=wave, grid={"points": 64, "size": 4e-4}, **sticking(0.05, 2e-6 * share))
-        found = sanity.find_doubts(set_up(one, Slab(MPI.COMM_SELF, 64, 64)))
+        found = sanity.find_doubts(set_up(one, Slab.alone(64, 64)))
         assert any("more than the 2e-06 m from the lowest to the highest" in text for text in found) == told
 
 
@@ -108,7 +107,7 @@ def test_approaches_beyond_full_contact_are_refused_before_the_first_step() -> N
     grid = {"points": n, "size": length}
     for boundary, share, refused in (("periodic", 0.999, False), ("periodic", 1.001, True), ("free", 1.001, False)):
         history = [{"approach": 0.0}, {"approach": {"from": 0.0, "to": share * closed}, "duration": 1.0}]
-        setup = set_up(job(grid={**grid, "boundary": boundary}, history=history), Slab(MPI.COMM_SELF, n, n))
+        setup = set_up(job(grid={**grid, "boundary": boundary}, history=history), Slab.alone(n, n))
         with (
             pytest.raises(InputError, match=rf"history\.1: an approach of .* at {closed:.6g} m; approach no further")
             if refused

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 from marching import marched
-from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.errors import InputError
@@ -102,7 +101,7 @@ def test_a_bell_over_the_velocity() -> None:
 
 def test_a_steady_state_has_it_too() -> None:
     built = job(interface=CONSTANT)
-    sliding = SteadySliding(scene.set_up(built, Slab(MPI.COMM_SELF, 32, 4)))
+    sliding = SteadySliding(scene.set_up(built, Slab.alone(32, 4)))
     measures = sliding.solve((SPEED, 0.0), PRESSURE).measures
     assert measures.friction_interface == pytest.approx(STRESS * measures.contact_area_corrected / PRESSURE, rel=1e-12)
     assert measures.friction > measures.friction_interface
@@ -127,7 +126,7 @@ def test_its_error_is_that_of_the_area(center: float) -> None:
                 interface=CONSTANT,
                 numerics={"tolerance": 5e-3},
             ),
-            Slab(MPI.COMM_SELF, 64, 64),
+            Slab.alone(64, 64),
         )
     )
     point = sliding.solve((SPEED, 0.0), pressure)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
-from mpi4py import MPI
 
 from parcontact.job.sections.part import Origin
 from parcontact.parallel.slab import Slab
@@ -25,7 +24,7 @@ def run(tmp_path: Path) -> Callable[..., Path]:
         output = {**changes.pop("output", {}), "directory": str(tmp_path / name)}
         planned = job(history=[PRESS], output=output, **changes).of(Origin(tmp_path / "job.yaml"))
         planned.path.write_text(planned.resolved())
-        assert runner.run(planned, Slab(MPI.COMM_SELF, NX, NY), Options(quiet=True)) == 0
+        assert runner.run(planned, Slab.alone(NX, NY), Options(quiet=True)) == 0
         return tmp_path / name
 
     return go

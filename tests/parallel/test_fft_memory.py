@@ -31,7 +31,7 @@ def test_footprint(
 @pytest.mark.parametrize("nx", [8, 14, 16, 300])
 def test_rows_of_waves_in_single_precision(nx: int) -> None:
     """On one rank they begin at cache lines of 64 bytes, unless they are shorter than one."""
-    spectrum = FFT(Slab(MPI.COMM_SELF, nx, 6), dtype=np.float32).spectrum
+    spectrum = FFT(Slab.alone(nx, 6), dtype=np.float32).spectrum
     assert spectrum.shape == (6, nx // 2 + 1)
     assert all(row.ctypes.data % 64 == 0 for row in spectrum) == (nx // 2 + 1 >= 8)
 

@@ -80,7 +80,7 @@ def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
     for comm in communicators:
         assert_allclose(march(comm, "exponential", 8, 200, 1e-2)[1][4], whole, rtol=1e-12)
     for ny in (1, 31, 64, 200, 1024, 4096):
-        pair = EmbeddedPair(Slab(MPI.COMM_SELF, 4, ny), ZenerBody(Slab(MPI.COMM_SELF, 1, 1), PRONY, "exponential"), DX)
+        pair = EmbeddedPair(Slab.alone(4, ny), ZenerBody(Slab.alone(1, 1), PRONY, "exponential"), DX)
         assert len(range(0, ny, pair.stride(1.0))) <= 2 * SAMPLED_ROWS
         assert len(range(0, ny, pair.stride(1.0))) >= min(ny, SAMPLED_ROWS)
         assert len(range(0, ny, pair.stride(0.01))) >= min(ny, 10 * SAMPLED_ROWS)
@@ -100,7 +100,7 @@ def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None
     displacement = slab.zeros()
     displacement[...] = 1.0
     body.commit(trial, displacement)
-    line = Slab(MPI.COMM_SELF, 8, 1)
+    line = Slab.alone(8, 1)
     alone = HeldBody(ZenerBody(line, PRONY, "exponential"))
     one = alone.begin(1e-2, Heights(np.zeros((1, 8))))
     alone.commit(one, np.ones((1, 8)))
@@ -117,7 +117,7 @@ def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None
 
 def test_nothing_pressed_and_jumps() -> None:
     """No pressure: no difference. A jump relaxes nothing, in either integrator."""
-    slab = Slab(MPI.COMM_SELF, 4, 4)
+    slab = Slab.alone(4, 4)
     body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
     pair = EmbeddedPair(slab, body.body, DX)
     trial = body.begin(0.0, Heights(slab.zeros()))
@@ -128,7 +128,7 @@ def test_nothing_pressed_and_jumps() -> None:
 
 def test_second_order_of_a_step() -> None:
     """Smooth motion: half the step, a quarter of the difference."""
-    slab = Slab(MPI.COMM_SELF, 4, 1)
+    slab = Slab.alone(4, 1)
     found = []
     for count in (64, 128):
         body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
@@ -147,7 +147,7 @@ def test_second_order_of_a_step() -> None:
 def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: float) -> None:
     """Two where the branch is slow, to z = dt/tau; one where there are as many branches of every time, to the share of
     those beyond the ends. A jump, and a body of no branch, have none: two is what is told."""
-    slab, prony = Slab(MPI.COMM_SELF, 4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
+    slab, prony = Slab.alone(4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
     body = HeldBody(ZenerBody(slab, prony, "exponential"))
     trial = body.begin(dt, Heights(slab.zeros()))
     body.commit(trial, np.ones((1, 4)))

@@ -56,7 +56,7 @@ class Driven:
     """Four points of a body whose displacements are prescribed, and its energy."""
 
     def __init__(self, integrator: Integrator) -> None:
-        slab = Slab(MPI.COMM_SELF, 4, 1)
+        slab = Slab.alone(4, 1)
         self.zener = HeldBody(ZenerBody(slab, BODY, integrator))
         self.energy = ZenerEnergy(slab, self.zener.body, AppliedInverse(Identity(), slab.empty))
         self.balance = self.energy.at_rest()

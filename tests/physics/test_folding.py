@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from rubbers import complex_modulus
@@ -19,7 +18,7 @@ from .held import HeldBody
 
 Array = NDArray[np.float64]
 
-POINT = Slab(MPI.COMM_SELF, 1, 1)
+POINT = Slab.alone(1, 1)
 INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
 # terms of 1 MPa, a decade apart, around a wave of frequency 1 rad/s
 DECADES = normal_form(1e6, np.full(11, 1e6), 10.0 ** np.arange(-5, 6))

@@ -189,7 +189,7 @@ def test_units_and_poisson(comm: MPI.Intracomm, name: str) -> None:
 @pytest.mark.parametrize(("nx", "ny"), [(16, 12), (11, 7), (5, 2)])
 def test_any_number_of_ranks(communicators: list[MPI.Intracomm], name: str, nx: int, ny: int) -> None:
     whole = random_map(nx, ny)
-    alone = applied(OPERATORS[name](Slab(MPI.COMM_SELF, nx, ny), (1.0, 2.0), 0.5), whole)
+    alone = applied(OPERATORS[name](Slab.alone(nx, ny), (1.0, 2.0), 0.5), whole)
     for comm in communicators:
         operator = OPERATORS[name](Slab(comm, nx, ny), (1.0, 2.0), 0.5)
         assert_allclose(applied(operator, whole), alone, atol=1e-14 * np.abs(alone).max())

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
@@ -58,7 +57,7 @@ def test_isolated_and_periodic_layers_agree_in_a_wide_box(base: Base, poisson: f
 
     Means differ on a smooth base: it lets an isolated layer spread, but not one that repeats for ever.
     """
-    slab = Slab(MPI.COMM_SELF, 128, 128)
+    slab = Slab.alone(128, 128)
     fft, x = FFT(slab), (np.arange(128) - 63.5) / 8.0
     pressure = np.exp(-(x**2 + x[:, None] ** 2))
     layer = Layer(1.0, base, poisson)
@@ -93,7 +92,7 @@ def test_isolated_layer_against_the_integral_over_waves() -> None:
 @pytest.mark.parametrize("poisson", [0.3, 0.5])
 def test_the_preconditioner_is_the_inverse_of_short_waves(base: Base, poisson: float) -> None:
     """Waves longer than that of the softest one count as stiff as that; no other one does."""
-    fft, layer = FFT(Slab(MPI.COMM_SELF, 32, 32)), Layer(0.05, base, poisson)
+    fft, layer = FFT(Slab.alone(32, 32)), Layer(0.05, base, poisson)
     body = HalfSpace((1.0, 1.0), poisson, layer=layer)
     softest, stiffness = layer.softest_wave
     product = body.symbol(fft) * body.inverse_symbol(fft)

@@ -4,7 +4,6 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 from rubbers import relaxation
 
@@ -15,7 +14,7 @@ from parcontact.physics.units import Units
 
 from .held import HeldBody
 
-POINT = Slab(MPI.COMM_SELF, 1, 1)
+POINT = Slab.alone(1, 1)
 MICRON = 1e-6
 # two Zener branches beside a spring of 0.5 MPa, and the time step of the printed numbers
 BRANCHES = ([2e6, 1e6], [1e6, 0.0], [3e3, 1e4])
@@ -181,7 +180,7 @@ def test_branches_without_a_part(integrator: Integrator) -> None:
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
     """A map and an offset stand for the moved map; rounding of heights of size 1."""
-    slab, rng = Slab(MPI.COMM_SELF, 6, 4), np.random.default_rng(1)
+    slab, rng = Slab.alone(6, 4), np.random.default_rng(1)
     base, prony = rng.normal(size=slab.shape), normal_form(*TWO)
     first, second = (HeldBody(ZenerBody(slab, prony, integrator)) for _ in range(2))
     for offset, dt in ((0, 0.0), (1, 1e-3), (5, 1e-3), (7, 2e-3), (-1, 1e-4)):
@@ -196,7 +195,7 @@ def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
 
 
 def test_elastic_heights() -> None:
-    slab = Slab(MPI.COMM_SELF, 5, 2)
+    slab = Slab.alone(5, 2)
     base, made = np.arange(10.0).reshape(2, 5), ElasticBody(slab, 3.0)
     memory = made.at_rest()
     assert made.begin(memory, 0.0, Heights(base)).effective is base
@@ -226,7 +225,7 @@ def test_state_restores_the_same_digits() -> None:
 
 def test_memory_is_one_map_per_branch_and_two() -> None:
     """The last displacement, and the buffer in which effective heights and increments take turns."""
-    slab = Slab(MPI.COMM_SELF, 32, 16)
+    slab = Slab.alone(32, 16)
     memory = ZenerBody(slab, normal_form(*TWO), "exponential").at_rest()
     assert slab.tally["map bytes"] == (len(memory.branches) + 2) * 32 * 16 * 8
 

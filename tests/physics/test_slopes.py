@@ -43,7 +43,7 @@ def test_differences_of_the_eighth_order(
 @pytest.mark.parametrize("direction", DIRECTIONS)
 def test_an_elastic_body_has_no_friction(direction: tuple[float, float], free: bool) -> None:
     """As its operator commutes with differences: 0 to round-off for any pressure, away from the edge of a free box."""
-    slab, (p, _) = Slab(MPI.COMM_SELF, 32, 32), pressure_and_displacement(32)
+    slab, (p, _) = Slab.alone(32, 32), pressure_and_displacement(32)
     if free:
         p[:4], p[-4:], p[:, :4], p[:, -4:] = 0.0, 0.0, 0.0, 0.0
     u = HalfSpace((1.0, 1.0), free=free).operator(FFT(slab)).apply(p, slab.empty())
@@ -56,10 +56,10 @@ def test_a_wave_of_eight_cells() -> None:
     n, q = 32, 8 * math.pi
     x = np.arange(n) / n
     p, u = (np.tile(1.0 + wave, (n, 1)) for wave in (np.cos(q * x), -np.sin(q * x)))
-    found = friction_by_energy(Slab(MPI.COMM_SELF, n, n), p, u, (1 / n, 1 / n), (1.0, 0.0), True)
+    found = friction_by_energy(Slab.alone(n, n), p, u, (1 / n, 1 / n), (1.0, 0.0), True)
     assert found == pytest.approx(0.5 * q * (1.0 - (q / n) ** 8 / 630), rel=3e-4 * 0.2)
 
 
 def test_no_load_has_no_friction() -> None:
-    slab = Slab(MPI.COMM_SELF, 8, 8)
+    slab = Slab.alone(8, 8)
     assert math.isnan(friction_by_energy(slab, slab.zeros(), slab.zeros(), (1.0, 1.0), (1.0, 0.0), True))

@@ -130,6 +130,6 @@ def test_free_is_the_sum_of_coefficients(comm: MPI.Intracomm) -> None:
 
 
 def test_waits_for_no_endless_wake() -> None:
-    half_space, fft = HalfSpace((1.0, 1.0), free=True), FFT(Slab(MPI.COMM_SELF, 4, 4))
+    half_space, fft = HalfSpace((1.0, 1.0), free=True), FFT(Slab.alone(4, 4))
     with pytest.raises(InputError, match="endless wake"):
         half_space.sliding_operator(fft, (1.0, 0.0), Prony(0.0, np.ones(1), np.ones(1)))

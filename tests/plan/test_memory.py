@@ -45,7 +45,7 @@ def test_no_rank_has_more_than_is_planned() -> None:
 def test_the_most_that_is_held() -> None:
     """The first solve of 256 x 256 points is found on nested grids, whose maps are gone afterwards."""
     planned = job(grid={"points": 256}, surface={**ROUGH, "short_wavelength": 6.25e-5})
-    seen = sample(planned, Slab(MPI.COMM_SELF, 256, 256), 1e6)
+    seen = sample(planned, Slab.alone(256, 256), 1e6)
     march, _ = marched(planned)
     tally = march.scene.slab.tally
     assert tally["map bytes at most"] > 1.1 * tally["map bytes"]
@@ -100,7 +100,7 @@ def test_solvers_on_tiles_hold_what_is_planned(
         monkeypatch.setattr(memory, name, 3.5 * SIDE**2 / (points[0] * points[1]))
     grid = {"points": points, "size": [n * 1e-6 for n in points], "boundary": boundary}
     planned = job(grid=grid, surface={"shape": "sphere", "radius": 1e-2})
-    setup = scene.set_up(planned, Slab(MPI.COMM_SELF, *points))
+    setup = scene.set_up(planned, Slab.alone(*points))
     on_tiles, tally = scene.solver_on_tiles(setup), setup.slab.tally
     assert on_tiles is not None
     before = tally["map bytes"]

@@ -74,7 +74,7 @@ def test_waiting_for_a_core_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """The share is the time of the process over that of the clock, here one that runs at twice its speed."""
     clock = time.perf_counter
     monkeypatch.setattr(time, "perf_counter", lambda: 2.0 * clock())
-    seen = sample(job(), Slab(MPI.COMM_SELF, 48, 40), 0.1)
+    seen = sample(job(), Slab.alone(48, 40), 0.1)
     assert seen.share < 0.6
     assert seen.disturbed
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from marching import marched
-from mpi4py import MPI
 
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load_cases
@@ -155,7 +154,7 @@ def test_what_is_offered_keeps_its_promise(accuracy: float) -> None:
     """The run at the mesh, steps and tolerance of the offer: its own error budget is within the accuracy; it takes as
     many steps, and as many calls to a factor of 1.5 (small jobs differ by that from mesh to mesh)."""
     planned = job()
-    seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
+    seen = sample(planned, Slab.alone(*planned.grid.points), 1e6)
     found = price.offer(costs_of(planned, seen, 1e30), accuracy)
     stage = {**{k: v for k, v in SLIDE.items() if k != "cells_per_step"}, "time_step": 0.01 / (found.sample.steps - 1)}
     _, rows = marched(Job.model_validate({**plain(found.job), "history": [stage]}))
@@ -177,7 +176,7 @@ def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
     """Weighed by the way slid: a slow stage that lasts fifty times as long does not hide what a fast one makes."""
     short = {**SLIDE, "distance": 2.5e-4}
     planned = job(history=[{**short, "velocity": 0.01}, {**short, "velocity": 0.5}])
-    seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
+    seen = sample(planned, Slab.alone(*planned.grid.points), 1e6)
     budget, (_, rows) = ErrorSums(), marched(planned)
     for before, row in pairwise(rows):
         assert row.errors is not None
@@ -190,7 +189,7 @@ def test_errors_of_a_trial_of_all_steps_are_those_of_the_run() -> None:
 def test_friction_has_no_price_where_nothing_slides() -> None:
     """Waves that are pressed have tangential forces by rounding and by the mesh, which are noise."""
     planned = job(history=[{"pressure": 1e4, "duration": 1e-3, "time_step": 2.5e-4}])
-    seen = sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6)
+    seen = sample(planned, Slab.alone(*planned.grid.points), 1e6)
     assert seen.total("area weight") > 0.0
     assert seen.total("friction weight") == 0.0
     assert next(price.table(costs_of(planned, seen, 1e30))) == "cost of an accuracy of the contact area"

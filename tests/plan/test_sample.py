@@ -44,7 +44,7 @@ def test_rest_that_is_cut_short_is_known(material: Json) -> None:
     planned = job(material=material, history=[dwell, CELLS])
     _, rows = marched(planned)
     assert len(rows) < len(Timeline.of(planned))
-    assert sample(planned, Slab(MPI.COMM_SELF, *planned.grid.points), 1e6).steps == len(rows) - 1
+    assert sample(planned, Slab.alone(*planned.grid.points), 1e6).steps == len(rows) - 1
 
 
 def test_steps_that_stages_choose_are_known() -> None:
@@ -52,7 +52,7 @@ def test_steps_that_stages_choose_are_known() -> None:
     dwell, slide = {"pressure": 1e4, "duration": 1e-3}, {"pressure": 1e4, "velocity": 0.1, "distance": 1.25e-4}
     planned = job(material=TWO, history=[dwell, slide])
     _, rows = marched(planned)
-    slab = Slab(MPI.COMM_SELF, *planned.grid.points)
+    slab = Slab.alone(*planned.grid.points)
     seen = sample(planned, slab, 1e6)
     assert seen.steps == seen.tried == len(rows) - 1
     assert seen.total("operator") == sum(row.operator_calls for row in rows)
@@ -64,7 +64,7 @@ def test_steps_that_stages_choose_are_known() -> None:
 def test_every_stage_is_tried_in_the_time_given() -> None:
     """Of three long ones some steps each; what is not tried is like what was, and the first steps count once."""
     long = [{**CELLS, "distance": 5e-3, "pressure": pressure} for pressure in (1e4, 2e4, 3e4)]
-    seen = sample(job(history=long), Slab(MPI.COMM_SELF, 48, 40), 0.1)
+    seen = sample(job(history=long), Slab.alone(48, 40), 0.1)
     assert all(stage.tried >= FEWEST for stage in seen.stages[:2])
     assert seen.tried < seen.steps == 3 * (1 + 240)
     stage = StageCost(100)

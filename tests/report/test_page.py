@@ -12,7 +12,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from drawing import ELASTIC, LOADS, MAPS, SLIDE, STRIP, WAVE, ZENER, ran
-from mpi4py import MPI
 from PIL import Image
 
 from parcontact import __main__, job
@@ -117,7 +116,7 @@ def solved(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "curve.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'steady'}", "steady.pressures=[1.0e3]"])
-    assert curve.run(loaded, Slab(MPI.COMM_SELF, *loaded.grid.points), curve.request(loaded), quiet=True) == 0
+    assert curve.run(loaded, Slab.alone(*loaded.grid.points), curve.request(loaded), quiet=True) == 0
     return tmp_path / "steady"
 
 

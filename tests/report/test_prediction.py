@@ -10,7 +10,6 @@ import yaml
 from conftest import RunParcontact
 from csv_rows import rows
 from marching import JOBS, PRONY, SLS, column, marched
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact import __version__
@@ -49,7 +48,7 @@ def job(**changes: Any) -> Job:
 
 
 def predicted(job: Job, waves: prediction.WavesOf = "lattice", gamma: float = 0.45) -> list[prediction.Instant]:
-    return list(prediction.predict(job, Slab(MPI.COMM_SELF, *job.grid.points), gamma, waves))
+    return list(prediction.predict(job, Slab.alone(*job.grid.points), gamma, waves))
 
 
 def test_instants_are_those_of_the_run() -> None:

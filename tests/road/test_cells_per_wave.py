@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from judging import job_of
-from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import scene
@@ -20,7 +19,7 @@ SLIDE = {"pressure": 1e5, "velocity": 0.3, "distance": 1e-4, "cells_per_step": 1
 
 def frame_of(surface: dict[str, Any], points: int, boundary: str = "periodic") -> scene.Setup:
     job = job_of(surface, [SLIDE], grid={"points": points, "size": 1e-3, "boundary": boundary})
-    return scene.set_up(job, Slab(MPI.COMM_SELF, points, points))
+    return scene.set_up(job, Slab.alone(points, points))
 
 
 def rough(hurst: float, short: float) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.job import Job
@@ -96,7 +95,7 @@ class Drift:
 def drift(periods: int, contact: str, modulus_inf: float = 1e6) -> Drift:
     """March so many periods, more than SETTLED."""
     job, found = back_and_forth(periods, contact, modulus_inf), Periods()
-    run(March(scene.build(job, Slab(MPI.COMM_SELF, POINTS, POINTS))), [found])
+    run(March(scene.build(job, Slab.alone(POINTS, POINTS))), [found])
     states = np.array(found.states[SETTLED:])
     sizes = np.abs(states).max(axis=(0, 2, 3), keepdims=True)[0]
     dissipated = np.array([row.dissipated for row in found.rows])

@@ -131,7 +131,7 @@ def test_a_run_of_another_job_is_made_anew(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(other))
     loaded = jobs.load(path, [f"output.directory={tmp_path / 'run'}"])
     options = Options(quiet=True, restart="never")
-    assert runner.run(loaded, Slab(MPI.COMM_SELF, 32, 32), options) == 0
+    assert runner.run(loaded, Slab.alone(32, 32), options) == 0
     resolved = (tmp_path / "run" / half_mesh.DIRECTORY / "job.resolved.yaml").read_text()
     assert "backward-euler" in resolved
 

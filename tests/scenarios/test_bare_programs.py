@@ -5,7 +5,6 @@ from collections import Counter
 import numpy as np
 import pytest
 from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
-from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.history.timeline import Timeline
@@ -25,7 +24,7 @@ from parcontact.solve.workspace import Workspace
 
 def bare(planned: Job) -> Counter[str]:
     """A surface that stands on an elastic body: a solver, and measures. Nothing lasts, moves or remembers."""
-    slab = Slab(MPI.COMM_SELF, NX, NY)
+    slab = Slab.alone(NX, NY)
     base = scene.set_up(planned, slab)
     heights = base.surface.heights((0.0, 0.0), slab.empty())
     solver, operators = bare_solver(base)
@@ -42,7 +41,7 @@ def bare(planned: Job) -> Counter[str]:
 
 def lasting(planned: Job) -> Counter[str]:
     """The same for a body with or without memory under stages that last; the surface stands or moves by whole cells."""
-    slab = Slab(MPI.COMM_SELF, NX, NY)
+    slab = Slab.alone(NX, NY)
     base = scene.set_up(planned, slab)
     path = AlongX(base.surface)
     memory = base.prony.moduli.size > 0

@@ -143,7 +143,7 @@ def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
     from parcontact.report import prediction
 
     job = of_parts(**sliding_wave({"thickness": 1e-4}))
-    *_, row = prediction.predict(job, Slab(MPI.COMM_SELF, 32, 4), 0.45, "lattice")
+    *_, row = prediction.predict(job, Slab.alone(32, 4), 0.45, "lattice")
     assert row.contact_area == pytest.approx(1.0)
     assert row.friction == pytest.approx(last_row(sliding_wave({"thickness": 1e-4})).friction, rel=0.01)
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from marching import JOBS, load_script, marched
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.job import Job, load, load_cases
@@ -33,7 +32,7 @@ def simulated(job: Job) -> dict[str, NDArray[np.float64]]:
 
 
 def predicted(job: Job, waves: prediction.WavesOf = "continuum") -> dict[str, NDArray[np.float64]]:
-    rows = list(prediction.predict(job, Slab(MPI.COMM_SELF, *job.grid.points), 0.45, waves))
+    rows = list(prediction.predict(job, Slab.alone(*job.grid.points), 0.45, waves))
     return {name: np.array([getattr(row, name) for row in rows]) for name in COLUMNS}
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from judging import HERE, Json, job_of, rough_heights, run
-from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.job import Job, load_cases
@@ -25,7 +24,7 @@ def test_no_job_of_ours_is_told(path: Path) -> None:
     job = load_cases(path)[-1].job
     assert job.warnings == ()
     if sanity.is_quickly_made(job):
-        assert sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == []
+        assert sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points))) == []
 
 
 def sound(dice: random.Random, directory: Path) -> Job:
@@ -81,5 +80,5 @@ def test_no_sound_scene_is_told(tmp_path: Path) -> None:
     for number in range(50):
         job = sound(dice, tmp_path)
         assert job.warnings == (), (number, job.resolved())
-        assert sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))) == [], job.resolved()
+        assert sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points))) == [], job.resolved()
         assert run(job) == [], (number, job.resolved())

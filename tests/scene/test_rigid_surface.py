@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact import scene
@@ -36,7 +35,7 @@ def surface_of(*parts: dict[str, Any]) -> tuple[Job, Surface]:
             "history": [{"pressure": 1e4}],
         }
     )
-    return job, scene.set_up(job, Slab(MPI.COMM_SELF, NX, NY)).surface
+    return job, scene.set_up(job, Slab.alone(NX, NY)).surface
 
 
 @pytest.mark.parametrize(

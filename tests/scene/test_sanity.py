@@ -134,7 +134,7 @@ def test_a_measured_road_is_looked_at_before_it_runs(tmp_path: Path) -> None:
     road = {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "m", "size": [1e-3, 1e-3]}
     job = job_of(road, [{"pressure": 1e4}], grid={"points": 64, "size": 1e-3})
     assert sanity.is_quickly_made(job)
-    (text,) = sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, 64, 64)))
+    (text,) = sanity.check_heights(scene.set_up(job, Slab.alone(64, 64)))
     assert "unit: um of a topography" in text
 
 
@@ -206,7 +206,7 @@ def test_every_rank_says_the_same(comm: MPI.Intracomm, communicators: list[MPI.I
         comm.Barrier()
         shape = {"shape": "file", "path": str(shared_path / "road.npy")}
         job = job_of(shape, [PRESS], grid={"points": [30, 48], "size": 1e-3})
-        (alone,) = sanity.check_heights(scene.set_up(job, Slab(MPI.COMM_SELF, 30, 48)))
+        (alone,) = sanity.check_heights(scene.set_up(job, Slab.alone(30, 48)))
         assert words in alone
         for group in communicators:
             assert (
@@ -262,6 +262,6 @@ def test_approaches_beyond_full_contact_are_told_with_their_places(tmp_path: Pat
     stages = "{approach: 1e-7}\n  - {name: up, approach: {from: 0, to: 1e-6}, duration: 1}"
     path.write_text(SMALL.replace("{pressure: 1e4}", stages))
     with pytest.raises(JobError) as caught:
-        sanity.refuse_beyond_full_contact(scene.set_up(load(path), Slab(MPI.COMM_SELF, 64, 64)))
+        sanity.refuse_beyond_full_contact(scene.set_up(load(path), Slab.alone(64, 64)))
     found = [text.partition(" an approach")[0] for text in caught.value.mistakes]
     assert found == [f"{path}:5:16: history.0:", f"{path}:6:26: history.1:"]

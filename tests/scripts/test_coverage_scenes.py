@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from marching import load_script
-from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
@@ -17,7 +16,7 @@ coverage_scenes = load_script("error_coverage.scenes")
 def sampled(number: int, finer: int, directory: Path) -> np.ndarray:
     """Heights of the surface of a scene at the points of the coarse grid, above their mean."""
     job = jobs.Job.model_validate(coverage_scenes.sketch(number).job(directory, finer))
-    base = scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points))
+    base = scene.set_up(job, Slab.alone(*job.grid.points))
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     rows = heights[:: finer if job.grid.ny > 1 else 1, ::finer] * base.units.height
     return np.asarray(rows - rows.mean())

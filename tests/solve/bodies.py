@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
@@ -35,7 +34,7 @@ def solver(
 ) -> "Bench":
     """A solver for maps of the shape of `heights`, on one rank."""
     ny, nx = heights.shape
-    slab = Slab(MPI.COMM_SELF, nx, ny)
+    slab = Slab.alone(nx, ny)
     fft = FFT(slab)
     half_space = HalfSpace(size, poisson, "love" if kernel == "love" else "spectral", boundary == "free")
     height = float(np.ptp(heights)) or size[0] / nx
@@ -70,7 +69,7 @@ class Bench:
 
 def rough(points: int, seed: int = 1, cells: int = 8) -> Map:
     """Hurst 0.9, four longest waves in the box, the shortest of so many cells, rms slope 1."""
-    fft = FFT(Slab(MPI.COMM_SELF, points, points))
+    fft = FFT(Slab.alone(points, points))
     waves = Roughness(0.9, 0.25, 0.25, cells / points, seed, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
     return np.asarray(fft.backward(waves, np.empty((points, points))), dtype=np.float64)
 

@@ -141,7 +141,7 @@ def test_any_load_below_the_hardness_can_be_given(total: float) -> None:
     """To pressures of which half has yielded, others have none: up to H on all points, and down to any."""
     p = np.zeros((10, 10))
     p[:5], p[5:7] = 1.0, 0.1
-    slab = Slab(MPI.COMM_SELF, 10, 10)
+    slab = Slab.alone(10, 10)
     Bounded(1.0).give_load(slab, p, float(p.sum()), total)
     assert_allclose(p.sum(), total, rtol=ROUNDING)
     assert p.min() >= 0.0

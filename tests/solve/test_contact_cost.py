@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
@@ -57,7 +56,7 @@ def test_preconditioner_in_single_precision() -> None:
     h = rough(128)
     double = solve(h, 0.4, tolerance=1e-9)
     solving = solver(h, tolerance=1e-9)
-    narrow = FFT(Slab(MPI.COMM_SELF, 128, 128), dtype=np.float32)
+    narrow = FFT(Slab.alone(128, 128), dtype=np.float32)
     solving.preconditioner = HalfSpace((1.0, 1.0)).inverse(narrow)
     mixed = keep(solving.solve(h, MeanPressure(0.4), np.zeros_like(h)))
     assert abs(mixed.iterations - double.iterations) <= 2

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Slab
@@ -47,7 +46,7 @@ def test_without_halving_steps_it_may_cycle(
     h = np.array([heights])
 
     def attempt() -> contact.Contact:
-        solving = ContactSolver(Workspace(Slab(MPI.COMM_SELF, 5, 1), 1e-8), 10.0, 1e-8, 500)
+        solving = ContactSolver(Workspace(Slab.alone(5, 1), 1e-8), 10.0, 1e-8, 500)
         body = Bench(solving, Dense(matrix), Dense(np.eye(5).tolist()))
         return body.solve(h, control, np.zeros_like(h))
 

@@ -107,7 +107,7 @@ def test_periodic_box(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_tiles_beside_an_edge() -> None:
     """In a periodic box a block at the edge has a neighbour at the opposite one, in a free box it has none."""
-    near, slab = np.zeros((16, 16), np.bool_), Slab(MPI.COMM_SELF, 512, 512)
+    near, slab = np.zeros((16, 16), np.bool_), Slab.alone(512, 512)
     near[5, 0] = True
     free, periodic = (module._tiles_of(near, slab, repeats) for repeats in (False, True))
     assert set(zip(free.rows, free.columns, strict=True)) == {(j, i) for j in (4, 5, 6) for i in (0, 1)}
@@ -116,7 +116,7 @@ def test_tiles_beside_an_edge() -> None:
 
 def test_only_whole_tiles_repeat() -> None:
     """A periodic grid that its tiles do not divide has none."""
-    slab = Slab(MPI.COMM_SELF, 320, 336)
+    slab = Slab.alone(320, 336)
     assert [module.OnTiles(None, each).work_on(slab) for each in (False, True)] == [True, False]  # type: ignore[arg-type]
 
 
@@ -177,7 +177,7 @@ def test_a_contact_that_is_not_dilute(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
     """On tiles that the end cuts off they lie below all others by the height of the surface."""
-    slab = Slab(MPI.COMM_SELF, 40, 36)
+    slab = Slab.alone(40, 36)
     rows, columns = (each.ravel() for each in np.indices((2, 2)))
     grid = Tiles((40, 36), rows, columns)
     found = []

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.job import Job
@@ -28,7 +27,7 @@ def body(ratio: float, points: tuple[int, int] = (32, 48), boundary: str = "peri
             "history": [{"pressure": 1e5}],
         }
     )
-    return scene.set_up(made, Slab(MPI.COMM_SELF, *points))
+    return scene.set_up(made, Slab.alone(*points))
 
 
 def test_soft_stripes() -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
-from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact import scene
@@ -47,7 +46,7 @@ def solver(tmp_path: Path, text: str, changes: Sequence[str] = ()) -> SteadySlid
     path = tmp_path / "job.yaml"
     path.write_text(text)
     job = jobs.load(path, changes)
-    return SteadySliding(scene.set_up(job, Slab(MPI.COMM_SELF, *job.grid.points)))
+    return SteadySliding(scene.set_up(job, Slab.alone(*job.grid.points)))
 
 
 def test_friction_of_a_wave_at_each_temperature(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mpi4py import MPI
 
 from parcontact.errors import InputError, InUseError
 from parcontact.parallel.slab import Slab
@@ -17,7 +16,7 @@ PLAIN: dict[str, Any] = {"grid": {"points": [8, 8]}, "surface": [{"shape": "flat
 
 
 def directory_at(path: Path, verb: str = "run") -> Directory:
-    return Directory(path, Slab(MPI.COMM_SELF, 8, 8), verb)
+    return Directory(path, Slab.alone(8, 8), verb)
 
 
 def make(here: Directory, job: Path, data: dict[str, Any] = PLAIN) -> None:

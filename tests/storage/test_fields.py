@@ -43,7 +43,7 @@ def saved(path: Path, slab: Slab, names: tuple[str, ...], steps: list[int], unti
 def check(path: Path, slab: Slab, steps: list[int], reached: int, names: dict[str, list[int]]) -> None:
     """Planned steps, how many of them were reached, and for each map the steps at which it holds numbers."""
     slab.comm.Barrier()
-    whole = Slab(MPI.COMM_SELF, NX, NY)
+    whole = Slab.alone(NX, NY)
     with h5py.File(path) as file:
         assert file["step"][...].tolist() == steps
         assert np.flatnonzero(~np.isnan(file["t"][...])).tolist() == list(range(reached))
@@ -165,7 +165,7 @@ def test_xdmf_puts_maps_into_the_x_y_plane(comm: MPI.Intracomm, shared_path: Pat
     """Every value at its point (x, y, 0), to the last digit (8-byte numbers), at its time."""
     path, slab = shared_path / "fields.h5", Slab(comm, NX, NY)
     saved(path, slab, ("gap", "pressure"), [2, 4, 6], 4)
-    whole = Slab(MPI.COMM_SELF, NX, NY)
+    whole = Slab.alone(NX, NY)
     with h5py.File(path) as file:
         found = instants(path.with_suffix(".xdmf"), file)
         assert [time for time, *_ in found] == [0.2, 0.4]

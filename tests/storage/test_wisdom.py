@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
 
 from parcontact.job import load
 from parcontact.parallel.slab import Slab
@@ -23,7 +22,7 @@ history: [{pressure: 1.0e4}]
 @pytest.mark.skipif(os.geteuid() != 0, reason="gives a directory to somebody else")
 def test_plans_in_a_directory_of_others_are_not_read(cache: Path, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(JOB)
-    job, slab = load(tmp_path / "job.yaml"), Slab(MPI.COMM_SELF, 16, 4)
+    job, slab = load(tmp_path / "job.yaml"), Slab.alone(16, 4)
     wisdom.keep(choices(job).transforms, slab)
     (kept,) = (cache / "parcontact" / "plans").iterdir()
     assert wisdom._place(choices(job).transforms, slab) == kept
@@ -36,14 +35,14 @@ def test_plans_in_a_directory_of_others_are_not_read(cache: Path, tmp_path: Path
 def test_plans_are_those_of_a_precision(cache: Path, tmp_path: Path) -> None:
     """An operator in single precision has transforms of its own."""
     (tmp_path / "job.yaml").write_text(JOB)
-    slab, mixed = Slab(MPI.COMM_SELF, 16, 4), "numerics.precision=mixed"
+    slab, mixed = Slab.alone(16, 4), "numerics.precision=mixed"
     jobs = [load(tmp_path / "job.yaml", [mixed, f"numerics.tolerance={size}"]) for size in ("1e-3", "1e-4")]
     assert len({wisdom._place(choices(job).transforms, slab) for job in jobs} - {None}) == 2
 
 
 def test_wisdom_of_a_checkpoint(cache: Path) -> None:
     """It is used for as many ranks; what is none is left alone, as is what was kept before."""
-    slab = Slab(MPI.COMM_SELF, 16, 4)
+    slab = Slab.alone(16, 4)
     saved = wisdom.gather(slab)
     assert wisdom._adopt(saved.tobytes(), slab)
     assert not wisdom._adopt(b"none", slab)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from conftest import Main, RunParcontact
 from csv_rows import rows
-from mpi4py import MPI
 
 from parcontact.job import load
 from parcontact.job.sections.calculation import Study
@@ -38,7 +37,7 @@ def outcomes(path: Path) -> dict[Settings, Outcome]:
     found = {}
     for case in ladders(job).combine():
         changed = load(path, overrides(job, ladders(job).own, case))
-        found[case] = outcome.run(changed, Slab(MPI.COMM_SELF, *changed.grid.points), lambda: False)
+        found[case] = outcome.run(changed, Slab.alone(*changed.grid.points), lambda: False)
     assert None not in found.values()
     return {case: one for case, one in found.items() if one is not None}
 
@@ -92,7 +91,7 @@ def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str
 
     def errors(mesh: int, cells: float, integrator: str = integrator) -> tuple[float, float]:
         case = Settings(mesh, cells, integrator, own.tolerance, "double", "spectral")
-        found = outcome.run(load(path, overrides(job, own, case)), Slab(MPI.COMM_SELF, mesh, mesh), lambda: False)
+        found = outcome.run(load(path, overrides(job, own, case)), Slab.alone(mesh, mesh), lambda: False)
         assert found is not None
         return found.mu_end - limit[0], found.area_corrected - limit[1]
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -58,7 +57,7 @@ def points(feedback: str, temperature: float = 20.0) -> list[Point]:
         "thermal": {"conductivity": KAPPA, "diffusivity": D, "distance": DISTANCE, "feedback": feedback},
     }
     data["material"]["temperature"] = temperature
-    sliding = SteadySliding(scene.set_up(Job.model_validate(data), Slab(MPI.COMM_SELF, 64, 1)))
+    sliding = SteadySliding(scene.set_up(Job.model_validate(data), Slab.alone(64, 1)))
     return [sliding.solve((float(speed), 0.0), PRESSURE) for speed in SPEEDS]
 
 

@@ -4,7 +4,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.parallel.fft import FFT
@@ -23,7 +22,7 @@ WEAK = Law(0, 0.4, 0.2)
 
 
 def solver(free: bool = False) -> tuple[Slab, GapOperators, GapSolver]:
-    slab = Slab(MPI.COMM_SELF, NX, NY)
+    slab = Slab.alone(NX, NY)
     half_space = HalfSpace((1.0, 1.0), kernel="love" if free else "spectral", free=free)
     operators = GapOperators(*half_space.gap_operators(FFT(slab)))
     return slab, operators, GapSolver(slab, operators, 500)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
@@ -39,7 +38,7 @@ class Problem:
 
     def __init__(self, skew: float) -> None:
         random = np.random.default_rng(7)
-        self.slab = Slab(MPI.COMM_SELF, NX, NY)
+        self.slab = Slab.alone(NX, NY)
         self.A = positive(skew)
         self.h = random.normal(size=(NY, NX))
         self.working = np.zeros((NY, NX), dtype=np.bool_)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.slab import Array, Slab
@@ -37,7 +36,7 @@ def test_goes_where_the_residual_is_smallest() -> None:
     residual and the last two changes; the third of them is compared with numpy, to 1e-9."""
     nx, ny = 6, 5
     n, random = nx * ny, np.random.default_rng(4)
-    slab = Slab(MPI.COMM_SELF, nx, ny)
+    slab = Slab.alone(nx, ny)
     basis, _ = np.linalg.qr(random.normal(size=(n, n)))
     skew = random.normal(size=(n, n))
     A = basis @ np.diag(np.geomspace(0.2, 5.0, n)) @ basis.T + 0.2 * (skew - skew.T)
@@ -65,7 +64,7 @@ def test_goes_where_the_residual_is_smallest() -> None:
 
 
 def test_pressures_are_cut_off_and_stay_on_the_set() -> None:
-    slab = Slab(MPI.COMM_SELF, 4, 3)
+    slab = Slab.alone(4, 3)
     steps = Projected(slab, Scaled(1.0), Scaled(1.0), NonNegative())
     working = np.ones((3, 4), dtype=np.bool_)
     working[0, 0] = False

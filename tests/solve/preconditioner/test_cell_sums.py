@@ -31,7 +31,7 @@ def weighted(c: Map, weights: list[float], pairs: int) -> Map:
 def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int) -> None:
     """`M c` is that of products of matrices, to single precision."""
     random = np.random.default_rng([ny, nx, seed])
-    count = len(levels_of(Slab(MPI.COMM_SELF, nx, ny), pairs))
+    count = len(levels_of(Slab.alone(nx, ny), pairs))
     weights, c = random.random(count + 1).tolist(), random.normal(size=(ny, nx))
     slab = Slab(MPI.COMM_WORLD, nx, ny)
     out = slab.empty()
@@ -45,7 +45,7 @@ def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int)
 def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | None) -> None:
     """Waves along x, y and between, from two points to the whole box, come out 0.5 to 2.5 times as large, on square
     cells and on cells of 4 : 1: the interpolation takes a wave of four points for half of what it is."""
-    slab, body = Slab(MPI.COMM_SELF, 64, ny), HalfSpace((1.0, 1.0), poisson=0.3, layer=layer)
+    slab, body = Slab.alone(64, ny), HalfSpace((1.0, 1.0), poisson=0.3, layer=layer)
     sums = CellSums.on(slab, body.size, body.compliance)
     assert sums is not None
     half = min(64, ny) // 2
@@ -65,7 +65,7 @@ def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | No
 )
 def test_none_where_they_are_no_good(nx: int, ny: int, layer: Layer | None) -> None:
     """On lines, on cells that are too long for pairs, and where long waves are stiff; nothing is held."""
-    slab, body = Slab(MPI.COMM_SELF, nx, ny), HalfSpace((1.0, 1.0), layer=layer)
+    slab, body = Slab.alone(nx, ny), HalfSpace((1.0, 1.0), layer=layer)
     assert CellSums.on(slab, body.size, body.compliance) is None
     assert CellSums.footprint(nx, ny, 1, 0, body.size, body.compliance) == 0
 

@@ -133,7 +133,7 @@ def test_pairs_until_cells_are_square() -> None:
 @pytest.mark.parametrize(("last", "equal"), [(1.0, False), (1e9, True)])
 def test_largest_cells_of_a_high_floor_count_for_nothing(last: float, equal: bool) -> None:
     """To single precision: they tell and ask nothing then, as if they were not there."""
-    random, slab = np.random.default_rng(2), Slab(MPI.COMM_SELF, 16, 16)
+    random, slab = np.random.default_rng(2), Slab.alone(16, 16)
     c = random.random((16, 16)) < 0.2
     r = np.where(c, random.normal(size=(16, 16)), 0.0)
     given_to_k = []
