@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,8 +48,18 @@ def foreign_numbers(path: Path) -> str:
         return ""
     lines = (line for line in start.decode("latin-1").splitlines() if line.strip() and not line.startswith("#"))
     first = next(lines, "")
+    if has_decimal_commas(first):
+        return "its numbers have decimal commas; write them with points, separated by blanks as .txt, or as .npy"
     mark = next((name for letter, name in ((";", "semicolons"), (",", "commas")) if first.count(letter) > 2), "")
     return f"its numbers are separated by {mark}; save them separated by blanks as .txt, or as .npy" if mark else ""
+
+
+def has_decimal_commas(line: str) -> bool:
+    """Return whether a line holds several numbers like 0,1 with something else than commas between them."""
+    parts = [part for part in re.split(r"[;\s]+", line) if part]
+    return (
+        len(parts) > 1 and "," in line and all(re.fullmatch(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?", part) for part in parts)
+    )
 
 
 def read_lines(path: Path, expected: str) -> list[tuple[int, str]]:

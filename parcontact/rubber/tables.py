@@ -23,7 +23,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datafiles import read_lines
+from ..datafiles import has_decimal_commas, read_lines
 from ..errors import InputError
 from .sane import refuse_odd, refuse_rising
 
@@ -153,6 +153,8 @@ def _number(text: str) -> float:
 
 def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> list[float]:
     parts = _split(text)
+    if has_decimal_commas(text) and (";" in text or len(parts) != len(columns)):
+        raise InputError(f"{path}:{number}: its numbers have decimal commas; write them with points")
     if len(parts) != len(columns):
         raise InputError(f"{path}:{number}: {len(parts)} values where {len(columns)} columns are named")
     for part, column in zip(parts, columns, strict=True):

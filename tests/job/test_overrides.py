@@ -61,12 +61,24 @@ def test_text_that_cannot_be_read(text: str | bytes, mistake: str) -> None:
         ("title: !!python/object:os.system {}", "6:8: !!python/object:os.system does not belong in a job"),
         ("1: x", "6:1: a key must be a word, got '1'"),
         ("body: {thickness: 1,0e-3}", "6:21: a key must be a word, got '0e-3'; write decimals with a point"),
+        ("body: {thickness: 1,02}", "6:21: a key must be a word, got '02'; write decimals with a point"),
+        (
+            "body: {thickness: 1 mm}",
+            "6:19: body.thickness must be a positive thickness [m], got '1 mm'; write 1.0e-3",
+        ),
         ("? [a]\n: x", "6:3: a key must be a word, got a list or a mapping"),
         ("<<: 3", "6:5: << takes a mapping, or a list of mappings"),
     ],
 )
 def test_what_yaml_allows_and_a_job_does_not(line: str, mistake: str) -> None:
     assert mistakes_of(f"{SMALL}{line}\n") == [f"job.yaml:{mistake}"]
+
+
+def test_two_loads_of_a_stage_are_a_ramp_or_two_stages() -> None:
+    assert mistakes_of(SMALL.replace("pressure: 1e5", "pressure: [1e5, 2e5]")) == [
+        "job.yaml:5:16: history.0.pressure must be a pressure [Pa] of zero or more, got a list; give {from: 100000.0, "
+        "to: 200000.0} for a ramp, or a stage for each"
+    ]
 
 
 def test_duplicates_deep_inside() -> None:

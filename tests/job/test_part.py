@@ -28,7 +28,7 @@ GRID = {
     "grid: {points: 64, size: -1.0}": "1:26: grid.size must be a positive length [m], got -1.0",
     "grid: {points: 64, size: [1, 0]}": "1:30: grid.size.1 must be a positive length [m], got 0",
     "grid: {points: 64, size: .inf}": "1:26: grid.size must be a positive length [m], got inf",
-    "grid: {points: 64, size: 1 mm}": "1:26: grid.size must be a positive length [m], got '1 mm'",
+    "grid: {points: 64, size: 1 mm}": "1:26: grid.size must be a positive length [m], got '1 mm'; write 1.0e-3",
     "grid: {points: 64, size: '1e-3'}": "1:26: grid.size must be a positive length [m], got '1e-3'",
     "grid: {points: 64, size: true}": "1:26: grid.size must be a positive length [m], got true",
     "grid: {points: 64, size: [1, 1, 1]}": "1:26: grid.size must be a positive length [m], got [1, 1, 1]",

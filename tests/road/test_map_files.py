@@ -90,6 +90,13 @@ BAD = {
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
     "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
     "commas": ("road.txt", "1,2,3,4\n" * 4, ("m", SIZE, None), "separated by commas; save them separated by blanks"),
+    "decimal commas": (
+        "road.txt",
+        "1,25 3,4 0 -2,1\n" * 4,
+        ("m", SIZE, None),
+        "decimal commas; write them with points",
+    ),
+    "semicolons": ("road.txt", "1,2;3,4;5,6;7\n" * 4, ("m", SIZE, None), "decimal commas; write them with points"),
     "two columns": ("road.xyz", "1 2\n3 4\n", ("m", None, None), "has 2 columns; x, y and z"),
     "a word": ("road.xyz", "1 2 x\n", ("m", None, None), "cannot be read"),
     "no grid": (

@@ -89,6 +89,11 @@ BAD = {
     "E' with G''": (text("f[Hz] E'[MPa] G''[MPa]", mark=" "), "it needs f or omega"),
     "a word": (GOOD.replace("3.6", "high"), ":4: E_stor must be a finite number, got 'high'"),
     "not a number": (GOOD.replace("3.6", "nan"), ":4: E_stor must be a finite number, got 'nan'"),
+    "decimal commas": (GOOD.replace(",", ";").replace(".", ","), ": its numbers have decimal commas; write them with"),
+    "decimal commas, blanks": (
+        text("f[Hz] E'[MPa] E''[MPa]", mark=" ").replace(".", ","),
+        ": its numbers have decimal commas; write them with",
+    ),
     "endless": (GOOD.replace("3.6", "inf"), ":4: E_stor must be a finite number"),
     "negative storage": (GOOD.replace("3.6", "-3.6"), ":4: E_stor must be positive, got -3.6"),
     "negative loss": (GOOD.replace("0.6", "-0.6"), ":4: E_loss must be positive, got -0.6"),

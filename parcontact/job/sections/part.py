@@ -25,7 +25,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, closest, did_you_mean, quote, refuse
+from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, closest, did_you_mean, in_si, quote, refuse
 from ..text.overrides import Included
 from .quantities import from_home
 
@@ -153,7 +153,7 @@ class Part(BaseModel):
         if _absent(error):
             return Fault(f"is missing; it {expected}", path)
         got = quote(filled[name] if kind == "missing" else value)
-        return Fault(f"{expected}, got {got}{did_you_mean(value, words)}", path)
+        return Fault(f"{expected}, got {got}{did_you_mean(value, words)}{in_si(value)}", path)
 
     @classmethod
     def _instead(cls, word: str) -> Instead:

@@ -58,6 +58,9 @@ def _ramp(number: Any, description: str) -> PlainValidator:
     def read(value: Any, info: ValidationInfo) -> Ramp:
         if isinstance(value, Ramp):
             return value
+        if isinstance(value, list | tuple) and len(value) == 2:
+            ends = f"{{from: {quote(value[0])}, to: {quote(value[1])}}}"
+            refuse(Fault(f"must be {description}, got a list; give {ends} for a ramp, or a stage for each"))
         given = value if isinstance(value, dict) else {"from": value, "to": value}
         return Ramp(*(number for _, number in keys.model_validate(given, context=info.context)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import reprlib
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, NoReturn
@@ -16,6 +17,8 @@ MAX_WORD = 40  # tuning: characters of a word that may be a misspelt one
 BOUNDED = reprlib.Repr()  # a `repr` that never writes out all of something large
 BOUNDED.maxlist = BOUNDED.maxtuple = BOUNDED.maxset = 60
 BOUNDED.maxstring = BOUNDED.maxlong = BOUNDED.maxother = 500
+PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+UNITS = {f"{prefix}{unit}": size for prefix, size in PREFIXES.items() for unit in ("m", "s", "Pa", "N", "m/s")}
 AT_VALUE, AT_KEY = "at value", "at key"  # the types of our errors within pydantic
 
 
@@ -68,6 +71,20 @@ def closest(word: Any, words: Iterable[str]) -> str:
     known = {candidate.lower(): candidate for candidate in words}
     close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.65)
     return known[close[0]] if close else ""
+
+
+def in_si(value: Any) -> str:
+    """Return the ending '; write 1.0e-3' if a value is a text of a number and a unit like 1 mm, else nothing."""
+    found = (
+        re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S+)", value.strip()) if isinstance(value, str) else None
+    )
+    if not found or (unit := UNITS.get(found[2])) is None:
+        return ""
+    try:
+        digits, exponent = f"{float(found[1]) * unit:.9e}".split("e")
+    except ValueError:
+        return ""
+    return f"; write {float(digits)}e{int(exponent)}"
 
 
 def did_you_mean(word: Any, words: Iterable[str]) -> str:

@@ -159,9 +159,9 @@ class _Reader:
         for key, child in node.value:
             if key.tag == YAML_TAG + "merge":
                 merged += child.value if isinstance(child, yaml.SequenceNode) else [child]
-            elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str":
+            elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str" or _follows_a_comma(key, child):
                 got = repr(shorten(key.value)) if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
-                comma = "; write decimals with a point" if got[1:2].isdigit() and not child.value else ""
+                comma = "; write decimals with a point" if _follows_a_comma(key, child) else ""
                 self.refuse(key, f"a key must be a word, got {got}{comma}")
             elif key.value in found:
                 name, line = ".".join(map(str, (*path, key.value))), self.source.places[*path, key.value][0].line
@@ -174,3 +174,8 @@ class _Reader:
             else:
                 self.refuse(other, "<< takes a mapping, or a list of mappings")
         return found
+
+
+def _follows_a_comma(key: yaml.Node, child: yaml.Node) -> bool:
+    """Return whether a key may be the digits after a decimal comma, as in {thickness: 0,02}: it has no value."""
+    return isinstance(key, yaml.ScalarNode) and key.value[:1].isdigit() and not child.value
