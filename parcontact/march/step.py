@@ -43,6 +43,8 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         solved = replace(solved, stuck=_count_energies(scene, state, solved, energy))
     if solved.stuck is not None and (solved.stuck.snapped or _loses(state, solved)):
         solved, errors = replace(solved, stuck=solved.stuck.noted()), replace(errors, budget=None)
+    if solved.measures.at_edge:  # of what the box cuts off no estimate knows
+        errors = replace(errors, budget=None)
     _tell_effects(scene, solved, slid)
     if state.chosen is not None and verdict is not None:
         state.chosen.add(verdict)

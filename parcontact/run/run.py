@@ -215,6 +215,10 @@ class Run:
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
             console.say(text)
+        if "edge" in self.contacts.seen:
+            console.say(
+                "no error is stated of steps whose contact reaches the edge of the box: their results are wrong"
+            )
         if stuck is not None and stuck.snaps:
             console.say(f"the contact snapped in {stuck.snaps} of the steps: no error is stated across them")
         if self.stop:

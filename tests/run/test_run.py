@@ -1,11 +1,16 @@
 """What a run advises where it is more wrong than asked for."""
 
+import json
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from parcontact.__main__ import main
 from parcontact.job import Job
 from parcontact.run.run import chosen_by_accuracy
+from parcontact.storage import tables
 
 
 @pytest.mark.parametrize(
@@ -31,3 +36,23 @@ def test_what_a_smaller_accuracy_would_help(slide: dict[str, Any], numerics: dic
         "numerics": numerics,
     }
     assert chosen_by_accuracy(Job.model_validate(data)) == parts
+
+
+def test_no_error_is_stated_where_the_box_cuts_a_contact_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the steps at the edge there is no error, and the end says so; a step inside has one."""
+    data = {
+        "grid": {"points": 32, "size": 1e-3, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-2},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [{"force": 0.01}, {"force": 1.0}],
+    }
+    (tmp_path / "job.yaml").write_text(json.dumps(data))
+    monkeypatch.chdir(tmp_path)
+    for force, inside, name in ((1.0, False, "edge"), (0.011, True, "room")):
+        assert main(["job.yaml", "--set", f"history.1.force={force}", "--set", f"output.directory={name}"]) == 0
+        out = capsys.readouterr().out
+        assert ("no error is stated of steps whose contact reaches the edge of the box" in out) != inside
+        errors = tables.read(tmp_path / name / "measures.csv")["error_area"]
+        assert [math.isnan(error) for error in errors] == [True, False, not inside]
