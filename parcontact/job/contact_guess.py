@@ -28,7 +28,7 @@ from .sections.stages import Initial, Stage, Steady
 UNKNOWN, USUAL_PHASE = 0.1, 0.25  # accuracy: where slopes or loads are not known
 LEAST, MOST = 0.005, 0.99  # accuracy: for which the laws of the mesh were found
 MORE = 1.42  # accuracy: power of the share that is open by the theory
-FEW, EDGES, FINEST = 0.5, 4.0, 16.0  # accuracy: times the frequency of the shortest wave: of spots, edges, and cells
+FEW, EDGES, FINEST = 0.5, 4.0, 16.0  # accuracy: times the frequency of the shortest wave: of spots, edges, the finest
 SLOWNESS = 1.5  # accuracy: power with which it counts
 NODES = 400  # accuracy: of integrals over the spectrum, to 1e-4
 RELAXATION = EntryPoint("relaxation", "parcontact.effects.relaxation:relaxation_of", "")  # of materials of all kinds
@@ -52,12 +52,11 @@ def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
     found = []
     for pressure, speed in {load: None for load in _loads(job, area) if load[0] > 0.0}:
         omega = 2.0 * math.pi * speed / wave
-        few, edges, finest = (_modulus(series, times * omega) for times in (FEW, EDGES, FINEST))
+        few, edges = (_modulus(series, times * omega) for times in (FEW, EDGES))
         share = _share(pressure, abs(few), job.material.poisson, slope) if slope else UNKNOWN
         slow = _slowness(series, omega) if curve else 0.0
-        phase, at_cells = (2.0 / math.pi * cmath.phase(modulus) for modulus in (edges, finest))
-        found.append(Guess(share, phase, at_cells, waves, slow))
-    return found or [Guess(UNKNOWN, USUAL_PHASE, USUAL_PHASE, waves)]
+        found.append(Guess(share, 2.0 / math.pi * cmath.phase(edges), waves, slow))
+    return found or [Guess(UNKNOWN, USUAL_PHASE, waves)]
 
 
 def _slowness(series: Any, omega: float) -> float:

@@ -23,17 +23,17 @@ def test_fast_lengths(count: int) -> None:
 
 def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, float]:
     """Return the errors of friction and area by the laws of the module, in a slide along a unit vector at 5 % of
-    contact of a body with phases of 0.4 and 0.2 at edges and cells, in a box of 24 waves."""
+    contact of a body with a phase of 0.4, in a box of 24 waves."""
     (nx, ny), (x, y) = points, way
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
     c, across = 0.25 / math.hypot(x / cx, y / cy), 0.25 / math.hypot(y / cx, x / cy)
     place = math.sqrt(0.95 / 0.05)  # the standard deviation of one place over its mean, 0.05
     chance = 0.5 * 0.0034 * (1.0 + 4.6 * 0.4) * math.hypot(c**-2.15, 0.13 * across**-2.7)
     friction = (0.016 * (1.0 - math.exp(-0.4 / 1.5)) - 0.0004) * c**-1.5 + 1.1 * math.hypot(chance, 0.0028 * c**-1.5)
-    known = (0.036 * (1.0 - math.exp(-0.4 / 0.33)) - 0.0025) * c**-1.24 + (0.0038 - 0.00424 - 0.0042) * across**-0.7
-    chance = 0.5 * 0.006 * math.hypot(c**-1.02, 0.67 * across**-2.2)
-    area = abs(known) + 1.1 * math.sqrt(chance**2 + (0.005 * c**-1.24) ** 2 + (0.0011 * across**-0.7) ** 2)
-    return place * friction, place * area
+    known = abs(0.067 * 0.4 / c - 0.005 * (1.0 / c + 1.0 / across))
+    chance = 0.5 * 0.0058 * math.hypot(c**-1.23, 0.61 * across**-1.23)
+    area = place**0.8 * known + 1.1 * place * chance
+    return place * friction, area
 
 
 @pytest.mark.parametrize("asked", [BOTH, FRICTION, Accuracy(friction=0.05, area=0.3)])
@@ -41,7 +41,7 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
 def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     """It keeps both errors, with no more points than the best of all meshes that transform fast."""
     way = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    found = cells.choose(WAVE, SIZE, [way], asked, [cells.Guess(0.05, 0.4, 0.2, 24.0)])
+    found = cells.choose(WAVE, SIZE, [way], asked, [cells.Guess(0.05, 0.4, 24.0)])
     lengths = [n for n in range(16, 800, 16) if cells.fast_length(n) == n]
 
     def keeps(points: tuple[int, int]) -> bool:
@@ -56,7 +56,7 @@ def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
 
 def test_slow_sliding_needs_cells_in_the_first_order() -> None:
     """As many as the term of slow sliding asks for, where others are small; half as many for twice the error."""
-    guess = cells.Guess(share=0.2, phase=0.0, phase_at_cells=0.0, waves=100.0, slow=1.0)
+    guess = cells.Guess(share=0.2, phase=0.0, waves=100.0, slow=1.0)
     for asked in (0.02, 0.01):
         nx, _ = cells.choose(WAVE, SIZE, [(1.0, 0.0)], Accuracy(friction=asked, area=0.9), [guess])
         least = 0.09 * 4.0 * 2.0 / asked * SIZE[0] / WAVE  # 2 = (0.8/0.2)^0.5
@@ -64,7 +64,7 @@ def test_slow_sliding_needs_cells_in_the_first_order() -> None:
 
 
 def test_long_cells_lie_across_the_sliding() -> None:
-    asked, guess = Accuracy(friction=0.001, area=0.1), [cells.Guess(0.2, 0.4, 0.3, 12.0)]
+    asked, guess = Accuracy(friction=0.001, area=0.1), [cells.Guess(0.2, 0.4, 12.0)]
     along_x, along_y, both, still = (
         cells.choose(WAVE, SIZE, ways, asked, guess)
         for ways in ([(1.0, 0.0)], [(0.0, 1.0)], [(1.0, 0.0), (0.0, 1.0)], [])
@@ -79,7 +79,7 @@ def test_long_cells_lie_across_the_sliding() -> None:
 def test_the_worst_of_all_loads_decides() -> None:
     """An elastic body, whose error is by cells across the sliding as by those along it, and one that loses energy,
     whose error is by those along it: neither mesh does for both."""
-    still, lossy = cells.Guess(0.2, 0.0, 0.0, 24.0), cells.Guess(0.2, 0.5, 0.4, 24.0)
+    still, lossy = cells.Guess(0.2, 0.0, 24.0), cells.Guess(0.2, 0.5, 24.0)
     one, other, both = (
         cells.choose(WAVE, SIZE, [(1.0, 0.0)], BOTH, found) for found in ([still], [lossy], [still, lossy])
     )

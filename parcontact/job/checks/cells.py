@@ -7,9 +7,10 @@ share A is in contact, ((1 - A)/A)^0.5 is the standard deviation over the mean f
 shortest waves along a side has N^2 places. `friction_error` and `area_error` have the sums. Of chance, and of that by
 which surfaces differ in the first kind, SURE standard deviations count.
 
-Their numbers were found by experiment, with the share and the phases as they are guessed before (`job.contact_guess`):
-36 steady states of rough surfaces of 2 to 100 % contact with 12 or 24 of their shortest waves along a side, each on
-some 110 meshes of 2 to 80 cells per shortest wave. Fewer waves count as 12. `scripts/chosen_mesh.py` tells how the
+Their numbers were found by experiment, with the share and the phase as they are guessed before (`job.contact_guess`):
+steady states of rough surfaces of 1 to 100 % contact with 12 or 24 of their shortest waves along a side. Those of
+friction are from 36 states on some 110 meshes each, those of the area by maximum likelihood from 24 states on some 20
+meshes, with references of 160 cells per shortest wave. Fewer waves count as 12. `scripts/chosen_mesh.py` tells how the
 meshes that follow do on others. Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing
 slides, either direction counts as the one along the sliding.
 """
@@ -42,13 +43,12 @@ SAME = 1e-9  # accuracy: relative: numbers this close are the same
 
 
 class Guess(NamedTuple):
-    """A guess made before anything is solved: the share in contact, the phases of the body's modulus at the frequencies
-    of edges and of cells, in right angles, how many of the shortest waves a side of the box has, and how `slow` the
-    sliding is, from 0 to 1."""
+    """A guess made before anything is solved: the share in contact, the phase of the body's modulus at the frequency of
+    edges, in right angles, how many of the shortest waves a side of the box has, and how `slow` the sliding is, from 0
+    to 1."""
 
     share: float
     phase: float
-    phase_at_cells: float
     waves: float
     slow: float = 0.0
 
@@ -75,14 +75,12 @@ def friction_error(c: float, across: float, guess: Guess) -> float:
 
 
 def area_error(c: float, across: float, guess: Guess) -> float:
-    """Return the same of the corrected contact area. Cells across the sliding make it too small, those along it too
-    large in a body that loses energy."""
-    along, aside = (4.0 / c) ** 1.24, (4.0 / across) ** 0.7
-    steep = 0.036 * (1.0 - math.exp(-guess.phase / 0.33)) - 0.0025
-    known = steep * along + (0.019 * guess.phase_at_cells - 0.0106 * guess.phase - 0.0042) * aside
-    counted = math.hypot((4.0 / c) ** 1.02, 0.67 * (4.0 / across) ** 2.2)
-    unknown = SURE * math.hypot(guess.few * 0.006 * counted, 0.005 * along, 0.0011 * aside)
-    return guess.spread * (abs(known) + unknown)
+    """Return the same of the corrected contact area. The correction takes off too much along the edges of an elastic
+    body, and too little at those across the sliding of a body that loses energy."""
+    along, aside = 4.0 / c, 4.0 / across
+    known = 0.067 * guess.phase * along - 0.005 * (along + aside)
+    chance = guess.few * 0.0058 * math.hypot(along**1.23, 0.61 * aside**1.23)
+    return guess.spread**0.8 * abs(known) + SURE * guess.spread * chance
 
 
 def one_cell(stage: Stage, grid: Grid) -> float:
