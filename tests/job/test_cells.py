@@ -29,10 +29,11 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
     c, across = 0.25 / math.hypot(x / cx, y / cy), 0.25 / math.hypot(y / cx, x / cy)
     place = math.sqrt(0.95 / 0.05)  # the standard deviation of one place over its mean, 0.05
     chance = 0.5 * 0.0034 * (1.0 + 4.6 * 0.4) * math.hypot(c**-2.15, 0.13 * across**-2.7)
-    friction = (0.016 * (1.0 - math.exp(-0.4 / 1.5)) - 0.0004) * c**-1.5 + 1.1 * math.hypot(chance, 0.0028 * c**-1.5)
+    friction = (0.016 * (1.0 - math.exp(-0.4 / 1.5)) - 0.0004) * c**-1.5 + 1.2 * math.hypot(chance, 0.0028 * c**-1.5)
+    friction += 0.008 * c**-4
     known = abs(0.067 * 0.4 / c - 0.005 * (1.0 / c + 1.0 / across))
-    chance = 0.5 * 0.0058 * math.hypot(c**-1.23, 0.61 * across**-1.23)
-    area = place**0.8 * known + 1.1 * place * chance
+    chance = 0.5 * 0.0078 * math.hypot(c**-1.2, 0.7 * across**-1.6)
+    area = place**0.8 * known + 1.2 * place * chance
     return place * friction, area
 
 

@@ -9,7 +9,7 @@ which surfaces differ in the first kind, SURE standard deviations count.
 
 Their numbers were found by experiment, with the share and the phase as they are guessed before (`job.contact_guess`):
 steady states of rough surfaces of 1 to 100 % contact with 12 or 24 of their shortest waves along a side. Those of
-friction are from 36 states on some 110 meshes each, those of the area by maximum likelihood from 24 states on some 20
+friction are from 36 states on some 110 meshes each, those of the area by maximum likelihood from 24 states on some 40
 meshes, with references of 160 cells per shortest wave. Fewer waves count as 12. `scripts/chosen_mesh.py` tells how the
 meshes that follow do on others. Along a direction (x, y) the cells of a grid are hypot(x dx, y dy). Where nothing
 slides, either direction counts as the one along the sliding.
@@ -27,7 +27,7 @@ from ..sections.stages import Initial, Stage, Steady
 
 Vector = tuple[float, float]
 
-SURE = 1.1  # accuracy: standard deviations, with which nine of ten surfaces keep what is asked for
+SURE = 1.2  # accuracy: standard deviations, with which nine of ten surfaces keep what is asked for
 FEW = 12.0  # accuracy: waves along a side; fewer were not tried
 CELLS_PER_WAVE = 8  # accuracy: for an error of 1 %, of squares; fewer under-resolve the contact of the shortest waves
 FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: with which more of them are advised for less
@@ -65,13 +65,14 @@ class Guess(NamedTuple):
 
 def friction_error(c: float, across: float, guess: Guess) -> float:
     """Return the relative error of friction that nine of ten surfaces keep with so many cells along the sliding and
-    across it. Where sliding is slow edges lose power in waves shorter than the cells, which is the last part."""
+    across it. Where sliding is slow edges lose power in waves shorter than the cells. The last part is that of the
+    fewest cells."""
     along = (4.0 / c) ** 1.5
     steep = 0.016 * (1.0 - math.exp(-guess.phase / 1.5)) - 0.0004
     counted = math.hypot((4.0 / c) ** 2.15, 0.13 * (4.0 / across) ** 2.7)
     chance = guess.few * 0.0034 * (1.0 + 4.6 * guess.phase) * counted
     unknown = SURE * math.hypot(chance, 0.007 * guess.phase * along)
-    return guess.spread * (abs(steep) * along + unknown + 0.09 * guess.slow * 4.0 / c)
+    return guess.spread * (abs(steep) * along + unknown + 0.09 * guess.slow * 4.0 / c + 0.008 * (4.0 / c) ** 4)
 
 
 def area_error(c: float, across: float, guess: Guess) -> float:
@@ -79,7 +80,7 @@ def area_error(c: float, across: float, guess: Guess) -> float:
     body, and too little at those across the sliding of a body that loses energy."""
     along, aside = 4.0 / c, 4.0 / across
     known = 0.067 * guess.phase * along - 0.005 * (along + aside)
-    chance = guess.few * 0.0058 * math.hypot(along**1.23, 0.61 * aside**1.23)
+    chance = guess.few * 0.0078 * math.hypot(along**1.2, 0.7 * aside**1.6)
     return guess.spread**0.8 * abs(known) + SURE * guess.spread * chance
 
 
