@@ -9,7 +9,7 @@ from parcontact.errors import InputError
 from .texts import SMALL, job_of, replaced
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1}"
-SLIDING = "[{pressure: 1, velocity: 1, distance: 1e-4, cells_per_step: 2}]"
+SLIDING = "[{pressure: 1e4, velocity: 1, distance: 1e-4, cells_per_step: 2}]"
 
 
 def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:

@@ -46,6 +46,10 @@ PRESS = {"pressure": 1e4}
         (job_of({**ROUGH, "rms_slope": 1.1}, [PRESS]), ["rms slope is 1.1", "0.5 at most"]),
         (job_of(WAVE, [PRESS], material={**RUBBER, "shear_modulus": 2.75}), ["2.75 Pa", "1000 Pa", "MPa"]),
         (job_of(WAVE, [{"pressure": 1e8}]), ["1e+08 Pa is above 2 G/(1 - nu) = 4e+06 Pa", "linear theory"]),
+        (
+            job_of(ROUGH, [{"pressure": 0.1}]),
+            ["under 0.1 Pa", "points of the grid would touch", "0.1 MPa is 1e+05"],
+        ),
         (job_of(WAVE, [{"force": 1e2}]), ["history.0.force: a mean pressure of 1e+08 Pa"]),
         (job_of(SPHERE, [{"force": 1000.0}], grid=FREE), ["history.0: the contact, there,", "0.0015 m", "grid.size"]),
         (
@@ -77,6 +81,20 @@ def test_absurd_jobs_are_told(job: Job, words: list[str], monkeypatch: pytest.Mo
     monkeypatch.setattr(size_advice, "_free", lambda directory: 100e9)
     found = [warning for warning in job.warnings if all(word in warning for word in words)]
     assert len(found) == 1, job.warnings
+
+
+def test_loads_that_press_less_than_one_point_are_told() -> None:
+    """One of 64 x 64 points is a share of 2.4e-4, which sqrt(8/pi) p/(E* h') is at 61 Pa, with E* of 4 MPa and a slope
+    of 0.1; a load that is approached, or sticks, says nothing."""
+    grid = {"points": 64, "size": 1e-3}
+    limit = math.sqrt(math.pi / 8.0) * 4e6 * 0.1 / 64**2
+    for factor, told in ((0.99, True), (1.01, False)):
+        loads = [{"pressure": {"from": 0.0, "to": factor * limit}, "duration": 1.0}]
+        found = [text for text in job_of(ROUGH, loads, grid=grid).warnings if "would touch" in text]
+        assert bool(found) == told
+    sticking = job_of(ROUGH, [{"pressure": 1.0}], grid=grid, adhesion={"work": 0.05, "range": 1e-6})
+    assert not any("would touch" in text for text in sticking.warnings)
+    assert not any("would touch" in text for text in job_of(ROUGH, [{"approach": -1e-7}], grid=grid).warnings)
 
 
 def test_strains_are_judged_after_relaxation() -> None:

@@ -120,6 +120,21 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[str]:
             f"{key}: a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {pressure / strain:.3g} Pa{when}, "
             "where strains are far beyond linear theory; pressures and moduli are both in Pa"
         )
+    yield from _light(job, material, *max((pressure, key) for key, pressure, _ in loads))
+
+
+def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[str]:
+    """Judge the largest load on a rough surface by the share that touches by Persson, erf(sqrt(2) p/(E* h'))."""
+    sticks = getattr(job, "adhesion", None) is not None or any(stage.control == "approach" for stage in job.history)
+    slopes = [shape.rms_slope or 0.0 if isinstance(shape, Rough) else math.inf for shape in job.surface]
+    stiffness = 2.0 * material.long_modulus / (1.0 - material.poisson) * math.hypot(*slopes)
+    known = not sticks and pressure > 0.0 and 0.0 < stiffness < math.inf
+    touching = math.erf(math.sqrt(2.0) * pressure / stiffness) * math.prod(job.grid.points) if known else 1.0
+    if touching < 1.0:
+        yield (
+            f"{key}: under {pressure:.3g} Pa, the largest load, {touching:.2g} points of the grid would touch, "
+            f"and 1 is the least; use a larger load. Pressures are in Pa: {pressure:.3g} MPa is {pressure * 1e6:.3g}"
+        )
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
