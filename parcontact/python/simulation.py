@@ -125,6 +125,12 @@ class Simulation:
         """When and why surfaces that stick have come off under their load, which ends the history; empty otherwise."""
         return self._march.detached
 
+    @property
+    def errors(self) -> dict[str, dict[str, float]]:
+        """Estimated relative errors so far, which the end of a run says: of `friction` and `contact_area_corrected`, as
+        far as they are known, by what makes them and in all (`total`). Rows have those of their instant."""
+        return {name: dict(parts) for name, parts in self._march.state.errors.facts(None).items() if name != "accuracy"}
+
     # -- fields -------------------------------------------------------------------------------------------------------
 
     @property

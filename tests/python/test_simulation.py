@@ -16,6 +16,7 @@ from short_job import STEPS
 
 import parcontact as pc
 from parcontact.__main__ import main
+from parcontact.printed import per_cent
 
 ROOT = Path(__file__).parents[2]
 JOB: dict[str, Any] = {**short_job.JOB, "numerics": {"tolerance": 1e-8}}
@@ -45,6 +46,20 @@ def test_steps_are_rows_of_measures_csv(nowhere: Path) -> None:
         assert list(row) == list(line)
         assert numbers(row) == {name: float(text) for name, text in line.items() if text and name != "seconds"}
     assert rows[-1].friction == rows[-1]["friction"] == float(written[-1]["friction"]) > 0.0
+
+
+def test_errors_are_those_that_a_run_says(nowhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is known before the first step; in the end the parts add up to the total that the command line prints."""
+    run = pc.Simulation(JOB, comm=MPI.COMM_SELF)
+    assert run.errors == {}
+    run.run()
+    (nowhere / "job.yaml").write_text(yaml.safe_dump(JOB))
+    assert main(["job.yaml"]) == 0
+    out = capsys.readouterr().out
+    for name, said in (("friction", "friction"), ("contact_area_corrected", "the corrected contact area")):
+        parts = run.errors[name]
+        assert sum(parts[part] for part in ("solver", "time", "folded", "mesh")) == pytest.approx(parts["total"])
+        assert f"estimated error of {said}: {per_cent(parts['total'], 3)} (" in out
 
 
 def test_a_file_is_as_good_as_a_mapping(nowhere: Path) -> None:
@@ -248,5 +263,6 @@ def test_the_example_of_the_readme(nowhere: Path, outside_mpi: dict[str, str]) -
     words = [sys.executable, "-W", "error", "-c", program]
     done = subprocess.run(words, env=outside_mpi, capture_output=True, text=True, cwd=nowhere)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("friction") == 9
+    (error,) = re.findall(r"^estimated error of friction: (\S+) %$", done.stdout, re.M)
+    assert 0.0 < float(error) < 10.0  # what its job asks for
     assert done.stderr == ""
