@@ -1,28 +1,25 @@
 """Branches without a map in whole runs: what they save and cost, and that restarts wake them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-import yaml
 from csv_rows import rows
 from marching import begun, column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
+from restarting import Bench
 
-from parcontact import job, scene
+from parcontact import scene
 from parcontact.effects.folded_branches import bands, phases
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
-from parcontact.parallel.slab import Slab
 from parcontact.physics.body import ZenerBody
 from parcontact.physics.folding import Band, Phase
-from parcontact.run import runner
-from parcontact.run.run import Options
 
 Json = dict[str, Any]
 
@@ -155,20 +152,11 @@ def test_a_steady_start_freezes_nothing() -> None:
 # -- restarts ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass
-class Place:
-    """Runs jobs in one output directory that all ranks see."""
+class Place(Bench):
+    """Runs of jobs, and what they leave."""
 
-    comm: MPI.Intracomm
-    where: Path
-
-    def run(self, content: Json, name: str = "out", **options: Any) -> None:
-        path = self.where / f"{name}.yaml"
-        if self.comm.rank == 0:
-            path.write_text(yaml.safe_dump(content))
-        self.comm.Barrier()
-        loaded = job.load(path, [f"output.directory={self.where / name}", "checkpoint={every: 100}"])
-        runner.run(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
+    def go(self, content: Json, name: str = "out", **options: Any) -> None:
+        self.run({**content, "checkpoint": {"every": 100}}, self.where / name, **options)
 
     def friction(self, name: str = "out") -> list[str]:
         return [row["friction"] for row in rows(self.where / name / "measures.csv")]
@@ -189,9 +177,9 @@ def place(comm: MPI.Intracomm, shared_path: Path) -> Place:
 def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
     """Two pieces are the whole, and no map of a folded branch is in the checkpoint."""
     content = data(numerics={"branch_error": 1e-2})
-    place.run(content, "whole")
-    place.run(content, until=1e-3)
-    place.run(content)
+    place.go(content, "whole")
+    place.go(content, until=1e-3)
+    place.go(content)
     assert place.friction() == place.friction("whole")
     assert place.maps(13) == place.maps(13, "whole")
     assert [name for name in place.maps(13) if "branch" in name] == ["material/branch 1"]
@@ -202,10 +190,10 @@ def test_a_longer_run_wakes_frozen_branches(place: Place) -> None:
     """In twice the time the slow branch is G u no more. Its map is made, and friction is that of a run that always had
     it: within the error allowed, and not the same."""
     content = data(numerics={"branch_error": 1.5e-3})
-    place.run(content)
+    place.go(content)
     before = place.maps(13)
-    place.run(content, until=5e-3)
-    place.run(content, "whole", until=5e-3)
+    place.go(content, until=5e-3)
+    place.go(content, "whole", until=5e-3)
     assert "material/branch 2" not in before
     assert "material/branch 2" in place.maps(25)
     found, expected = (np.array([float(text) for text in place.friction(name)]) for name in ("out", "whole"))
@@ -218,10 +206,10 @@ def test_a_body_that_had_no_time_wakes_when_it_gets_some(place: Place) -> None:
     To 1e-9, the tolerance: h = G u is what the jump leaves.
     """
     touch, hold = {"pressure": 1e5}, {"pressure": 1e5, "duration": 1e-3, "time_step": 1e-4}
-    place.run(data(touch))
+    place.go(data(touch))
     before = place.maps(1)
-    place.run(data(touch, hold))
-    place.run(data(touch, hold), "whole")
+    place.go(data(touch, hold))
+    place.go(data(touch, hold), "whole")
     assert not [name for name in before if "branch" in name]
     assert [name for name in place.maps(11) if "branch" in name] == ["material/branch 1"]
     found, expected = (np.frombuffer(place.maps(11, name)["material/displacement"]) for name in ("out", "whole"))
@@ -230,11 +218,11 @@ def test_a_body_that_had_no_time_wakes_when_it_gets_some(place: Place) -> None:
 
 def test_a_smaller_error_wakes_all_and_a_larger_one_folds(place: Place) -> None:
     """Either way the run goes on; the branch that had no memory starts again with none."""
-    place.run(data(numerics={"branch_error": 1e-2}), until=1e-3)
-    place.run(data(numerics={"branch_error": 0.0}), until=2e-3)
+    place.go(data(numerics={"branch_error": 1e-2}), until=1e-3)
+    place.go(data(numerics={"branch_error": 0.0}), until=2e-3)
     assert sum("branch" in name for name in place.maps(11)) == 4
-    place.run(data(numerics={"branch_error": 1e-2}))
-    place.run(data(numerics={"branch_error": 0.0}), "whole")
+    place.go(data(numerics={"branch_error": 1e-2}))
+    place.go(data(numerics={"branch_error": 0.0}), "whole")
     assert sum("branch" in name for name in place.maps(13)) == 1
     found, expected = (np.array([float(text) for text in place.friction(name)]) for name in ("out", "whole"))
     assert 0.0 < np.max(np.abs(found - expected)) / expected[-1] < 1e-2
@@ -242,14 +230,14 @@ def test_a_smaller_error_wakes_all_and_a_larger_one_folds(place: Place) -> None:
 
 def test_steps_too_short_for_a_branch_without_memory_are_refused(place: Place) -> None:
     """A stage to come with shorter steps would need what the branch remembered; a fresh start does it."""
-    place.run(data(SLIDE))
+    place.go(data(SLIDE))
     with pytest.raises(InputError, match=r"does not have the branch of relaxation time 1e-06 s, .*never"):
-        place.run(data(SLIDE, SHORT))
-    place.run(data(SLIDE, SHORT), restart="never", until=2e-4)
+        place.go(data(SLIDE, SHORT))
+    place.go(data(SLIDE, SHORT), restart="never", until=2e-4)
 
 
 def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
-    Place(MPI.COMM_SELF, tmp_path).run(data(numerics={"branch_error": 1e-2}), until=2e-4)
+    Place(MPI.COMM_SELF, tmp_path).go(data(numerics={"branch_error": 1e-2}), until=2e-4)
     log = (tmp_path / "out" / "run.log").read_text()
     bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
     assert "branches: 1 of 4 are followed in time; those of 1e-06 s are too fast to remember; those of 3, 10" in log

@@ -14,13 +14,11 @@ from csv_rows import Rows, rows
 from marching import begun, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from restarting import Bench
 
 from parcontact import __main__, job, scene
 from parcontact.job import Job, JobError
-from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
-from parcontact.run import runner
-from parcontact.run.run import Options
 
 from .tread_wear import forget, install, shown
 
@@ -53,12 +51,7 @@ def installed(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.Monkey
 
 def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> Rows:
     """Run the job with wear into a directory that all ranks see; the rows of measures.csv."""
-    path = where / f"{name}.yaml"
-    if comm.rank == 0:
-        path.write_text(yaml.safe_dump(WEAR))
-    comm.Barrier()
-    loaded = job.load(path, [f"output.directory={where / name}"])
-    runner.run(loaded, Slab(comm, NX, NY), Options(quiet=True, **options))
+    Bench(comm, where).run(WEAR, where / name, **options)
     comm.Barrier()
     return rows(where / name / "measures.csv")
 

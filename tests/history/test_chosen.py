@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from csv_rows import measures
+from csv_rows import Rows, measures
 from marching import SLS, begun, column, marched
 from mpi4py import MPI
+from restarting import Bench
 
 from parcontact.history.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
 from parcontact.history.timeline import Timeline
-from parcontact.job import Job, load
-from parcontact.parallel.slab import Slab
-from parcontact.run import runner
-from parcontact.run.run import Options
+from parcontact.job import Job
 
 POINTS = 32
 CELL = 1e-3 / POINTS
@@ -198,19 +196,11 @@ def test_times_of_rows_long_after_the_start() -> None:
 # -- runs -------------------------------------------------------------------------------------------------------------
 
 
-def run(
-    where: Path, comm: MPI.Intracomm, name: str, until: float | None = None, **sections: Any
-) -> list[dict[str, str]]:
+def run(where: Path, comm: MPI.Intracomm, name: str, until: float | None = None, **sections: Any) -> Rows:
     """The rows of a run without their seconds, on root."""
-    output = {"directory": str(where / name), "fields": ["pressure"], "every": 7}
-    path = where / f"{name} {comm.size}.yaml"
-    if comm.rank == 0:
-        path.write_text(job(**{"output": output, **sections}).resolved())
-    comm.Barrier()
-    assert runner.run(load(path), Slab(comm, POINTS, POINTS), Options(True, until=until)) == 0
-    if comm.rank:
-        return []
-    return measures(where / name)
+    output = {"fields": ["pressure"], "every": 7}
+    assert Bench(comm, where).run(data(**{"output": output, **sections}), where / name, until=until) == 0
+    return [] if comm.rank else measures(where / name)
 
 
 @pytest.mark.mpi(3)
@@ -234,7 +224,7 @@ def test_a_run_in_pieces_has_the_same_steps(
 def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
     """The instants are the same to the last bit, friction to some roundings of search directions, 6e-8, of its largest:
     at rest it is noise."""
-    found: list[list[dict[str, str]]] = []
+    found: list[Rows] = []
     for comm in communicators:
         found.append(run(shared_path, comm, f"on {comm.size}"))
         comm.Barrier()

@@ -9,6 +9,7 @@ import yaml
 from marching import marched
 from mpi4py import MPI
 from numpy.typing import NDArray
+from restarting import Bench
 
 from parcontact import job as jobs
 from parcontact.errors import JobError, RunError
@@ -43,12 +44,7 @@ def data(points: int = 32, check: bool = True, **changes: Any) -> Json:
 
 
 def run(job: Json, out: Path, comm: MPI.Intracomm = MPI.COMM_SELF) -> int:
-    path = out.with_suffix(".yaml")
-    if comm.rank == 0:
-        path.write_text(yaml.safe_dump(job))
-    comm.Barrier()
-    loaded = jobs.load(path, [f"output.directory={out}"])
-    return runner.run(loaded, Slab(comm, *loaded.grid.points), Options(quiet=True))
+    return Bench(comm, out.parent).run(job, out)
 
 
 def columns(out: Path, *names: str) -> list[Series]:
