@@ -65,12 +65,11 @@ def test_the_mesh_part_is_the_difference(comm: MPI.Intracomm, shared_path: Path)
     if comm.rank:
         return
     assert not (shared_path / "plain" / half_mesh.DIRECTORY).exists()
-    names = ("friction", "contact_area_corrected", "contact_area", "error_friction", "error_area")
-    friction, area, counted, *estimates = (column[1:] for column in columns(shared_path / "plain", *names))
+    names = ("friction", "contact_area_corrected", "error_friction", "error_area")
+    friction, area, *estimates = (column[1:] for column in columns(shared_path / "plain", *names))
     coarse = (column[1:] for column in columns(shared_path / "half", *names[:2]))
-    errors = (column[1:] for column in columns(shared_path / "checked", *names[3:]))
-    correction = (counted - area) / area
-    estimated = (mesh_part(data(check=False)), 0.25 * correction + 0.6 * correction**2)
+    errors = (column[1:] for column in columns(shared_path / "checked", *names[2:]))
+    estimated = mesh_parts(data(check=False))
     for values, other, order, error, estimate, mesh in zip(
         (friction, area), coarse, (WAVES_ORDER, CORRECTED_ORDER), errors, estimates, estimated, strict=True
     ):
@@ -81,11 +80,11 @@ def test_the_mesh_part_is_the_difference(comm: MPI.Intracomm, shared_path: Path)
         assert (error - estimate + mesh)[known] == pytest.approx(apart[known], rel=5e-3)  # less of what edges lose
 
 
-def mesh_part(job: Json) -> Series:
-    """Return the mesh part of the error of friction in each step of a job."""
-    _, rows = marched(Job.model_validate(job))
-    parts = [row.errors.friction.mesh for row in rows if row.errors and row.errors.friction]
-    return np.array(parts)
+def mesh_parts(job: Json) -> tuple[Series, Series]:
+    """Return the mesh part of the errors of friction and area in each step of a job."""
+    budgets = [row.errors for row in marched(Job.model_validate(job))[1] if row.errors]
+    friction = [budget.friction.mesh for budget in budgets if budget.friction]
+    return np.array(friction), np.array([budget.area.mesh for budget in budgets if budget.friction])
 
 
 def test_it_is_honest(tmp_path: Path) -> None:
@@ -99,7 +98,7 @@ def test_it_is_honest(tmp_path: Path) -> None:
     _, rows = marched(Job.model_validate(data(128, False, history=[{**slide, "cells_per_step": 4}])))
     exact = np.array([row.measures.friction for row in rows])
     late = slice(-32, None)
-    estimated = mesh_part(data(history=[slide], check=False))
+    estimated, _ = mesh_parts(data(history=[slide], check=False))
     mesh = (friction[late] * (error[late] - estimate[late] + estimated[late])).mean()
     assert 0.5 < mesh / np.abs(friction - exact)[late].mean() < 5.0
 
