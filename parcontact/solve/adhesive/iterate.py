@@ -36,7 +36,8 @@ class GapOperators(NamedTuple):
 class GapSolution:
     """Solved gap (the map that was given as the start) and pressure (the solver's map, valid until the next solve).
 
-    `failure` is empty, or says what happened instead; `detached` says that no equilibrium was left under the load.
+    `failure` is empty, or says what happened instead; `detached` says that no equilibrium was left under the load,
+    `jumped` that it went through states that are not stable.
     """
 
     gap: Array
@@ -46,6 +47,7 @@ class GapSolution:
     iterations: int
     failure: str
     detached: bool = False
+    jumped: bool = False
 
 
 @dataclass

@@ -90,7 +90,7 @@ class GapSolver:
         they are given; collective."""
         it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
-        best, scale, iteration, stuck = (math.inf, 0), 0.0, 0, False
+        best, scale, iteration, stuck, jumped = (math.inf, 0), 0.0, 0, False, False
         while True:
             members, lost = self._find_residual(it, g)
             certificate, exact = self._precondition(it, g, other, tolerance)
@@ -102,14 +102,14 @@ class GapSolver:
                 if g is not gap:
                     gap[...] = g
                 self._find_pressure(it)
-                return GapSolution(gap, self._q, it.d, certificate, iteration, failure, lost)
+                return GapSolution(gap, self._q, it.d, certificate, iteration, failure, lost, jumped)
             scale = self._turn(it, members, scale, other)
             if not self._descend(it, g, other):
                 members, _ = self._find_residual(it, g)  # where z points across a bound: c does not
                 self._turn(it, members, 0.0, self._way)
                 scale, stuck = 0.0, not self._descend(it, g, other)
             if not it.stable:  # on its way from one equilibrium to another, where certificates rise first
-                best = (math.inf, iteration)
+                best, jumped = (math.inf, iteration), True
             if not stuck:
                 g, other = other, g
             iteration += 1

@@ -7,9 +7,9 @@ same, so that one pass or two do as a rule.
 
 A contact that fills its box may be softer on B than on A, in its mean or in waves whose ends meet across the edges. An
 equilibrium that is stable on A then is none on B: passes jump over it, and go round between the two states beside it.
-Such a solve begins again from its start with the operator A itself, whose inverse takes some iterations
-(`free_inverse`). So E falls, and no equilibrium is passed over. Under a given mean pressure P, `p = K (g + h - P A 1) +
-P` with the inverse K of A on pressures whose mean is 0.
+So a solve whose later passes jump or come off, or are too many, begins again from its start with the operator A itself,
+whose inverse takes some iterations (`free_inverse`). Then E falls, and no equilibrium is passed over. Under a given
+mean pressure P, `p = K (g + h - P A 1) + P` with the inverse K of A on pressures whose mean is 0.
 """
 
 import math
@@ -30,6 +30,7 @@ from .solver import GapSolver
 MAX_PASSES = 12  # tuning: of a free body, before its own operator is used; one to three do as a rule
 LEFT = 0.8  # accuracy: of the tolerance, for such a solve; the rest is for the inverse
 DIGITS = 0.01  # accuracy: of the inverse, over the tolerance
+UNSETTLED = "did not settle in a free box"
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
 
 
@@ -84,8 +85,8 @@ class StickingSolver:
         out: Array,
         tolerance: float,
     ) -> tuple[GapSolution, int]:
-        """Repeat the solve of a free body until what is lagged changes no more; returns the solution and the iterations
-        of all passes; collective."""
+        """Repeat the solve of a free body until what is lagged changes no more; returns the solution, which has failed
+        where it does not settle, and the iterations of all passes; collective."""
         iterations, share, last = 0, 1.0, lag
         for passes in range(1, MAX_PASSES + 1):
             found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
@@ -94,9 +95,11 @@ class StickingSolver:
             share = self._share(share, out, change, last) if passes > 1 else 1.0
             last = change
             lag += share * change
-            if found.failure or found.detached or worst <= tolerance:
+            if found.failure or worst <= tolerance or (found.detached and passes == 1):
                 return found, iterations
-        return replace(found, failure=_unsettled(f"{MAX_PASSES} passes", worst, tolerance)), iterations
+            if passes > 1 and (found.jumped or found.detached):
+                break
+        return replace(found, failure=UNSETTLED), iterations
 
     def _solve_free(
         self,
@@ -126,7 +129,8 @@ class StickingSolver:
         repeated.operator.apply(out, lag)
         np.subtract(work.displacement, lag, out=lag)
         if not found.failure and worst > tolerance:
-            return replace(found, failure=_unsettled("the solve", worst, tolerance))
+            asked = f"changes are {worst:.3g} where {tolerance:.3g} was asked for"
+            return replace(found, failure=f"{UNSETTLED}: {asked}")
         return found
 
     def _compare(
@@ -163,7 +167,3 @@ class StickingSolver:
     def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
         """The solution as a contact, whose displacement is in the workspace."""
         return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)
-
-
-def _unsettled(what: str, worst: float, tolerance: float) -> str:
-    return f"did not settle in {what} of a free body: changes are {worst:.3g} where {tolerance:.3g} was asked for"

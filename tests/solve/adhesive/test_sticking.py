@@ -108,3 +108,23 @@ def test_a_state_that_is_stable_on_the_free_body_alone(
     assert_allclose(free.apply(p, slab.zeros()), gap + heights[slab.rows] + contact.d, rtol=0.0, atol=10.0 * TIGHT)
     repeated = solver.gaps.operators.operator.apply(p, slab.zeros())
     assert_allclose(lag, free.apply(p, slab.zeros()) - repeated, rtol=0.0, atol=TIGHT)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("pull", [2.697, 2.784])
+def test_a_load_that_the_free_body_alone_holds(comm: MPI.Intracomm, pull: float) -> None:
+    """The first pass holds it, as what is lagged is that of a contact without load; later ones come off. The gap is
+    that of the matrix, to 30 tolerances."""
+    points, law = 4, Law(0, 8.7, 0.79)
+    heights = np.tile(np.cos(2.0 * np.pi * np.arange(points) / points), (points, 1))
+    expected = heights.max() - heights
+    slab, _, solver = sticking(comm, points)
+    gap, lag, p = slab.zeros(), slab.zeros(), slab.zeros()
+    gap[...] = expected[slab.rows]
+    for load in (0.0, -pull):
+        expected = fallen(law, heights, MeanPressure(load), expected)
+        contact, detached = solver.solve(law, heights[slab.rows], MeanPressure(load), gap, lag, p)
+        assert not contact.failure
+        assert not detached
+        assert_allclose(gap, expected[slab.rows], rtol=0.0, atol=30.0 * TIGHT * law.range)
+    assert expected.min() == 0.0
