@@ -24,7 +24,7 @@ FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by th
 
 
 class Told(NamedTuple):
-    """What to say of measured maps: notes on how they were prepared, on root; doubts, on every rank."""
+    """What a user is told of measured maps: root has notes on how they were prepared, and every rank has doubts."""
 
     notes: list[str]
     doubts: list[str]

@@ -123,13 +123,14 @@ def _results(case: Case) -> dict[str, Any]:
     directory, row = case.job.output.directory, dict[str, Any]()
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
         columns = _columns(directory / name) or {"time": []}
-        solved = len(columns["time"]) > 1  # beside the start
-        if solved:
+        if len(columns["time"]) < 2 and not prefix:  # nothing but the start
+            continue
+        if columns["time"]:
             found = slide.measure(case.job.history, columns)
             ends = {name: columns[name][-1] for name in RESULTS if name in columns}
             known = ends if found is None else {key: value for key, value in found._asdict().items() if value == value}
             row |= {f"{prefix}{key}": value for key, value in known.items()}
-        if solved and not prefix:
+        if not prefix:
             row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])

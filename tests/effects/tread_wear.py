@@ -25,7 +25,7 @@ def install(directory: Path, module: str) -> None:
 
 
 def forget() -> None:
-    """What was found before is looked for anew."""
+    """The program forgets the sections that it has found, and looks for them anew."""
     for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
         found.cache_clear()
     sys.modules.pop("tread_wear", None)

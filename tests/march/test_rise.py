@@ -1,4 +1,4 @@
-"""What steps tell the estimate of the error of rising friction: its change, and how uneven pressures are."""
+"""Steps tell the estimate of the error of rising friction by how much it changed, and how uneven pressures are."""
 
 import math
 from typing import Any

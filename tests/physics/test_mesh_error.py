@@ -38,8 +38,8 @@ def test_the_mesh_along_the_sliding_and_across_it(way: tuple[float, float], alon
 
 @pytest.mark.parametrize(("cells", "counts"), [(8.0, 0.2), (3.5, 0.2 * (4.0 / 3.5) ** 6), (2.5, 1.0)])
 def test_waves_of_steady_sliding(cells: float, counts: float) -> None:
-    """Of the module of `mesh_error`: of what waves make in a march a fifth, by the root of what is open, a point of
-    10 000 at least. A map may lack waves, so that it counts in full contact, too, and rises below 4 cells."""
+    """A steady state has a fifth of what waves make in a march, by the root of what is open, a point of 10 000 at
+    least. A map may lack waves, so that its share counts in full contact, too, and rises below 4 cells."""
     for area in (0.1, 0.9999, 1.0):
         seen, known = replace(SEEN, area=area, corrected=area, way=(1.0, 0.0)), replace(KNOWN, cells_per_wave=cells)
         bare = sum(friction_by_mesh(replace(known, cells_per_wave=None), seen, 10_000, steady=True))

@@ -73,7 +73,7 @@ def test_meshes_of_spots_go_by_their_error() -> None:
 
 
 def test_with_points_auto_meshes_are_those_of_auto() -> None:
-    """Of the whole job also where its steady states alone are priced; its own accuracy has its own mesh."""
+    """Meshes are those of the whole job, also where its steady states alone are priced, and its own at its accuracy."""
     steady = {"velocities": [1e-2], "pressures": [1e4]}
     given = {**plain(job(steady=steady)), "grid": {"points": "auto", "size": 1e-3}}
 

@@ -52,7 +52,7 @@ def test_areas_are_corrected(tmp_path: Path, drawn: list[Figure]) -> None:
 
 
 def test_no_panel_of_friction_that_is_0(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Of a flat surface that slides."""
+    """A flat surface slides without friction."""
     plots.plot([ran(tmp_path, WAVE.replace("1.0e-6", "0.0") + ZENER + SLIDE)])
     assert panels(drawn[0]) == [FRACTION, PEAK]
 

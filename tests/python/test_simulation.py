@@ -49,7 +49,7 @@ def test_steps_are_rows_of_measures_csv(nowhere: Path) -> None:
 
 
 def test_errors_are_those_that_a_run_says(nowhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nothing is known before the first step; in the end the parts add up to the total that the command line prints."""
+    """No error is known before the first step; in the end the parts add up to the total of the command line."""
     run = pc.Simulation(JOB, comm=MPI.COMM_SELF)
     assert run.errors == {}
     run.run()

@@ -245,7 +245,7 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
 def test_a_job_to_start_from_asks_for_what_its_points_keep(
     shared_path: Path, main: "Main", monkeypatch: pytest.MonkeyPatch, cells: int, more: str, written: str
 ) -> None:
-    """Of the accuracies it writes the smallest for which `points: auto` takes no more points than the map has."""
+    """The command writes the smallest accuracy for which `points: auto` takes no more points than the map has."""
     np.save(shared_path / "road.npy", truth.rough(POINTS, LENGTH, 2.5e-4, cells * LENGTH / POINTS, SLOPE) * 1e6)
     monkeypatch.chdir(shared_path)
     words = ["surface", "road.npy", "--set", "surface.unit=um", "--set", "surface.size=[1e-3, 1e-3]"]

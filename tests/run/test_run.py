@@ -41,7 +41,7 @@ def test_what_a_smaller_accuracy_would_help(slide: dict[str, Any], numerics: dic
 def test_no_error_is_stated_where_the_box_cuts_a_contact_off(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of the steps at the edge there is no error, and the end says so; a step inside has one."""
+    """Steps at the edge have no error, and the end says so; a step inside has one."""
     data = {
         "grid": {"points": 32, "size": 1e-3, "boundary": "free"},
         "surface": {"shape": "sphere", "radius": 1e-2},

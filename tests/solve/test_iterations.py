@@ -50,7 +50,7 @@ def test_last_gap(two_ways: bool, share: float) -> None:
 
 
 def reversals(count: list[int]) -> int:
-    """How often a count that has fallen rises, or the other way round."""
+    """Return how often a count that has fallen rises, or the other way round."""
     steps = [after - before for before, after in pairwise(count) if after != before]
     return sum(first * second < 0 for first, second in pairwise(steps))
 

@@ -124,12 +124,14 @@ def test_so_does_a_table_without_a_column(cases: tuple[Case, ...]) -> None:
 
 
 def test_the_start_is_no_result(cases: tuple[Case, ...]) -> None:
-    """Of a case that failed in its first step: areas of 0 would count in means."""
+    """A case that failed in its first step has no areas of 0, which would count in means. A row of theory counts."""
     cases[0].job.output.directory.mkdir(parents=True)
     head = "step,time,distance,friction,contact_area,residual,seconds"
     (cases[0].job.output.directory / "measures.csv").write_text(f"{head}\n0,0,0,0,0,0,0\n")
+    (cases[0].job.output.directory / "theory.csv").write_text("time,distance,friction,contact_area\n0,0,0,0.3\n")
     sweep_table.write(Path("out/job"), cases)
     assert [table()[0][name] for name in ("contact_area", "residual", "seconds")] == ["", "", ""]
+    assert table()[0]["theory_contact_area"] == "0.3"
 
 
 def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

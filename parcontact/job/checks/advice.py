@@ -35,7 +35,8 @@ def resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = 
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
             yield from _long_waves(index, shape, grid)
-            yield from (f"grid.size {text}" for text in [out_of_proportion(index, shape, grid)] if text)
+            if text := out_of_proportion(index, shape, grid):
+                yield f"grid.size {text}"
             if not chosen:
                 yield from _short_waves(index, shape, grid, numerics.asked, directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)

@@ -76,14 +76,7 @@ class StickingSolver:
         return self._contact(found, out, iterations), found.detached
 
     def _settle(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        lag: Array,
-        out: Array,
-        tolerance: float,
+        self, law: Law, heights: Array, control: Control, gap: Array, lag: Array, out: Array, tolerance: float
     ) -> tuple[GapSolution, int]:
         """Repeat the solve of a free body until what is lagged changes no more; returns the solution, which has failed
         where it does not settle, and the iterations of all passes; collective."""
@@ -102,14 +95,7 @@ class StickingSolver:
         return replace(found, failure=UNSETTLED), iterations
 
     def _solve_free(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        lag: Array,
-        out: Array,
-        tolerance: float,
+        self, law: Law, heights: Array, control: Control, gap: Array, lag: Array, out: Array, tolerance: float
     ) -> GapSolution:
         """Solve with the operator of a free body itself, and find what is lagged; collective."""
         assert self.free is not None
