@@ -59,7 +59,6 @@ class Job(Part):
         Rule(("surface",), limits.some_shape),
         Rule(("grid", "surface"), limits.waves_fit),
         Rule(("grid", "surface"), limits.arrays_fit),
-        Rule(("grid", "surface", "output"), limits.half_mesh_fits),
         Rule(("history", "steady"), limits.some_history),
         Rule(("history", "initial"), limits.some_load),
         Rule(("history",), limits.loads_press),

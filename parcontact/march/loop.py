@@ -20,14 +20,10 @@ from .sticking import NEVER
 
 
 class March:
-    """A scene at an instant; it advances step by step.
-
-    `compare`, if there is one, returns a row with errors that are known better than from the step alone.
-    """
+    """A scene at an instant; it advances step by step."""
 
     def __init__(self, scene: Scene, state: State | None = None) -> None:
         self.scene = scene
-        self.compare: Callable[[Row], Row] = lambda row: row
         self.state = self._weighed(first_state(scene) if state is None else state)
 
     @property
@@ -69,21 +65,15 @@ class March:
         return self.row
 
     def _weighed(self, state: State, since: Row | None = None) -> State:
-        """Return the state with its errors as they are known best, and added to the sums; a first state begins them."""
-        row = self.compare(state.row)
+        """Return the state with its errors added to the sums; a first state begins the sums."""
+        row = state.row
         if row.errors is None:
             return state
         friction = row.measures.friction if row.distance > 0.0 else 0.0
         if since is None:
-            return replace(state, row=row, errors=ErrorSums().plus(row.errors, friction, 0.0))
+            return replace(state, errors=ErrorSums().plus(row.errors, friction, 0.0))
         seconds, slid = row.time - since.time, row.distance - since.distance
-        return replace(state, row=row, errors=state.errors.plus(row.errors, friction, seconds, slid))
-
-    def compare_with(self, compare: Callable[[Row], Row]) -> None:
-        """Know errors better from now on, those of a first state included."""
-        self.compare = compare
-        if self.row.step == 0:
-            self.state = self._weighed(self.state)
+        return replace(state, errors=state.errors.plus(row.errors, friction, seconds, slid))
 
     def restore(self, contents: Contents) -> None:
         """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""

@@ -15,7 +15,7 @@ folded: the bound of the branches without a map.
 mesh: of friction by how much its two views differ, by the slopes of the rigid surface and of the body (`slopes`), or
     by what edges of contact lose in waves shorter than the cells, and what both views have in common: from the cells
     per shortest wave of a rough surface, and per radius of the spots of contact (`mesh_error`). Of the corrected area
-    from the correction itself. Where there is a run on half the mesh, both from their difference to it.
+    from the correction itself.
 
 Friction is the small difference of large forces where its coefficient is less than the slopes of the surface: what is
 wrong with pressures then counts more, by about the root of the ratio. Pressures that are wrong by the complementarity
@@ -41,14 +41,13 @@ from numpy.typing import NDArray
 
 from ..printed import per_cent
 from .entries import Entry, Saved
-from .mesh_error import SPOTS_ORDER, SPOTS_POWER, WAVES_ORDER, area_by_mesh, friction_by_mesh, lost_at_edges
+from .mesh_error import SPOTS_POWER, area_by_mesh, friction_by_mesh, lost_at_edges
 from .time_error import RunProperties, StepObservation, count_spots, share_of_area, time_error
 
 # accuracy: these constants are fitted to true errors, as the text above says
 SOLVER_FRICTION = 1.1  # times the complementarity, over the power SPOTS_POWER of the number of spots
 SOLVER_AREA, SOLVER_AREA_POWER = 0.1, 0.7  # times this power of it
 PENETRATING = 0.8  # of the points that penetrate without pressure are missing in the contact, but for those in excess
-CORRECTED_ORDER = 1.0  # of the corrected area
 NOISE = 0.4  # of the slope of the surface, times the complementarity: tangential force where there is no friction
 BY_ENERGY = 0.3  # of the difference of the views, in steady sliding
 PRESSURES = 0.3  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
@@ -81,11 +80,6 @@ class Parts:
     def plain(self) -> dict[str, float]:
         """Return the parts that add up, that of the mesh which is made across the sliding, and all of them."""
         return {name: getattr(self, name) for name in NAMES} | {"mesh_across": self.across, "total": self.total}
-
-    def with_mesh(self, error: float) -> "Parts":
-        """Return the same with another error by the mesh, in the same proportions."""
-        times = error / self.mesh if self.mesh > 0.0 else 0.0
-        return replace(self, mesh=error, across=self.across * times, edges=self.edges * times)
 
 
 NAMES = ("solver", "time", "folded", "mesh")  # that add up
@@ -161,32 +155,6 @@ def _friction(run: RunProperties, observed: StepObservation, points: int, time: 
     lost = lost_at_edges(run, observed, points, steady=False)
     mesh = max(observed.views_apart / observed.friction, lost) + along + across
     return Parts(max(solver, noise), time, run.folded, mesh, across, lost)
-
-
-def compared_with_half_mesh(
-    budget: ErrorBudget,
-    here: tuple[float, float],
-    coarse: tuple[float, float],
-    waves: bool,
-    coarse_error: float = math.nan,
-) -> ErrorBudget:
-    """Return the budget with what another run shows of the mesh: `here` friction and corrected area of an instant,
-    `coarse` those with twice the cell. As errors go with the power p of the cell, the difference is 2^p - 1 of them.
-
-    With p as above, but 1 for what edges of contact lose, and 1 for the corrected area. A run with other time steps has
-    another error of time, by which it takes friction for too small: `coarse_error` is that of its friction in all, by
-    its budget, NaN if it has the same steps, or none. Of that, solver and folded branches make as much as here, the
-    mesh 2^p times as much, and the steps the rest.
-    """
-    found, own, other = budget.friction, here[0], coarse[0]
-    first = min(1.0, found.edges / found.mesh) if found is not None and found.mesh > 0.0 else 0.0
-    times = 2.0 * first + 2.0 ** (WAVES_ORDER if waves else SPOTS_ORDER) * (1.0 - first)
-    if found is not None and math.isfinite(coarse_error):
-        by_steps = max(coarse_error - found.solver - found.folded - times * found.mesh, 0.0)
-        own, other = own * (1.0 + found.time), other * (1.0 + by_steps)
-    friction = (abs(own - other) / own if own > 0.0 else 0.0) / (times - 1.0)
-    area = (abs(here[1] - coarse[1]) / here[1] if here[1] > 0.0 else 0.0) / (2.0**CORRECTED_ORDER - 1.0)
-    return ErrorBudget(found and found.with_mesh(friction), budget.area.with_mesh(area))
 
 
 def _area(run: RunProperties, observed: StepObservation, points: int, time: float) -> Parts:

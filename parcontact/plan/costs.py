@@ -16,8 +16,6 @@ from .sample import Sample
 
 TRIED_BYTES = 32 << 20  # tuning: written to see how fast that is
 SLOW_WRITE = 100e6  # tuning: bytes per second, where that cannot be seen
-HALF_MESH = 0.3  # tuning: of the time of a run, that on half the mesh: a quarter of the points, some more calls
-HALF_MESH_CHOSEN = 0.2  # tuning: the same in steps that are chosen, half as many
 
 
 @dataclass(frozen=True)
@@ -55,10 +53,8 @@ class Costs:
 
     @property
     def marching(self) -> float:
-        """Return the seconds of all steps, or steady states; with those on half the mesh, which comes first."""
-        part = HALF_MESH_CHOSEN if Timeline.of(self.job).chooses else HALF_MESH
-        beside = part if self.job.history and choices(self.job).mesh_check.on else 0.0
-        return self.sample.steps * self.step * (1.0 + beside)
+        """Return the seconds of all steps, or steady states."""
+        return self.sample.steps * self.step
 
     @property
     def building(self) -> float:

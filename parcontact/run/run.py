@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from .. import scene
 from ..errors import InputError, RunError
@@ -33,18 +32,15 @@ DONE, STOPPED_EARLY = 0, 3  # exit codes: as asked; stopped early with a good ch
 class Options:
     """Options beside a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
-    A run `beside` another one ends with that one's stop file, and warns of nothing about its scene. A case of a sweep
-    ends with the stop file of all, `others_file`, too. Doubts about a scene that are not shown, as `shows` says, go
-    into run.log only.
+    A case of a sweep ends with the stop file of all cases, `others_file`, too. Doubts about a scene for which `shows`
+    is False go into run.log only.
     """
 
     quiet: bool = False
     restart: str = "auto"
     until: float | None = None
     wall: float | None = None
-    stop_file: Path | None = None
     others_file: StopFile | None = None
-    beside: bool = False
     shows: Callable[[str], bool] = always
 
 
@@ -61,9 +57,8 @@ class Run:
         self.facts, self.options, self.console = facts, options, recorder.console
         self.slab, self.job = march.scene.slab, march.scene.job
         self.timeline = march.timeline(options.until or 0.0)
-        known = set(sanity.ODD_CONTACTS if options.beside else ())
         more = more_points(self.job.grid)
-        self.contacts = sanity.ContactWatch(self.job.numerics.strict, self.timeline, known, more)
+        self.contacts = sanity.ContactWatch(self.job.numerics.strict, self.timeline, more=more)
         self.watch.state_bytes = sum(entry.nbytes for entry in march.entries().values()) * self.slab.comm.size
         self.first, self.saved, self.failed, self.stop = march.row.step, -1, False, ""
         self.began, self.saving = time.monotonic(), 0.0

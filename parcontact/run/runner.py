@@ -1,11 +1,10 @@
 """From a job to a run in its output directory: it begins, or goes on from a checkpoint."""
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import Any
 
 from ..effects.effect import columns_of
-from ..errors import InputError, RunError
+from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Timeline
 from ..job import Job, Rough, RoughSpectrum
@@ -19,13 +18,11 @@ from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, marker, row, wisdom
 from ..storage.checkpoint import Contents, Facts
-from ..storage.console import Console
 from ..storage.directory import Directory
 from ..storage.marker import Claim
 from ..storage.provenance import Link, Provenance, cite_lines, extended
 from ..storage.recorder import Recorder, Recording
-from . import half_mesh, restart, watch
-from .half_mesh import HalfMesh
+from . import restart, watch
 from .restart import Origin
 from .run import DONE, Options, Run
 from .watch import Watch
@@ -59,8 +56,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         transforms = choices(job).transforms
         wisdom.recall(transforms, slab, saved.numbers.get("plans/all") if saved else None)
         march = steadystart.first(job, slab, options.until or 0.0, saved)
-        found = sanity.find_doubts(march.scene.setup)
-        doubts = () if options.beside else tuple(found)
+        doubts = tuple(sanity.find_doubts(march.scene.setup))
         wisdom.keep(transforms, slab)
         claim = restart.claim(plain, origin)
         facts = Facts(plain, provenance_of(job, slab, saved, doubts), claim.id)
@@ -74,11 +70,8 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None
             with Signals().noted() as signals:
-                stop_file = options.stop_file or directory.stop_file
-                watching = Watch(slab, job.checkpoint, stop_file, signals, limit, options.others_file)
-                code = _run_on_half_mesh(march, recorder.console, replace(options, stop_file=stop_file))
-                if code == DONE:
-                    code = Run(march, directory, recorder, watching, facts, options).go(saved)
+                watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit, options.others_file)
+                code = Run(march, directory, recorder, watching, facts, options).go(saved)
                 return Ended(code, march)
         finally:
             recorder.close()
@@ -110,36 +103,6 @@ def _find_origin(
     if reason and (lost := on_root(slab.comm, lambda: marker.find_lost_rows(directory.path))):
         raise InputError(lost)
     return origin, warnings, reason
-
-
-def _run_on_half_mesh(march: March, console: Console, options: Options) -> int:
-    """Run the job on half the mesh if that is asked for, and compare the march with it; returns the exit code;
-    collective.
-
-    Where that cannot be done the run goes on without it.
-    """
-    job, slab = march.scene.job, march.scene.slab
-    if not march.scene.choices.mesh_check.on:
-        return DONE
-    half = half_mesh.job_on_half_mesh(job)
-    grid, where = half.grid, half.output.directory
-    console.say(f"mesh check: {grid.nx} x {grid.ny} points first, in {where}")
-    afresh = replace(options, quiet=True, beside=True, restart="never")
-    own = slab.resized(*grid.points)
-    try:
-        try:
-            code = run(half, own, afresh if options.restart == "never" else replace(afresh, restart="auto"))
-        except InputError:  # of an earlier run of another job
-            code = run(half, own, afresh)
-        if code != DONE:
-            console.say(f"stopped in the run on half the mesh, {where}; run again to go on")
-            return code
-        found = HalfMesh.read(half, slab)
-    except (InputError, RunError) as error:
-        console.warn(f"mesh check: the run on half the mesh failed, and its errors are estimated: {error}")
-        return DONE
-    march.compare_with(partial(found.known_better, timeline=march.timeline(options.until or 0.0)))
-    return DONE
 
 
 def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:

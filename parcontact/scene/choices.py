@@ -279,12 +279,6 @@ class Choices:
             return False, "the body has no branch"
         return asked, f"output.branch_dissipation is {'' if asked else 'not '}set"
 
-    @decided("run on half the mesh")
-    def mesh_check(self) -> Verdict:
-        """The same run on half the mesh first, from which what the mesh makes wrong is seen."""
-        asked = self.output.mesh_check
-        return asked, f"output.mesh_check is {'set: an eighth to a third of the work more' if asked else 'not set'}"
-
     @decided("fields")
     def fields(self) -> Verdict:
         """Maps in fields.h5."""

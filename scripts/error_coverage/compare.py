@@ -18,11 +18,11 @@ import runs
 
 from parcontact import scene
 from parcontact.errors import InputError, RunError
+from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import NAMES, Parts, weight_of
-from parcontact.run.half_mesh import place_of
 from parcontact.steady_sliding import curve
 from parcontact.steady_sliding.sliding import SteadySliding
 
@@ -89,6 +89,14 @@ def _march(job: Job) -> Series:
     total = max(sum(row[2] for row in rows), 1e-300)
     means = [sum(row[2] * row[column] for row in rows) / total for column in COLUMNS.values()]
     return Series(rows, _within(march.state.errors, means), len(rows) - 1)
+
+
+def place_of(timeline: Timeline, step: int) -> int:
+    """Return how many rows before that of a step have its time; the initial state is one, at 0."""
+    time, place = timeline[step].time if step else 0.0, 0
+    while place < step and (timeline[step - place - 1].time if step > place + 1 else 0.0) == time:
+        place += 1
+    return place
 
 
 def _within(errors: object, means: list[float]) -> dict[str, dict[str, float]]:

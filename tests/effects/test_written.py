@@ -1,6 +1,5 @@
 """What a run writes where it is asked for, and that nothing is made for it elsewhere."""
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -72,18 +71,6 @@ def test_dissipation_per_branch(run: Callable[..., Path]) -> None:
     assert ["dissipated_0" in columns for columns in found] == [False, False, True]
     assert np.isnan(found[0]["work"]).all()
     assert not np.isnan(found[1]["work"]).any()
-
-
-def test_run_on_half_the_mesh(run: Callable[..., Path]) -> None:
-    """Only where it is asked for, and then no map more in the run itself."""
-    name, found = "run on half the mesh", {}
-    for mesh_check in (False, True):
-        output = {"mesh_check": mesh_check}
-        assert row(job(output=output), name).on == mesh_check
-        out = run(str(mesh_check), output=output)
-        assert (out / "half_mesh").exists() == mesh_check
-        (found[mesh_check],) = re.findall(r"map bytes (\d+)", (out / "run.log").read_text())
-    assert found[True] == found[False]
 
 
 def test_counts_are_in_the_log(run: Callable[..., Path]) -> None:

@@ -117,7 +117,7 @@ def test_chosen_steps_make_what_they_are_chosen_for() -> None:
 
 
 def test_steps_are_never_longer_than_a_cell() -> None:
-    """However accurate they are; half the mesh needs half as many."""
+    """However accurate they are; a grid with half the points needs half as many."""
     found = price.offer(costs(job(), time=1e-9), 0.05)
     assert (found.job.grid.nx, found.sample.steps) == (48, 1 + 48)
 

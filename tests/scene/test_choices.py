@@ -276,7 +276,6 @@ TESTED = {
         "steady start",
         "displacement control",
         "dissipation per branch",
-        "run on half the mesh",
         "yielding counterbody",
         "adhesion",
     ),

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...errors import InputError
 from ..sections.calculation import Body, Grid, Numerics, Output
-from ..sections.geometry import OnOneMesh, Rough
+from ..sections.geometry import Rough
 from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
@@ -64,20 +64,6 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
                 sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
                 yield Fault(sentence, ("surface", index, "waves", number))
 
-
-def half_mesh_fits(grid: Grid, surface: tuple[Any, ...], output: Output) -> Iterator[Fault]:
-    """Check that the same scene can be made on half of the mesh."""
-    key = ("output", "mesh_check")
-    if not output.mesh_check or next(waves_fit(grid, surface), None):
-        return
-    if any(n % 2 for n in grid.points if n > 1):
-        yield Fault(f"needs even numbers of grid.points, got {list(grid.points)}", key)
-    for index, shape in enumerate(surface):
-        if isinstance(shape, OnOneMesh):
-            yield Fault(f"the heights of surface.{index} are given on one mesh, and cannot be put on half of it", key)
-    half = grid.model_copy(update={"points": tuple(max(n // 2, 1) for n in grid.points)})
-    for fault in waves_fit(half, surface):
-        yield Fault(f"on half the mesh {'.'.join(map(str, fault.path))} {fault.predicate}", key)
 
 
 def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:

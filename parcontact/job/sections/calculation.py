@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -17,7 +18,7 @@ from pydantic import (
 )
 
 from ..text.fault import Fault
-from .part import Origin, Part, Rule
+from .part import Instead, Origin, Part, Rule
 from .quantities import (
     AUTO_POINTS,
     FROM_SURFACE,
@@ -175,6 +176,9 @@ def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
         yield Fault("needs energy: true", ("branch_dissipation",))
 
 
+MEASURE_MESH = "it went; `parcontact study` measures the error of the mesh, with a ladder study.mesh"
+
+
 class Output(Part):
     """Files of a run: which, where and how often. A relative directory starts at the working directory."""
 
@@ -187,8 +191,8 @@ class Output(Part):
     every: Count = Field(default=1, description="a positive whole number of steps")
     energy: Flag = False
     branch_dissipation: Flag = False
-    mesh_check: Flag = False
 
+    foreign = MappingProxyType({"mesh_check": Instead(MEASURE_MESH)})
     rules = (Rule(("branch_dissipation", "energy"), _needs_energy), _different("fields"))
 
 
