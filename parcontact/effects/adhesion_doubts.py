@@ -86,8 +86,8 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
 
 def beyond_heights(law: AdhesionLaw, span: float) -> str:
     """Return what to say of a range above the heights of a rough surface, from its lowest to its highest point [m], or
-    ''."""
-    if law.range <= span:
+    ''; a flat one has none."""
+    if law.range <= span or not span:
         return ""
     return (
         f"adhesion: the range, {law.range:.3g} m, is more than the {span:.3g} m from the lowest to the highest point "

@@ -251,7 +251,8 @@ class HalfSpace:
             return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
 
         def part(rows: slice) -> Spectrum:
-            return np.asarray(self.symbol(fft, rows) / self.sliding_modulus(fft, velocity, prony, rows))
+            symbol, modulus = self.symbol(fft, rows), self.sliding_modulus(fft, velocity, prony, rows)
+            return np.divide(symbol, modulus, out=np.zeros(symbol.shape, np.complex128), where=symbol != 0.0)
 
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 

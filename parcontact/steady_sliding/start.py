@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from ..errors import InputError
 from ..job import Job
 from ..march.loop import March
 from ..march.state import first_state, pressed_state
@@ -20,8 +19,7 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
     """A march before the first step of a job, or after that of a checkpoint; collective.
 
     It can go on to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not fit,
-    for approaches beyond full contact, and where a steady start is asked for with energies: they count from a body at
-    rest.
+    and for approaches beyond full contact.
     """
     setup = set_up(job, slab, until)
     sanity.refuse_beyond_full_contact(setup)
@@ -39,8 +37,6 @@ def _from_steady_sliding(setup: Setup) -> March:
     Maps of the scene are made when those of the steady solver are gone, and the pressures of the march last: until then
     the pressure waits in a map of the workspace.
     """
-    if setup.choices.energies.on:
-        raise InputError("output.energy: energies count from a body at rest, so they need initial: {state: virgin}")
     point, contact = _solve(setup)
     scene = build_on(setup)
     workspace, body = scene.solver.workspace, scene.material.at_rest()

@@ -46,6 +46,20 @@ def test_mistakes(changes: dict[str, Any], sentence: str) -> None:
     assert sentence in str(failure.value)
 
 
+def test_a_liquid_has_no_process_zone() -> None:
+    """Without long-term modulus no cell is too long for it; the work over a range is a strength all the same."""
+    liquid = job(material={**RUBBER, "modulus_inf": 0.0}, adhesion={"work": 0.05, "range": 4e-7})
+    assert liquid.facts == ("adhesion: a body without long-term modulus has no process zone of its own",)
+    assert not any("process zone" in doubt for doubt in liquid.warnings)
+
+
+@pytest.mark.parametrize("wave", [{"amplitude": 1e-7, "waves": [0, 0]}, {"amplitude": 0.0, "waves": [1, 0]}])
+def test_a_wave_that_is_flat_has_no_parameter_of_johnson(wave: dict[str, Any]) -> None:
+    flat = job(surface={"shape": "wave", **wave})
+    assert not any("Johnson" in fact for fact in flat.facts)
+    assert any("Johnson" in fact for fact in job(surface={"shape": "wave", "amplitude": 1e-7, "waves": [1, 0]}).facts)
+
+
 def test_loads_may_pull() -> None:
     assert job(history=[{"pressure": {"from": 0.0, "to": -1e3}, "duration": 1.0}]).history[0].load.end == -1e3
 

@@ -162,8 +162,3 @@ def test_one_point_is_a_flat_surface(main: Main, tmp_path: Path) -> None:
     assert code == 0, err
     (row,) = rows(tmp_path / "out" / "job" / "steady.csv")
     assert (float(row["contact_area"]), float(row["friction"]), float(row["max_pressure"])) == (1.0, 0.0, 1e5)
-
-
-def test_energies_need_a_body_at_rest(frictions: Callable[..., list[float]]) -> None:
-    with pytest.raises(InputError, match="energies count from a body at rest"):
-        frictions(WAVE, "output.energy=true")

@@ -74,6 +74,23 @@ def test_sphere_at_the_ends(shared_path: Path, comm: MPI.Intracomm) -> None:
     assert fast == pytest.approx(7.2 / 300.0, rel=3e-2)
 
 
+def test_a_line_of_a_body_that_flows(shared_path: Path) -> None:
+    """A wave in full contact with a Maxwell body has friction q^2 A^2 G''(q v)/p, q^2 A^2 (G'' of one branch at w tau =
+    0.628); the mean of the displacement, which nothing holds, is 0. Exact but for rounding."""
+    text = """\
+grid: {points: [64, 1], size: [1.0e-3, 1.5625e-5]}
+surface: {shape: wave, amplitude: 1.0e-6, waves: [1, 0]}
+material: {model: zener, modulus_inf: 0, branches: [{modulus: 1.0e+6, relaxation_time: 1.0e-3}]}
+steady: {velocities: [0.1], pressures: [1.0e+5]}
+"""
+    q, speed, pressure = 2 * np.pi / 1e-3, 0.1, 1e5
+    with np.errstate(all="raise"):
+        point = sliding(shared_path, text, MPI.COMM_SELF).solve((speed, 0.0), pressure)
+    loss = complex_modulus(np.array([q * speed]), 0.0, np.array([1e6]), np.array([1e-3]))[0].imag
+    assert point.measures.contact_area == 1.0
+    assert point.friction == pytest.approx((q * 1e-6) ** 2 * loss / pressure, rel=1e-9)
+
+
 @pytest.mark.mpi(4)
 def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
     """To ten times the tolerance of the certificate, 1e-5: each rank count stops elsewhere within it."""

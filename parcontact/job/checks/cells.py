@@ -94,6 +94,18 @@ def along(way: Vector, length: float, grid: Grid) -> float:
     return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
 
 
+def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
+    """Return whether a grid has a wave below the `longest` length and above the `shortest` [m]."""
+    least, most = (1 - SAME) / longest, (1 - SAME) / shortest
+    rows = (grid.ny - 1) // 2
+    for column in range(min(grid.nx // 2, int(most * grid.lx)) + 1):
+        rest = math.sqrt(max(least**2 - (column / grid.lx) ** 2, 0.0))
+        row = max(math.ceil(rest * grid.ly), 0 if column else 1)
+        if row <= rows and math.hypot(column / grid.lx, row / grid.ly) < most:
+            return True
+    return False
+
+
 def cells_per_wave(accuracy: float) -> int:
     """Return how many cells the shortest wave of a rough surface needs along the sliding."""
     return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME)))

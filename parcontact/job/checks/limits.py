@@ -15,7 +15,7 @@ from ..sections.materials import AnyMaterial, heated
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
 from .advice import SAME_LENGTH, out_of_proportion
-from .cells import one_cell
+from .cells import has_wave, one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
 MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
@@ -59,11 +59,15 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
         if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):
             sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
+        elif isinstance(shape, Rough) and not has_wave(grid, shape.short_wavelength, shape.long_wavelength):
+            sentence = (
+                f"leaves no wave down to short_wavelength, {shape.short_wavelength:g} m, that fits the box and the "
+            )
+            yield Fault(f"{sentence}grid, got {shape.long_wavelength!r}", ("surface", index, "long_wavelength"))
         for number, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
             if abs(waves) > n / 2:
                 sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
                 yield Fault(sentence, ("surface", index, "waves", number))
-
 
 
 def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
@@ -115,10 +119,25 @@ def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> It
             return
 
 
-def steady_at_rest(initial: Initial, material: AnyMaterial) -> Iterator[Fault]:
-    if initial.state == "steady" and not any(initial.velocity) and material.fitted.long_modulus == 0:
-        sentence = "must not be zero: the material has no long-term modulus, and a fluid at rest no steady contact"
-        yield Fault(sentence, ("initial", "velocity"))
+def steady_bodies_do_not_flow(
+    grid: Grid, material: AnyMaterial, body: Body | None, initial: Initial, steady: Steady | None
+) -> Iterator[Fault]:
+    """Check that a body without long-term modulus has a steady state: nothing holds waves that do not vary along the
+    sliding, so that it has one on a periodic line of points only, along which the surface slides."""
+    if material.fitted.long_modulus > 0.0:
+        return
+    asked = [("initial", initial.velocity)] if initial.state == "steady" else []
+    asked += [("steady", steady.unit_direction)] if steady is not None else []
+    for key, velocity in asked:
+        moves = [n > 1 and part != 0.0 for n, part in zip(grid.points, velocity, strict=True)]
+        if grid.boundary == "free" or body is not None or not any(moves) or min(grid.points) > 1:
+            sentence = "needs a material with a long-term modulus: this one flows as long as it is pressed"
+            yield Fault(f"{sentence}; give it modulus_inf > 0, or slide in a stage of the history", (key,))
+
+
+def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault]:
+    if initial.state == "steady" and output.energy:
+        yield Fault("needs initial: {state: virgin}: energies count from a body at rest", ("output", "energy"))
 
 
 def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
