@@ -1,5 +1,6 @@
 """Jobs with one mistake: the sentence about it, and its line and column."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -269,3 +270,28 @@ OTHERS = {
 def test_one_mistake(tmp_path: Path, line: str, mistake: str) -> None:
     path = tmp_path / "rough.yaml"
     assert mistakes(path, line) == [f"{path}:{mistake}"]
+
+
+LISTS = """\
+grid: {points: [32, 16], size: [1e-3, 5e-4]}
+surface: [{shape: wave, amplitude: 1e-6, waves: [4, 0]}, {shape: sphere, radius: 1e-2, center: [5e-4, 2e-4]}]
+material: {model: zener, modulus_inf: 1e6, branches: [{modulus: 1e6, relaxation_time: 1.0}], band: [1e-2, 1e6],
+  temperatures: [-20, 60], shift: {law: factors, temperatures: [0, 20, 40], logs: [1.9, 0, -1.1], reference: 20}}
+initial: {state: steady, velocity: [0.01, 0.0], pressure: 1e4}
+steady: {velocities: [0.1, 1.0], pressures: [1e4, 2e4], temperatures: [0, 20]}
+history: [{pressure: {from: 1e4, to: 2e4}, velocity: [0.1, 0.0], distance: 1e-4, cells_per_step: 1}]
+output: {fields: [pressure, gap], directory: out}
+study: {mesh: [16, 32], cells_per_step: [1, 0.5], integrator: [exponential, backward-euler], tolerance: [1e-2, 1e-3]}
+"""
+
+
+def test_an_empty_place_in_any_list_is_a_sentence(tmp_path: Path) -> None:
+    """Each item of each list is once left empty: its place is named, whatever rules hold for the whole list."""
+    (tmp_path / "job.yaml").write_text(LISTS)
+    load(tmp_path / "job.yaml")
+    places = [item.span() for item in re.finditer(r"(?<=[\[ ])(?<!: )[\w.+-]+(?=[,\]])", LISTS)]
+    assert len(places) > 30
+    for start, end in places:
+        (tmp_path / "job.yaml").write_text(f"{LISTS[:start]}null{LISTS[end:]}")
+        with pytest.raises(JobError, match="got nothing"):
+            load(tmp_path / "job.yaml")

@@ -53,6 +53,8 @@ class ArrheniusShift(ShiftLaw):
 
 
 def _rising(temperatures: tuple[float, ...], logs: tuple[float, ...], reference: float) -> Iterator[Fault]:
+    if None in temperatures:  # a mistake of its own
+        return
     if len(temperatures) < 2 or any(b <= a for a, b in pairwise(temperatures)):
         yield Fault("must be at least two rising temperatures [deg C]", ("temperatures",))
     elif len(logs) != len(temperatures):
