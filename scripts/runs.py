@@ -21,7 +21,8 @@ def begun(
     """A march before its first step, by this process unless a communicator is given; `sets` replaces keys."""
     from mpi4py import MPI
 
-    from parcontact.job import Job, load
+    from parcontact.job import Job
+    from parcontact.mesh import load
     from parcontact.parallel.slab import Slab
     from parcontact.steady_sliding import start
 

@@ -25,6 +25,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"summary"},
     {"plotting"},
     {"scene"},
+    {"mesh"},
     {"march"},
     {"steady_sliding"},
     {"run", "plan"},
@@ -66,6 +67,9 @@ def _imports(module: str, tree: ast.Module) -> Iterator[str]:
             source = ".".join(filter(None, [*package, node.module])).removeprefix("parcontact").removeprefix(".")
             names = [f"{source}.{alias.name}".removeprefix(".") for alias in node.names]
             yield from (name if name in MODULES else source for name in names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("parcontact."):
+            name = node.value.removeprefix("parcontact.").partition(":")[0]  # an import by a string
+            yield from [name] if name in MODULES else []
 
 
 OURS = {module: {name for name in imports(module) if room(name) in FLOOR} for module in MODULES}

@@ -52,8 +52,9 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
 def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:
     """All cases of a job, and those that the command line is about."""
     from .. import job as jobs
+    from .. import mesh
 
-    cases = jobs.load_cases(options.job, overrides(options))
+    cases = mesh.load_cases(options.job, overrides(options))
     if getattr(options, "until", None) is not None and not cases[0].job.history:
         raise InputError("--until: a friction curve has no time to go on to; leave it out")
     return cases, jobs.choose(cases, options.case)

@@ -7,10 +7,9 @@ from operator import le
 from pathlib import Path
 from typing import Any
 
-from .. import job as jobs
+from .. import mesh
 from ..errors import InputError, RunError
 from ..job import Job
-from ..job.chosen_mesh import points_for
 from ..job.sections.listing import plain
 from ..job.text import yamltext
 from ..storage import files
@@ -31,7 +30,7 @@ def is_map(path: Path) -> bool:
 def load(path: Path, overrides: Sequence[str]) -> Job:
     """The job of a whole map on its own points, with some keys changed. Raises InputError."""
     try:
-        return jobs.load(_job_of(str(path)), overrides)
+        return mesh.load(_job_of(str(path)), overrides)
     except InputError as error:
         raise InputError(f"{error}; {HOW}") if any(text in str(error) for text in UNSAID) else error from None
 
@@ -71,8 +70,8 @@ def _accuracy(job: Job, data: dict[str, Any]) -> tuple[Any, str]:
     if "accuracy" in job.numerics.model_fields_set:
         return accuracy, ""
     try:
-        whole = jobs.load(data)
-        kept = [a for a in ACCURACIES if all(map(le, points_for(whole, a), whole.grid.points))]
+        whole = mesh.load(data)
+        kept = [a for a in ACCURACIES if all(map(le, mesh.points_for(whole, a), whole.grid.points))]
     except InputError:  # nothing is known before of heights without a shortest wave
         return accuracy, ""
     return (kept[0], "  # what these points keep, by a guess") if kept else (accuracy, "  # needs more points")

@@ -135,7 +135,7 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
 @ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
     """Fit a compound to measured moduli: a material file and a picture."""
-    from .. import job as jobs
+    from .. import mesh
     from ..plotting import compound as files
     from ..rubber import compound
     from ..rubber.shift import given
@@ -143,7 +143,7 @@ def fit(options: argparse.Namespace) -> int:
 
     target = options.out or options.table.with_suffix(".yaml")
     files.refuse_foreign(target)
-    band = excited_band(jobs.load(options.job)) if options.job else None
+    band = excited_band(mesh.load(options.job)) if options.job else None
     law = given(options.shift, options.reference)
     made = compound.fitted(options.table, options.poisson, options.reference, law, options.error, options.weight)
     for line in files.write(made, target, band):
@@ -292,6 +292,6 @@ def cite(options: argparse.Namespace) -> int:
 
 def _load(options: argparse.Namespace, changes: Sequence[str] = ()) -> Job:
     """The job that the command line is about, with some more changes."""
-    from .. import job as jobs
+    from .. import mesh
 
-    return jobs.load(options.job, [*overrides(options), *changes], options.case)
+    return mesh.load(options.job, [*overrides(options), *changes], options.case)

@@ -1,11 +1,11 @@
 """Sections that effects add to a job: found by their name, and only when a job has a section that the program has not.
 
-An effect is registered in one place: in OURS, or, without touching this package, by an entry point of an installed one,
+An effect is registered by an entry point of an installed package, this one's own effects too,
 
     [project.entry-points."parcontact.effects"]
     wear = "tread_wear:Wear"
 
-Either names the class of an effect (`effects.effect`) under the name of its section. Nothing is imported, or looked
+which names the class of an effect (`effects.effect`) under the name of its section. Nothing is imported, or looked
 for, for a job without such a section.
 """
 
@@ -20,13 +20,6 @@ from .sections.part import Part
 from .text.fault import Fault, refuse
 
 GROUP = "parcontact.effects"
-OURS: dict[str, str] = {
-    # one line for each effect of this package that has a section of its own: its name, and where the effect is
-    "adhesion": "parcontact.effects.adhesion:AdhesionColumns",
-    "interface": "parcontact.effects.interface:InterfaceColumns",
-    "leakage": "parcontact.effects.leakage:LeakageColumns",
-    "thermal": "parcontact.effects.thermal:ThermalColumns",
-}
 
 
 def find_effects() -> dict[str, Any]:
@@ -53,8 +46,17 @@ def unusable() -> list[str]:
 
 @cache
 def _registered() -> dict[str, EntryPoint]:
-    installed = {entry.name: entry for entry in entry_points(group=GROUP)}
-    return installed | {name: EntryPoint(name, target, GROUP) for name, target in OURS.items()}
+    return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=_is_ours)}
+
+
+def _is_ours(entry: EntryPoint) -> bool:
+    """Return whether an effect is one of this package, which no other one replaces."""
+    return entry.value.startswith(f"{__package__.partition('.')[0]}.")
+
+
+def names() -> list[str]:
+    """Return the sections that effects of this package add."""
+    return sorted(name for name, entry in _registered().items() if _is_ours(entry))
 
 
 @cache

@@ -96,7 +96,7 @@ class Job(Part):
     @classmethod
     def words(cls) -> tuple[str, ...]:
         """Return the sections, those of our effects too, and the sweep, which is gone once a case is read."""
-        return (*dict.fromkeys((*super().words(), *added_sections.OURS)), "sweep")
+        return (*dict.fromkeys((*super().words(), *added_sections.names())), "sweep")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Job) and dict(self) == dict(other)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
 from ..errors import InputError, JobError
-from .chosen_mesh import choose_points, take_grid
 from .model import Job
 from .sections.part import Origin
 from .text.fault import faults_of, shorten
@@ -24,6 +23,7 @@ SHOWN_MISTAKES = 20  # tuning: of so many
 STRICT = "an error with numerics.strict"
 Given = str | os.PathLike[str] | Mapping[str, Any]
 Changes = Sequence[str] | Mapping[str, Any]
+FillGrid = Callable[[Source, Origin], Origin]
 CASES = "cases"  # where in the output directory of a job its cases have theirs
 
 
@@ -42,16 +42,22 @@ class Case(NamedTuple):
         return f"case {self.number}: {settings}"
 
 
-def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
+def leave_grid(source: Source, origin: Origin) -> Origin:
+    """Leave words of the grid, such as `points: auto`, in the source: they are mistakes then."""
+    return origin
+
+
+def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill_grid: FillGrid = leave_grid) -> Job:
     """Read a job file, or take a mapping like one, whose files are looked for from the working directory.
 
-    `overrides` are texts like `grid.points=512`, or values by such keys. Raises JobError with every mistake.
+    `overrides` are texts like `grid.points=512`, or values by such keys. `fill_grid` puts numbers for words of the grid
+    into the source (`mesh.load` does that). Raises JobError with every mistake.
 
     Of a job with a sweep it reads one `case`, and raises InputError if none is chosen or there is no such case.
     """
     if case is not None:
-        return choose(load_cases(given, overrides), case)[0].job
-    found, mistakes, sweep = _read(given, overrides, 0)
+        return choose(load_cases(given, overrides, fill_grid=fill_grid), case)[0].job
+    found, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if found is None:
         raise _job_error(given, mistakes)
     if sweep:
@@ -61,14 +67,14 @@ def load(given: Given, overrides: Changes = (), case: int | None = None) -> Job:
     return found.job
 
 
-def load_cases(given: Given, overrides: Changes = ()) -> tuple[Case, ...]:
+def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = leave_grid) -> tuple[Case, ...]:
     """Read all cases of a job, one if it has no sweep; else as `load`. A mistake names the first case that has it."""
-    first, mistakes, sweep = _read(given, overrides, 0)
+    first, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if not sweep:
         if first is None:
             raise _job_error(given, mistakes)
         return (first,)
-    read = [(first, mistakes), *(_read(given, overrides, index)[:2] for index in range(1, len(sweep)))]
+    read = [(first, mistakes), *(_read(given, overrides, index, fill_grid)[:2] for index in range(1, len(sweep)))]
     common = set(mistakes).intersection(*(found for _, found in read))
     first_with = {mistake: index for index, (_, found) in reversed(list(enumerate(read))) for mistake in found}
     if first_with:
@@ -95,7 +101,9 @@ def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistak
     return mistake._replace(sentence=f"{mistake.sentence} (in case {index}: {', '.join(map(str, settings))})")
 
 
-def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, list[Mistake], Sweep | None]:
+def _read(
+    given: Given, overrides: Changes, index: int, fill_grid: FillGrid
+) -> tuple[Case | None, list[Mistake], Sweep | None]:
     """Return a case, or its mistakes; and the sweep that it belongs to, if that is sound."""
     _refuse_no_job(given, overrides)
     from_python = isinstance(given, Mapping)
@@ -108,11 +116,10 @@ def _read(given: Given, overrides: Changes, index: int) -> tuple[Case | None, li
     names_directory = isinstance(output, dict) and output.get("directory") is not None
     texts = from_python or isinstance(overrides, Mapping)
     origin = Origin(path.absolute(), included, not from_python, texts, names_directory)
-    take_grid(source, origin)
     stages = source.data.get("history") if isinstance(source.data, dict) else None
     count = len(stages) if isinstance(stages, list) else 0
     written = tuple(str(source.locate(("history", index, "approach")).place) for index in range(count))
-    origin = choose_points(source, origin)._replace(approaches=written)
+    origin = fill_grid(source, origin)._replace(approaches=written)
     try:
         job = Job.model_validate(source.data, context=origin)
     except ValidationError as error:

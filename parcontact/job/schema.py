@@ -135,7 +135,7 @@ def sections() -> list[Section]:
     found: dict[type[Part], Section] = {Job: Section("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)
-    for name, effect in added_sections.effects_of(added_sections.OURS).items():
+    for name, effect in added_sections.effects_of(added_sections.names()).items():
         _collect(name, effect.section, found)
     return list(found.values())
 

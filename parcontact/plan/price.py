@@ -22,8 +22,8 @@ from ..history.timeline import Timeline
 from ..job import GeometricStep, Job, OnOneMesh, Rough, Stage
 from ..job.checks.advice import STEPS_PER_WAVE
 from ..job.checks.cells import ASIDE, cells_across, cells_per_wave, fast_length, one_cell
-from ..job.chosen_mesh import points_for
 from ..job.sections.listing import plain
+from ..mesh import points_for
 from ..physics.mesh_error import SPOTS_ORDER
 from ..physics.time_error import TIME_ORDER
 from ..printed import per_cent

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import job as jobs
+from .. import mesh
 from ..errors import InputError, JobError
 from ..history.timeline import Timeline
 from ..job import Job
@@ -41,7 +41,7 @@ def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intra
     made: list[Job] = []
 
     def load() -> Job:
-        made.append(_sound(given if isinstance(given, Job) else jobs.load(given, changes or {})))
+        made.append(_sound(given if isinstance(given, Job) else mesh.load(given, changes or {})))
         return made[0]
 
     with python_words():
@@ -107,7 +107,7 @@ def path_of(path: object) -> Path:
 def of_parts(**parts: Any) -> Job:
     """A job of which some sections matter, on this rank alone. Raises JobError."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
-    return _sound(jobs.load(rest | parts))
+    return _sound(mesh.load(rest | parts))
 
 
 def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:

@@ -36,7 +36,7 @@ def warnings_of(log: Path) -> list[str]:
 
 
 def meshes_of(log: Path) -> list[str]:
-    """Return what a log says of meshes that were chosen (`job.chosen_mesh`), the last of it; nothing as a rule."""
+    """Return what a log says of meshes that were chosen (`mesh.chosen_mesh`), the last of it; nothing as a rule."""
     return [line for line in lines_of(log) if line.startswith(MESH)][-1:]
 
 

@@ -8,7 +8,8 @@ import pytest
 
 from parcontact.effects.adhesion import law_of
 from parcontact.errors import InputError
-from parcontact.job import Job, load, load_cases
+from parcontact.job import Job
+from parcontact.mesh import load, load_cases
 from parcontact.run.sweep_warnings import doubts_of
 
 E = 4e6  # E* of an incompressible body of 1 MPa [Pa]

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from parcontact.job import JobError, load
+from parcontact.job import JobError
+from parcontact.mesh import load
 
 SMALL = """\
 grid: {points: 64, size: 1e-3}

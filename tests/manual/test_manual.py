@@ -17,7 +17,7 @@ import yaml
 from marching import ROOT
 from pydantic import TypeAdapter
 
-from parcontact import __main__, job
+from parcontact import __main__, mesh
 from parcontact.command.arguments import parse_arguments
 from parcontact.effects.adhesion import AdhesionColumns
 from parcontact.effects.interface import InterfaceColumns
@@ -190,7 +190,7 @@ def load_job(text: str, where: Path) -> None:
     data = yamltext.parse(text, "block").data
     needed = {key: value for key, value in WHOLE.items() if key != "history" or "steady" not in data}
     (where / "job.yaml").write_text(yamltext.dump({**needed, **data}))
-    assert job.load_cases(where / "job.yaml")
+    assert mesh.load_cases(where / "job.yaml")
 
 
 def parse_command(line: str) -> None:

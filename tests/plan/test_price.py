@@ -10,9 +10,10 @@ import pytest
 from marching import marched
 
 from parcontact.history.timeline import Timeline
-from parcontact.job import Job, load_cases
+from parcontact.job import Job
 from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.sections.listing import plain
+from parcontact.mesh import load_cases
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import ErrorSums
 from parcontact.physics.mesh_error import SPOTS_ORDER

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact import scene
+from parcontact import mesh, scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 from parcontact.scene import sanity
@@ -52,7 +52,7 @@ def heights_of(
     if comm.rank == 0:
         path.write_text(JOB.format(points=points, size=size, more=more))
     comm.barrier()
-    base = scene.set_up(jobs.load(path), Slab(comm, points, points))
+    base = scene.set_up(mesh.load(path), Slab(comm, points, points))
     rows = base.surface.heights((0.0, 0.0), base.slab.empty()) * base.units.height
     return np.concatenate(comm.allgather(rows))
 
@@ -131,7 +131,7 @@ def test_mistakes_name_their_key(road: Path, more: str, sentence: str) -> None:
     text = text.replace("path: road.npy, unit: um, size: [1.0e-3, 1.0e-3]", ", ".join(kept))
     (road / "job.yaml").write_text(text)
     with pytest.raises(jobs.JobError) as failure:
-        jobs.load(road / "job.yaml")
+        mesh.load(road / "job.yaml")
     assert sentence in str(failure.value)
     assert ":3:" in str(failure.value)
 
@@ -157,7 +157,7 @@ def grid_of(road: Path, grid: str, surface: str = "") -> jobs.Grid:
     surface = surface or "{shape: topography, path: road.npy, unit: um, size: [1.0e-3, 2.0e-3]}"
     text = f"grid: {grid}\nsurface: {surface}\n" + "".join(JOB.splitlines(True)[3:]).replace("{{", "{")
     (road / "job.yaml").write_text(text.replace("}}", "}"))
-    return jobs.load(road / "job.yaml").grid
+    return mesh.load(road / "job.yaml").grid
 
 
 @pytest.mark.parametrize(
@@ -206,9 +206,9 @@ def test_a_grid_of_no_map_is_one_sentence(road: Path, surface: str, sentence: st
 def test_an_array_has_points_but_no_size(road: Path) -> None:
     job = {"surface": np.zeros((4, 6)), "material": {"model": "elastic", "shear_modulus": 1e6}, "history": []}
     job |= {"history": [{"pressure": 1.0}], "grid": {"points": "from surface", "size": 1e-3}}
-    assert jobs.load(job).grid.points == (6, 4)
+    assert mesh.load(job).grid.points == (6, 4)
     with pytest.raises(jobs.JobError, match="an array has points, but no size"):
-        jobs.load(job, {"grid.size": "from surface"})
+        mesh.load(job, {"grid.size": "from surface"})
 
 
 def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.MonkeyPatch) -> None:
@@ -222,7 +222,7 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     for line in (r"missing +(2(.\d)?|1.9) %", r"rms slope +0.0", r"spectrum +waves of 1 mm to 10.42 um"):
         assert re.search(f"^{line}", out, re.MULTILINE)
     assert matplotlib.image.imread(road / "road-surface.png").ndim == 3
-    found = jobs.load(road / "start/job.yaml")
+    found = mesh.load(road / "start/job.yaml")
     assert (found.grid.points, found.grid.size) == ((POINTS, POINTS), (LENGTH, LENGTH))
     written = (road / "start/job.yaml").read_text()
     for line in (f"points: [{POINTS}, {POINTS}]", "detrend: tilt", "periodic: smooth"):
@@ -254,7 +254,7 @@ def test_a_job_to_start_from_asks_for_what_its_points_keep(
     assert written in (shared_path / "job.yaml").read_text()
     if "keep" in written:
         finer, kept = (
-            jobs.load(shared_path / "job.yaml", ["grid.points=auto", f"numerics.accuracy={a}"]).grid.points
+            mesh.load(shared_path / "job.yaml", ["grid.points=auto", f"numerics.accuracy={a}"]).grid.points
             for a in (0.02, 0.05)
         )
         assert max(kept) <= POINTS < max(finer)
@@ -273,7 +273,7 @@ def test_points_that_stick_out(shared_path: Path, comm: MPI.Intracomm, communica
         np.save(shared_path / "road.npy", spiked * 1e6)
         (shared_path / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=""))
     comm.barrier()
-    job = jobs.load(shared_path / "job.yaml")
+    job = mesh.load(shared_path / "job.yaml")
     for group in communicators:
         doubts = sanity.check_heights(scene.set_up(job, Slab(group, POINTS, POINTS)))
         assert group.allgather(doubts) == [doubts] * group.size

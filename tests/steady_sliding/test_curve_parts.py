@@ -14,7 +14,7 @@ import yaml
 from conftest import WORLD
 
 from parcontact import __main__
-from parcontact.job import load_cases
+from parcontact.mesh import load_cases
 from parcontact.solve import constraint
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read

@@ -8,7 +8,8 @@ import pytest
 
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
-from parcontact.job import Job, load
+from parcontact.job import Job
+from parcontact.mesh import load
 from parcontact.scene import choices
 from parcontact.study.ladders import Ladders, Settings, describe_chosen_steps, describe_held_range, ladders, overrides
 

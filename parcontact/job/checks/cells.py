@@ -7,7 +7,7 @@ share A is in contact, ((1 - A)/A)^0.5 is the standard deviation over the mean f
 shortest waves along a side has N^2 places. `friction_error` and `area_error` have the sums. Of chance, and of that by
 which surfaces differ in the first kind, SURE standard deviations count.
 
-Their numbers were found by experiment, with the share and the phase as they are guessed before (`job.contact_guess`):
+Their numbers were found by experiment, with the share and the phase as they are guessed before (`mesh.contact_guess`):
 steady states of rough surfaces of 1 to 100 % contact with 12 or 24 of their shortest waves along a side. Those of
 friction are from 36 states on some 110 meshes each, those of the area by maximum likelihood from 24 states on some 40
 meshes, with references of 160 cells per shortest wave. Fewer waves count as 12. `scripts/chosen_mesh.py` tells how the

@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 import yaml
 from conftest import Main
+from job.texts import job_of, mistakes_of, replaced
 from mpi4py import MPI
 
 import parcontact as pc
-from parcontact.job import load, load_cases
+from parcontact.mesh import load, load_cases
 from parcontact.parallel.root import on_root
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
 from parcontact.run.run import Options, chosen_by_accuracy
 from parcontact.steady_sliding import curve
 from parcontact.summary import info
-
-from .texts import job_of, mistakes_of, replaced
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1, seed: 1}"
 AUTO = f"""\

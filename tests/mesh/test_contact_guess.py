@@ -7,8 +7,8 @@ import pytest
 
 from parcontact.job import Job
 from parcontact.job.checks.cells import Guess
-from parcontact.job.contact_guess import EDGES, FEW, FINEST, LEAST, MORE, MOST, UNKNOWN, guesses, slope_of
 from parcontact.job.sections.geometry import Rough
+from parcontact.mesh.contact_guess import EDGES, FEW, FINEST, LEAST, MORE, MOST, UNKNOWN, guesses, slope_of
 
 WAVES: dict[str, Any] = {"hurst": 0.5, "long_wavelength": 1e-3, "short_wavelength": 1e-5}
 LOW, HIGH = 2.0 * math.pi / 1e-3, 2.0 * math.pi / 1e-5

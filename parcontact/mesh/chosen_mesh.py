@@ -1,37 +1,34 @@
 """Words that stand for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
 
 `auto` is the mesh of fewest points on which the errors are those of `numerics.accuracy`. It follows from the shortest
-wave of the surface, from the directions of sliding (`checks.cells`) and from a guess of what touches
-(`contact_guess`). The mesh may make MESH_SHARE of the error of a march, whose time steps make the rest, and
+wave of the surface, from the directions of sliding (`job.checks.cells`) and from a guess of what touches
+(`mesh.contact_guess`). The mesh may make MESH_SHARE of the error of a march, whose time steps make the rest, and
 STEADY_SHARE of that of a friction curve.
 """
 
 from __future__ import annotations
 
 import math
-from importlib.metadata import EntryPoint
 from typing import Any
 
 from pydantic import Field, ValidationError
 
 from ..errors import InputError
-from .checks import cells
+from ..job import Job
+from ..job.checks import cells
+from ..job.model import prepared
+from ..job.sections.calculation import Accuracy, Grid, Numerics
+from ..job.sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
+from ..job.sections.listing import plain
+from ..job.sections.materials import Material
+from ..job.sections.part import Origin, Part
+from ..job.sections.quantities import AUTO_POINTS, FROM_SURFACE
+from ..job.sections.stages import Initial, Stage, Steady
+from ..job.text.places import UNREADABLE, Source
+from ..job.text.python_data import is_array
 from .contact_guess import guesses
-from .model import Job, prepared
-from .sections.calculation import Accuracy, Grid, Numerics
-from .sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
-from .sections.listing import plain
-from .sections.materials import Material
-from .sections.part import Origin, Part
-from .sections.quantities import AUTO_POINTS, FROM_SURFACE
-from .sections.stages import Initial, Stage, Steady
-from .text.places import UNREADABLE, Source
-from .text.python_data import is_array
 
 MESH_SHARE, STEADY_SHARE = 0.7, 0.9  # accuracy: of numerics.accuracy
-SPECTRUM = EntryPoint("spectrum", "parcontact.road.spectrum:of", "")  # reads tables; jobs that name none do without
-READER = EntryPoint("extent", "parcontact.road.map_files:extent_of", "")  # of the grid of a map
-MAP = EntryPoint("map", "parcontact.scene.rigid_surface:shortest_of", "")  # the same of maps
 KEYS = ("points", "size")  # of a grid, which a measured map has
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
@@ -47,7 +44,13 @@ class Scenery(Part):
     numerics: Numerics = Numerics()
 
 
-def choose_points(source: Source, origin: Origin) -> Origin:
+def fill_grid(source: Source, origin: Origin) -> Origin:
+    """Put numbers for all words of the grid into the source of a job; return the origin with the sentence on them."""
+    _take_grid(source, origin)
+    return _choose_points(source, origin)
+
+
+def _choose_points(source: Source, origin: Origin) -> Origin:
     """Put numbers for `points: auto` into the source of a job; return the origin with what is to be said of them. What
     stands in the way is a mistake at the key; mistakes in other sections are found when the job is validated."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
@@ -103,11 +106,15 @@ def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> fl
         count = math.hypot(shape.waves[0] / box.lx, shape.waves[1] / box.ly)
         return 1.0 / count if count else math.inf
     if isinstance(shape, RoughSpectrum):
-        return float(SPECTRUM.load()(shape)[1][1])
+        from ..road import spectrum  # reads tables: jobs that name none do without
+
+        return float(spectrum.of(shape)[1][1])
     if isinstance(shape, OnOneMesh):
         raise InputError("heights from a file or an array are given on one mesh; give its numbers of points")
     if isinstance(shape, Topography):
-        return float(MAP.load()(_alone(shape, data, origin)) or math.inf)
+        from ..scene.rigid_surface import shortest_of  # makes surfaces: jobs without a map do without
+
+        return float(shortest_of(_alone(shape, data, origin)) or math.inf)
     return math.inf
 
 
@@ -123,7 +130,7 @@ def _alone(shape: Topography, data: dict[str, Any], origin: Origin) -> Job:
 # -- the grid of a measured map ----------------------------------------------------------------------------------------
 
 
-def take_grid(source: Source, origin: Origin) -> None:
+def _take_grid(source: Source, origin: Origin) -> None:
     """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
     wanted = [key for key in KEYS if isinstance(grid, dict) and grid.get(key) == FROM_SURFACE]
@@ -156,5 +163,6 @@ def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
         if arrays[0].ndim != 2:
             raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
         return tuple(arrays[0].shape[::-1]), None
-    found: Extent = READER.load()(Topography.model_validate(maps[0], context=origin), box)
-    return found
+    from ..road import map_files  # reads maps: jobs that name none do without
+
+    return map_files.extent_of(Topography.model_validate(maps[0], context=origin), box)

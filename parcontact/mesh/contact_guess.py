@@ -17,13 +17,12 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Sequence
-from importlib.metadata import EntryPoint
 from typing import Any, Protocol
 
-from .checks.cells import Guess
-from .sections.geometry import Rough, Spectral
-from .sections.materials import AnyMaterial
-from .sections.stages import Initial, Stage, Steady
+from ..job.checks.cells import Guess
+from ..job.sections.geometry import Rough, Spectral
+from ..job.sections.materials import AnyMaterial
+from ..job.sections.stages import Initial, Stage, Steady
 
 UNKNOWN, USUAL_PHASE = 0.1, 0.25  # accuracy: where slopes or loads are not known
 LEAST, MOST = 0.005, 0.99  # accuracy: for which the laws of the mesh were found
@@ -31,7 +30,6 @@ MORE = 1.42  # accuracy: power of the share that is open by the theory
 FEW, EDGES, FINEST = 0.5, 4.0, 16.0  # accuracy: times the frequency of the shortest wave: of spots, edges, the finest
 SLOWNESS = 1.5  # accuracy: power with which it counts
 NODES = 400  # accuracy: of integrals over the spectrum, to 1e-4
-RELAXATION = EntryPoint("relaxation", "parcontact.effects.relaxation:relaxation_of", "")  # of materials of all kinds
 
 
 class Loaded(Protocol):
@@ -47,7 +45,9 @@ class Loaded(Protocol):
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
     """Return what is guessed of each load and speed of a job, whose shortest wave [m] and box [m^2] are these; sliding
     is slow in friction curves alone."""
-    slope, series = _slope(job.surface), RELAXATION.load()(job.material)
+    from ..effects.relaxation import relaxation_of  # only a mesh that is chosen needs it
+
+    slope, series = _slope(job.surface), relaxation_of(job.material)
     waves, curve = math.sqrt(area) / wave, job.steady and not job.history
     found = []
     for pressure, speed in {load: None for load in _loads(job, area) if load[0] > 0.0}:

@@ -1,0 +1,14 @@
+"""Jobs whose grid is given in words: `points: auto`, and `from surface` for points and size of a measured map.
+
+`load` and `load_cases` read a job as the functions of the same names in `job` do, and put numbers for these words.
+"""
+
+from functools import partial
+
+from .. import job
+from .chosen_mesh import fill_grid, points_for
+
+load = partial(job.load, fill_grid=fill_grid)
+load_cases = partial(job.load_cases, fill_grid=fill_grid)
+
+__all__ = ["load", "load_cases", "points_for"]
