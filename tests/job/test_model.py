@@ -206,12 +206,13 @@ ROUND_TRIPS = {
         "{pressure", "{name: 'no', pressure"
     ),
     "steady": replaced(SMALL, steady="{velocities: '1e-3:1e2:31', waves: true}", title='"ünïcode: [x] # 1"'),
+    "energies": replaced(SMALL, output="{energy: true, branch_dissipation: true}"),
     "everything": replaced(
         SMALL.split("history")[0],
         material="{model: zener, branches: [{G0: 1e6, G1: 0, eta1: .inf}]}",
         history="[{force: {from: 0, to: 1e-2}, velocity: [1e-7, 2], distance: 1, time_step: 1e-5}, {approach: -1e-9}]",
         initial="{state: steady, pressure: 3, velocity: 0.123456789012345678}",
-        output="{energy: true, branch_dissipation: true, directory: /somewhere/else}",
+        output="{fields: [gap], every: 3, directory: /somewhere/else}",
         numerics="{integrator: backward-euler, precision: mixed, accept_unconverged: true}",
         checkpoint="{keep: 5}",
     ),
