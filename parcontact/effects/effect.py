@@ -34,24 +34,18 @@ class Decision:
 class Instant:
     """A step just made, in the run's units unless others are given; maps are valid until the next step begins.
 
-    The pressure on this rank's rows is `modulus pressure` (0 outside contact), `displacement` that of the body; both
-    have the shape (ny_loc, nx). `slid` [m] is by how much the surface moved in the step. With adhesion `touching` is
-    where the surfaces touch.
+    The pressure on this rank's rows is `modulus pressure`, `displacement` that of the body, and `touching` is not 0
+    where the surfaces touch; they have the shape (ny_loc, nx). `slid` [m] is by how much the surface moved in the step.
     """
 
     step: Step
     pressure: Array
     modulus: float
     displacement: Array
+    touching: NDArray[Any]
     slid: float
     measures: Measures
     sticking: tuple[float, ...] | None = None
-    touching: Array | None = None
-
-    @property
-    def closed(self) -> NDArray[Any]:
-        """Where the surfaces touch: under pressure, unless they stick."""
-        return self.pressure > 0.0 if self.touching is None else self.touching
 
 
 class Effect(Protocol):

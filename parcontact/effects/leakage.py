@@ -52,7 +52,7 @@ class LeakageColumns(Effect):
         scene, setup = self._scene, self._scene.setup
         approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
         gap = scene.gap(instant.displacement, instant.step.position, approach)
-        whole = scene.slab.to_root(np.where(instant.closed, 0.0, np.maximum(gap, 0.0)))
+        whole = scene.slab.to_root(np.where(instant.touching, 0.0, np.maximum(gap, 0.0)))
         found = leak_on_ranks(whole, setup.grid.size, setup.grid.boundary == "periodic", scene.slab.comm)
         self._values = found.flow_x, found.flow_y, found.constriction
 

@@ -159,8 +159,8 @@ class ThermalColumns:
         step, pressure = instant.step, instant.pressure
         if self._pulled:
             pressure = np.maximum(pressure, 0.0)
-        rubbed = np.where(pressure > 0.0, 1.0, 0.0) if self._rubs else None
-        sums = float(np.count_nonzero(pressure)), float(pressure.sum(dtype=np.float64))
+        rubbed = np.where(instant.touching, 1.0, 0.0) if self._rubs else None
+        sums = float(np.count_nonzero(instant.touching)), float(pressure.sum(dtype=np.float64))
         area, mean = (value / self._slab.points for value in self._slab.sum(*sums))
         scales = 1.0 / area if area > 0.0 else 0.0, 1.0 / mean if mean > 0.0 else 0.0
         heating = self._heat(instant)

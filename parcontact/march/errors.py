@@ -22,6 +22,7 @@ from ..physics.prony import Prony
 from ..physics.slopes import friction_by_energy
 from ..physics.time_error import RunProperties, StepObservation, error_of_rise, time_error
 from ..scene import Scene, Setup
+from ..solve.constraint import Mask
 from ..solve.contact import Contact
 from .sticking import StuckContact
 
@@ -91,7 +92,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Solved:
-    """A step that has been solved: its contact, what it measures and the memory of the body after it.
+    """A step that has been solved: its contact, a map that is not 0 where the surfaces touch, what it measures and the
+    memory of the body after it.
 
     `remark` says what was unusual about it; `moved_start` whether its start was a pressure of whole cells ago, None
     where there was no choice; `stuck` is what a contact with adhesion has besides; `rounding` tells whether the solve
@@ -101,6 +103,7 @@ class Solved:
     step: Step
     trial: Trial
     contact: Contact
+    touching: Mask
     measures: Measures
     body: BodyMemory
     remark: str = ""
@@ -175,8 +178,8 @@ def _compare_integrators(
     if now is None:
         load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
         pressure = contact.p
-        if solved.stuck is not None:  # tension counts as pressure does
-            pressure = np.abs(contact.p)
+        if solved.touching is not pressure:  # tension counts as pressure does
+            pressure = np.abs(contact.p) if solved.stuck else np.where(solved.touching, contact.p, 0.0)
             load = scene.slab.sum(float(pressure.sum()))[0]
         found = pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
         now = LastObservation.of(step, *astuple(found))

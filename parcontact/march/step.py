@@ -172,9 +172,10 @@ def _tell_effects(scene: Scene, solved: Solved, slid: float) -> None:
     """Tell the effects that follow the steps of one that was made; collective."""
     u, stuck = solved.body.displacement, solved.stuck
     assert u is not None
-    told = () if stuck is None else (stuck.columns, stuck.touching)
+    numbers = None if stuck is None else stuck.columns
     for follower in scene.followers.values():
-        follower.follow(Instant(solved.step, solved.contact.p, solved.trial.alpha, u, slid, solved.measures, *told))
+        maps = solved.contact.p, solved.trial.alpha, u, solved.touching
+        follower.follow(Instant(solved.step, *maps, slid, solved.measures, numbers))
 
 
 # -- the contact of a step ---------------------------------------------------------------------------------------------
@@ -200,14 +201,14 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
         contact, remark = _retry(scene, state, step, solver, problem, contact)
     if step.passed:
         remark = "; ".join(filter(None, (remark, _passed(scene, step))))
-    measures = scene.probe.measure(
-        contact.p, trial.alpha, contact.u, trial.effective, contact.d, step.position, step.velocity
-    )
+    touching = problem.constraint.touches(contact.p)
+    maps = contact.p, trial.alpha, contact.u, trial.effective, contact.d, touching
+    measures = scene.probe.measure(*maps, step.position, step.velocity)
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
     rounding = rounding_after(scene, state.rounding, contact, trial.effective)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
-    return Solved(step, trial, contact, measures, memory, remark, moved_start, rounding=rounding)
+    return Solved(step, trial, contact, touching, measures, memory, remark, moved_start, rounding=rounding)
 
 
 def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: MeanPressure | Approach) -> Solved:
@@ -228,12 +229,12 @@ def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: 
         moved = math.hypot(*cells_moved(scene, step, state.position))
         raise failure.of_solve(scene, step, contact, contact, [], trial.effective, moved)
     _, pull, *_ = stuck.columns
-    instant = step.position, step.velocity, stuck.touching, pull
-    measures = scene.probe.measure(contact.p, trial.alpha, contact.u, trial.effective, contact.d, *instant)
+    maps = contact.p, trial.alpha, contact.u, trial.effective, contact.d, stuck.touching
+    measures = scene.probe.measure(*maps, step.position, step.velocity, pull)
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
     memory = scene.material.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
-    return Solved(step, trial, contact, measures, memory, remark, stuck=stuck)
+    return Solved(step, trial, contact, stuck.touching, measures, memory, remark, stuck=stuck)
 
 
 def _stay_apart(state: State, stuck: sticking.StuckContact) -> bool:

@@ -23,6 +23,7 @@ from ..physics.measures import SIDE, Measures
 from ..scene import Scene
 from ..solve.adhesive import kernels
 from ..solve.certificate import Certificate
+from ..solve.constraint import Mask
 from ..solve.contact import Contact
 from ..solve.problem import Approach, Control
 from ..storage.checkpoint import Contents
@@ -76,7 +77,7 @@ class StuckContact(NamedTuple):
 
     contact: Contact
     memory: StickingMemory
-    touching: Array
+    touching: Mask
     columns: tuple[float, ...]
     pushed: Pushed
     flips: float
@@ -159,10 +160,12 @@ def solve(scene: Scene, memory: StickingMemory, step: Step, trial: Trial, path: 
     pasts = PastGap(gap, step.position, True), memory.pasts[0]
     now = StickingMemory(pasts, memory.pasts[1].gap, began, lag, trial.alpha, memory.energies)
     now = replace(now, snaps=memory.snaps, told=memory.told)
-    (flips,) = scene.slab.sum(kernels.count_flips(memory.pasts[0].gap, gap)) if now_known else (0.0,)
+    touching, flips = law.touches(gap), 0.0
+    if now_known:
+        (flips,) = scene.slab.sum(float(np.count_nonzero(law.touches(memory.pasts[0].gap) != touching)))
     columns = _columns(scene, trial, contact.p)
     pushed = Pushed(work.total * trial.alpha, detached or path.together)
-    return StuckContact(contact, now, gap == 0.0, columns, pushed, flips, snapped, detached)
+    return StuckContact(contact, now, touching, columns, pushed, flips, snapped, detached)
 
 
 def is_apart(stuck: StuckContact, before: Measures, now: Measures) -> bool:
@@ -201,7 +204,7 @@ def open_up(scene: Scene, stuck: StuckContact, trial: Trial) -> StuckContact:
         lag.fill(0.0)
     memory = replace(memory, pasts=(now, before._replace(known=False)))
     contact = replace(contact, d=d, failure="", certificate=Certificate(0.0, 0.0, 0.0))
-    touching, columns = now.gap == 0.0, _columns(scene, trial, contact.p)
+    touching, columns = law.touches(now.gap), _columns(scene, trial, contact.p)
     return stuck._replace(contact=contact, memory=memory, touching=touching, columns=columns)
 
 

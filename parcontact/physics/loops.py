@@ -147,13 +147,14 @@ def embedded(branches, decay, increment, gain, p, u, heights, offset, first, str
 
 
 @loop
-def slope_under(p, heights):
-    """Sums of p, and of p times the squared difference of the heights on both sides along x, cyclic."""
+def slope_under(p, touching, heights):
+    """Sums, where `touching` is not 0, of p and of p times the squared difference of the heights on both sides along x,
+    cyclic."""
     nx = p.shape[1]
     load, slope = 0.0, 0.0
     for j in range(p.shape[0]):
         for i in range(nx):
-            if p[j, i] != 0.0:
+            if touching[j, i] != 0.0:
                 rise = heights[j, (i + 1) % nx] - heights[j, i - 1]
                 load += p[j, i]
                 slope += p[j, i] * rise * rise

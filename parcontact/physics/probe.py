@@ -9,6 +9,9 @@ longer than wide it is less (`measures.excess_of`).
 
 import math
 from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
 
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
@@ -43,29 +46,27 @@ class Probe:
         u: Array,
         h: Array,
         d: float,
+        touching: NDArray[Any],
         displacement: Vector,
         velocity: Vector = (0.0, 0.0),
-        touching: Array | None = None,
         pull: float = 0.0,
     ) -> Measures:
         """Measure the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving
         with `velocity` [m/s]; collective.
 
-        `touching` is a map that is not 0 where the surfaces touch; without one that is where there is a pressure. All
-        tension adds up to the force `pull` [N].
+        `touching` is a map that is not 0 where the surfaces touch. All tension adds up to the force `pull` [N].
         Friction is 0 where no load presses: none, tension, or what rounding leaves of two forces that balance. Where
         nothing touches all pressure is tension, and a load above 0 is an error of the solve.
         """
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
-        mask = p if touching is None else touching
-        *sums, largest = loops.measure(p, u, h, mask, rows.before_first(self.slab, mask, cyclic), cyclic)
-        edge = 0.0 if cyclic else _largest_at_edge(self.slab, mask)
+        *sums, largest = loops.measure(p, u, h, touching, rows.before_first(self.slab, touching, cyclic), cyclic)
+        edge = 0.0 if cyclic else _touches_edge(self.slab, touching)
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
-        if load > 0.0 or touching is not None:
+        if load > 0.0 or pull > 0.0:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
@@ -91,9 +92,9 @@ class Probe:
         )
 
 
-def _largest_at_edge(slab: Slab, p: Array) -> float:
-    """Return the largest pressure of this rank at the edge of the box, across which there is more than one point."""
-    sides = [p[:, 0], p[:, -1]] if slab.nx > 1 else []
-    if slab.ny > 1 and len(p):
-        sides += [p[0]] * (slab.rows.start == 0) + [p[-1]] * (slab.rows.stop == slab.ny)
-    return max((float(side.max(initial=0.0)) for side in sides), default=0.0)
+def _touches_edge(slab: Slab, touching: NDArray[Any]) -> float:
+    """Return 1 if the surfaces touch on this rank at an edge of the box, across which there is more than one point."""
+    sides = [touching[:, 0], touching[:, -1]] if slab.nx > 1 else []
+    if slab.ny > 1 and len(touching):
+        sides += [touching[0]] * (slab.rows.start == 0) + [touching[-1]] * (slab.rows.stop == slab.ny)
+    return float(any(side.any() for side in sides))

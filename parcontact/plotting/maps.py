@@ -12,7 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
+from ..effects.contact_law import touching_of
 from ..errors import InputError
+from ..job import Job
 from ..parallel.slab import Array
 from . import lines, style, units
 from .run import Fields, Run
@@ -69,7 +71,7 @@ def _panels(run: Run, fields: Fields) -> Iterator[style.Panel]:
     instant = run.instant(int(fields.steps[last]), float(fields.times[last]))
     for name, values in found.items():
         if values is not None:
-            yield _panel(fields, name, mask(name, values, pressure), instant, _find_window(pressure))
+            yield _panel(fields, name, mask(name, values, pressure, run.job), instant, _find_window(pressure))
 
 
 def _panel(fields: Fields, name: str, values: Array, instant: str, window: Window) -> style.Panel:
@@ -86,15 +88,15 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
     return draw
 
 
-def mask(name: str, values: Array, pressure: Array | None) -> Array:
-    """Return a map as it is drawn: pressures where there are any, gaps, none negative, where there is no contact.
+def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
+    """Return a map as it is drawn: pressures where there are any, gaps, none negative, where the surfaces do not touch.
 
-    Only contacts that stick have pressures below 0: theirs are drawn everywhere, and closed is where the gap is 0.
+    Pressures of contacts that stick may be below 0, and are drawn everywhere. Without pressures all gaps above 0 are.
     """
     if name == "pressure":
         return values if (values < 0.0).any() else np.where(values > 0.0, values, np.nan)
     if name == "gap":
-        closed = values <= 0.0 if pressure is None or (pressure < 0.0).any() else pressure > 0.0
+        closed = values <= 0.0 if pressure is None else touching_of(job, pressure, values)
         return np.where(closed, np.nan, np.maximum(values, 0.0))
     return values
 
@@ -172,13 +174,19 @@ def where(file: h5py.File, name: str) -> str:
 
 
 def draw_frames(
-    file: h5py.File, name: str, labels: Mapping[int, str], size: tuple[float, float] = (4.5, 4.0), dpi: int = 110
+    file: h5py.File,
+    name: str,
+    labels: Mapping[int, str],
+    job: Job,
+    size: tuple[float, float] = (4.5, 4.0),
+    dpi: int = 110,
 ) -> Iterator[Image.Image]:
-    """Draw a map of shape (instant, y, x) in a file at each index that has a label, with one range of colours."""
+    """Draw a map of shape (instant, y, x) that a job has left in a file at each index that has a label, with one range
+    of colours."""
 
     def read(index: int) -> Array:
         pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
-        return mask(name, file[where(file, name)][index], pressure)
+        return mask(name, file[where(file, name)][index], pressure, job)
 
     ranges = [find_range(read(index)) for index in labels]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)

@@ -109,14 +109,15 @@ def _write_movie(directory: Path, options: Options) -> Path:
         raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
     try:
         with h5py.File(path, "r", locking=False) as file:
-            labels = label_frames(Run(directory), file)
+            run = Run(directory)
+            labels = label_frames(run, file)
             there = [key for key in maps.LOOKS if key in file]
             if name not in there or not labels:
                 raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
             chosen = choose_evenly(labels, FRAMES)
             duration = int(1000 / np.clip(round(len(chosen) / SECONDS), SLOWEST, FASTEST))  # of a frame [ms]
             with files.replaced(target, files.is_marked) as movie:
-                first, *others = maps.draw_frames(file, name, chosen)
+                first, *others = maps.draw_frames(file, name, chosen, run.job)
                 look: dict[str, Any] = {"append_images": others, "duration": duration, "loop": 0}
                 first.save(movie, "GIF", save_all=True, comment=files.MARK.encode(), **look)
     except hdf5.FAILURES as error:

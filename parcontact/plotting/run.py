@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..history.timeline import Timeline
+from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import tables
@@ -145,13 +146,16 @@ def read_table(path: Path, names: Sequence[str]) -> dict[str, Array]:
     return columns
 
 
+def find_curve_job(directory: Path) -> Job | None:
+    """Return the job of the friction curve in a directory, None where no job is left there."""
+    found = (directory / name for name in (STEADY_RESOLVED, RESOLVED))
+    return next((shown_job(path) for path in found if path.is_file()), None)
+
+
 def find_free_area(directory: Path) -> float:
     """Return the area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
-    for name in (STEADY_RESOLVED, RESOLVED):
-        if (directory / name).is_file():
-            grid = shown_job(directory / name).grid
-            return grid.lx * grid.ly if grid.boundary == "free" else 0.0
-    return 0.0
+    job = find_curve_job(directory)
+    return job.grid.lx * job.grid.ly if job and job.grid.boundary == "free" else 0.0
 
 
 def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:

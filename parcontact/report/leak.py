@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from .. import scene
+from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
@@ -67,8 +68,8 @@ class Gaps:
                 "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
             )
             raise InputError(f"{directory} is no {what}")
-        job = shown_job(directory / RESOLVED)
-        self.directory, self.sticks = directory, job.section("adhesion") is not None
+        self.directory, self.job = directory, shown_job(directory / RESOLVED)
+        job = self.job
         self.size, self.periodic = job.grid.size, job.grid.boundary == "periodic"
         self.cells = job.grid.nx * job.grid.ny
         self.columns = tables.read(directory / "measures.csv")
@@ -93,7 +94,7 @@ class Gaps:
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
             step = int(self.fields.steps[index])
             raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are no whole maps of numbers")
-        return np.maximum(gap, 0.0) if self.sticks else np.where(pressure > 0.0, 0.0, np.maximum(gap, 0.0))
+        return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:
         """Return the gap [m] of the undeformed surface that just touches; raises InputError where its heights are not

@@ -12,9 +12,10 @@ import numpy as np
 from PIL import Image
 
 from .. import progress
+from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
-from ..plotting.run import Run, find_free_area, label_frames, to_load
+from ..plotting.run import Run, find_curve_job, find_free_area, label_frames, to_load
 from ..storage import hdf5, marker, tables
 from ..storage.row import UNITS
 from ..summary import pull_off, slide, sweep_table, theory_beside, theory_settings
@@ -94,7 +95,9 @@ def describe_curve(directory: Path) -> Section:
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_chart(chart) for chart in steady.charts(directory)]
     states = partial(_label_states, find_free_area(directory))
-    return Section("Friction curve", (), [table], pictures, _browse_file(directory / "steady.h5", states))
+    job = find_curve_job(directory)
+    browsers = _browse_file(directory / "steady.h5", states, job) if job else []
+    return Section("Friction curve", (), [table], pictures, browsers)
 
 
 def describe_sweep(directory: Path) -> Section:
@@ -147,22 +150,22 @@ def _parse_number(text: str) -> object:
 
 def browse_run(run: Run) -> list[Browser]:
     """Return all maps that a run has saved, over time."""
-    return _browse_file(run.directory / "fields.h5", partial(label_frames, run))
+    return _browse_file(run.directory / "fields.h5", partial(label_frames, run), run.job)
 
 
-def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]]) -> list[Browser]:
+def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job) -> list[Browser]:
     """Return none where the file is missing or cannot be read: a report tells what there is."""
     try:
         with h5py.File(path, "r", locking=False) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
-            return [_browse_map(file, name, labels) for name in maps.LOOKS if maps.where(file, name) and labels]
+            return [_browse_map(file, name, labels, job) for name in maps.LOOKS if maps.where(file, name) and labels]
     except hdf5.FAILURES:
         return []
 
 
-def _browse_map(file: h5py.File, name: str, labels: dict[int, str]) -> Browser:
+def _browse_map(file: h5py.File, name: str, labels: dict[int, str], job: Job) -> Browser:
     counted = progress.with_bar(list(labels), f"maps of {name}", "map")
-    images = zip(maps.draw_frames(file, name, labels, MAP_SIZE, MAP_DPI), counted, strict=True)
+    images = zip(maps.draw_frames(file, name, labels, job, MAP_SIZE, MAP_DPI), counted, strict=True)
     return name, [(to_uri(to_small_png(image), "image/png"), labels[index]) for image, index in images]
 
 

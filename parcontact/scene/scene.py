@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..effects import contact_law
 from ..effects.effect import Effect, values_of
 from ..effects.folded_branches import describe_folded_branches
 from ..history.chosen import describe_steps
@@ -33,8 +34,7 @@ from ..solve.adhesive.iterate import GapOperators
 from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
 from ..solve.adhesive.solver import GapSolver
 from ..solve.adhesive.sticking import StickingSolver
-from ..solve.bounded import Bounded
-from ..solve.constraint import Constraint, NonNegative
+from ..solve.constraint import Constraint
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
@@ -161,8 +161,7 @@ class Scene:
 
     def constraint(self, alpha: float) -> Constraint:
         """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
-        hardness = self.choices.hardness
-        return NonNegative() if hardness is None else Bounded(hardness / (alpha * self.units.pressure))
+        return contact_law.constraint_of(self.job, alpha * self.units.pressure)
 
     def law(self, alpha: float) -> Law | None:
         """Return the law of adhesion in a step with the modulus alpha, None without adhesion."""

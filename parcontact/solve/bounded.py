@@ -17,7 +17,7 @@ import numpy as np
 from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
-from .constraint import Cells, Set
+from .constraint import Cells, Mask, Set
 
 MAX_PASSES = 20  # accuracy: of scaling to the load, of which each takes in those that reach H; 2 or 3 do as a rule
 LOAD_ROUNDING = 1e-14  # accuracy: of the load, a smaller part of which cannot be told from none
@@ -33,6 +33,10 @@ class Bounded:
     @property
     def bounds(self) -> tuple[float, float]:
         return 0.0, self.highest
+
+    def touches(self, p: Array) -> Mask:
+        """The surfaces touch where there is a pressure, also where one of them has yielded."""
+        return p
 
     def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         load, work, gaps, squares = kernels.weigh(p, u, h, d)

@@ -1,10 +1,10 @@
 """Admissible pressures, and the conditions of contact that go with them.
 
-`Constraint` is all that the solvers ask. `NonNegative` is contact without adhesion: it is only here that pressures are
-known not to be negative. Another law is another class with these methods (`bounded`).
+`Constraint` is all that the solvers ask, and all that the program knows of where surfaces touch. `NonNegative` is
+contact without adhesion. Another law is another class with these methods (`bounded`).
 """
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from . import kernels
 
 CELL = 16  # tuning: points along a side of a cell of `LocalLoad`; 8 and 32 need a few iterations more
 Set = NDArray[np.bool_]
+Mask = NDArray[Any]  # a map that is not 0 at the points that are meant
 
 
 class Cells(NamedTuple):
@@ -35,6 +36,9 @@ class Constraint(Protocol):
     @property
     def bounds(self) -> tuple[float, float]:
         """The lowest and the highest admissible pressure."""
+
+    def touches(self, p: Array) -> Mask:
+        """Return where the surfaces touch under an admissible pressure: a map that is not 0 there, which may be p."""
 
     def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         """Sums of p, p u, p g and p u^2; and of p and p g over the points that are free to move."""
@@ -65,6 +69,10 @@ class NonNegative:
     """`p >= 0`, `g >= 0`, `p g = 0`: surfaces that do not stick, and neither of which yields."""
 
     bounds = (0.0, np.inf)
+
+    def touches(self, p: Array) -> Mask:
+        """The surfaces touch where there is a pressure."""
+        return p
 
     def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         load, work, gaps, squares = kernels.weigh(p, u, h, d)

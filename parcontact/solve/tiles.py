@@ -24,6 +24,7 @@ from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab, allocate
 from ..physics.tile_operator import TileOperator
 from ..physics.tiles import SIDE, TileConvolution, Tiles, tiles_along
+from .constraint import Constraint
 from .contact import Contact, ContactSolver
 from .preconditioner.extension import Grids
 from .problem import Control, MeanPressure, Operators, Problem
@@ -69,17 +70,24 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 
 
 def choose(
-    blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, periodic: bool
+    blocks: Slab,
+    operators: Operators,
+    below: Found,
+    slab: Slab,
+    heights: Array,
+    constraint: Constraint,
+    periodic: bool,
 ) -> Tiles | None:
     """Return the tiles of a grid that may touch, from the contact on the next coarser one; None where these are none,
     or more than LARGEST_SHARE of all; collective."""
     most = (LARGEST_PERIODIC_SHARE if periodic else LARGEST_SHARE) * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
-    if _tiles_with(blocks, p > 0.0, slab, periodic).count > most:
+    touching = constraint.touches(p) != 0.0
+    if _tiles_with(blocks, touching, slab, periodic).count > most:
         return None
     u = operators.operator.apply(p, blocks.empty())
     gap = u - regrid.highest(slab, blocks, heights) - below.d
-    tiles = _tiles_with(blocks, (p > 0.0) | (gap < MARGIN * below.length), slab, periodic)
+    tiles = _tiles_with(blocks, touching | (gap < MARGIN * below.length), slab, periodic)
     return tiles if 0 < tiles.count <= most else None
 
 

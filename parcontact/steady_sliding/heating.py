@@ -19,6 +19,7 @@ from ..physics.heat import depths_of, sliding_heat
 from ..physics.heat_unbounded import sliding_heat_unbounded
 from ..physics.measures import Measures
 from ..scene import Setup
+from ..solve.constraint import Mask
 from .point import Point
 
 MOST_ROUNDS = 10  # tuning: of the fixed point, more than any case has needed
@@ -29,11 +30,18 @@ Vector = tuple[float, float]
 
 
 def warm(
-    setup: Setup, section: Thermal, pressure: Array, measures: Measures, friction: float, velocity: Vector
+    setup: Setup,
+    section: Thermal,
+    pressure: Array,
+    touching: Mask,
+    measures: Measures,
+    friction: float,
+    velocity: Vector,
 ) -> tuple[Flash, Array]:
     """Return the temperatures of a steady state, and this rank's rows of the map of rises [K]; collective.
 
-    `pressure` is its map in the run's units, `friction` that of the body without the interface.
+    `pressure` is its map in the run's units, `touching` is not 0 where the surfaces touch, `friction` is that of the
+    body without the interface.
     """
     slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
     place = fft, size, section.conductor, velocity
@@ -48,7 +56,7 @@ def warm(
         inside += operator(depths, felt=True).apply(heat, slab.empty())
         pairs.append((inside, heat))
     if (power := measures.friction_interface * measures.pressure * speed) > 0.0:
-        rubbed = spread_over(slab, np.where(pressure > 0.0, 1.0, 0.0), power)
+        rubbed = spread_over(slab, np.where(touching, 1.0, 0.0), power)
         rise = operator().apply(rubbed, slab.empty())
         if section.counterbody is not None:
             still = sliding_heat(fft, size, section.counterbody.conductor, (0.0, 0.0), time=operator.keywords["time"])

@@ -120,7 +120,8 @@ class SteadySliding:
             )
         self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
-        measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, (0.0, 0.0), velocity)
+        touching = SteadySolver.constraint.touches(contact.p)
+        measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, touching, (0.0, 0.0), velocity)
         if not measures.finite:
             raise RunError(f"{what}: its results would not be finite")
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
@@ -135,7 +136,8 @@ class SteadySliding:
         section = self.setup.job.section("thermal")
         if section is None:
             return None
-        flash, self._rise = warm(self.setup, section, contact.p, measures, friction, velocity)
+        touching = SteadySolver.constraint.touches(contact.p)
+        flash, self._rise = warm(self.setup, section, contact.p, touching, measures, friction, velocity)
         return flash
 
     def field(self, name: str) -> Array:
@@ -158,7 +160,8 @@ class SteadySliding:
         """Return friction from that by energy, with what an interface adds, and how wrong it and the area are;
         collective."""
         setup, (x, y) = self.setup, _direction(velocity)
-        load, rise = setup.slab.sum(*slope_under(contact.p, self.levels[0].heights))
+        touching = SteadySolver.constraint.touches(contact.p)
+        load, rise = setup.slab.sum(*slope_under(contact.p, touching, self.levels[0].heights))
         slopes = -(measures.force_x * x + measures.force_y * y) / measures.normal_force
         friction = by_energy + measures.friction_interface
         seen = StepObservation(

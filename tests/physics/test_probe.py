@@ -49,7 +49,7 @@ def test_pressure_ahead_of_a_wave(comm: MPI.Intracomm, waves: tuple[int, int], c
     shift = cells[0] * LX / NX, cells[1] * LY / NY
     p, h, d = slab.empty(), surface.heights(shift, slab.empty()), 0.25
     p[...] = p0 + p1 * np.cos(angle(slab, waves) - moved - lead)
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h + d, h, d, shift)
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h + d, h, d, p, shift)
     q = 2 * np.pi * np.array([waves[0] / LX, waves[1] / LY])
     force = -0.5 * p1 * PRESSURE * HEIGHT * math.sin(lead) * q * LX * LY
     assert_allclose([found.force_x, found.force_y], force, rtol=1e-12, atol=1e-13 * np.abs(force).max())
@@ -68,7 +68,7 @@ def test_partial_contact(comm: MPI.Intracomm) -> None:
     p[:, :4] = 1.5
     u += 0.5
     h -= 0.25
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, h, -0.125, (0.0, 0.0))
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, h, -0.125, p, (0.0, 0.0))
     assert found.contact_area == 0.25
     assert_allclose(found.pressure, 0.25 * 1.5 * PRESSURE, rtol=1e-15)
     assert_allclose(found.mean_gap, 0.875 * UNITS.height, rtol=1e-15)
@@ -84,7 +84,7 @@ def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
     for row in range(NY)[slab.rows]:
         if row == NY // 2:
             p[row - slab.rows.start, NX // 2 + 2] = 3.0
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, u, 0.0, (LX / NX, 0.0))
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, u, 0.0, p, (LX / NX, 0.0))
     distance = LX / NX  # two cells from where the centre was, which has moved by one
     assert_allclose(found.force_x, 3.0 * PRESSURE * (LX / NX) * (LY / NY) * (-distance / 1e-2), rtol=1e-13)
     assert_allclose(found.friction, distance / 1e-2, rtol=1e-13)
@@ -104,7 +104,7 @@ def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int
     pressed = np.random.default_rng(seed).random((ny, nx)) < 0.5
     p, none = slab.zeros(), slab.zeros()
     p[...] = pressed[slab.rows]
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, none, none, 0.0, (0.0, 0.0))
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, none, none, 0.0, p, (0.0, 0.0))
     if periodic:
         sides = sum(np.count_nonzero(pressed != np.roll(pressed, 1, axis)) for axis in (0, 1))
     else:
@@ -119,7 +119,7 @@ def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:
     surface = wave(comm, (1, 0))
     none = surface.slab.zeros()
     h = surface.heights((0.0, 0.0), surface.slab.empty())
-    found = Probe(surface.slab, surface, UNITS).measure(none, ALPHA, none, h, -1.0, (0.0, 0.0))
+    found = Probe(surface.slab, surface, UNITS).measure(none, ALPHA, none, h, -1.0, none, (0.0, 0.0))
     assert found == Measures(approach=-UNITS.height, mean_gap=found.mean_gap)
     assert_allclose(found.mean_gap, UNITS.height, rtol=1e-14)  # the wave has no mean
 
@@ -131,7 +131,7 @@ def test_a_load_on_nothing_has_no_friction(comm: MPI.Intracomm, touches: bool) -
     slab, h = surface.slab, surface.heights((0.0, 0.0), surface.slab.empty())
     p = 1e-9 * (1.0 + np.cos(angle(slab, (3, 0)) - 0.6))
     touching = np.full_like(p, touches)
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h, h, 0.0, (0.0, 0.0), touching=touching)
+    found = Probe(slab, surface, UNITS).measure(p, ALPHA, h, h, 0.0, touching, (0.0, 0.0))
     assert found.pressure > 0.0
     assert (found.friction > 0.0) == touches
 
@@ -145,7 +145,7 @@ def test_no_friction_where_pull_and_push_balance(comm: MPI.Intracomm, more: floa
     (tension,) = slab.sum(-float(np.minimum(p, 0.0).sum()))
     pull = tension * ALPHA * UNITS.pressure * LX * LY / (slab.nx * slab.ny)
     probe = Probe(slab, surface, UNITS, InterfaceFriction(2e5))
-    found = probe.measure(p, ALPHA, h, h, 0.0, *instant, touching=np.ones_like(p), pull=pull)
+    found = probe.measure(p, ALPHA, h, h, 0.0, np.ones_like(p), *instant, pull=pull)
     assert found.force_x != 0.0
     assert_allclose(found.force_interface, 2e5 * LX * LY, rtol=1e-15)
     assert [each != 0.0 for each in (found.friction, found.friction_x, *shares(found, instant[1]))] == [defined] * 4

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
+from parcontact.job import Job
 from parcontact.plotting import maps, plots
 from parcontact.plotting.run import Run, label_frames
 from parcontact.report import results
@@ -50,10 +51,11 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     plots.plot([out])
     found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
     assert set(found) == {"pressure", "gap", "height"}
-    assert [label for _, label in results.browse_run(Run(out))[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
+    run = Run(out)
+    assert [label for _, label in results.browse_run(run)[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
-            list(maps.draw_frames(file, name, {1: ""}))
+            list(maps.draw_frames(file, name, {1: ""}, run.job))
             film = drawn[-1].axes[0]
             ours, theirs = mesh(film), mesh(axes)
             assert ours.get_cmap().name == theirs.get_cmap().name == maps.LOOKS[name].colors
@@ -113,7 +115,7 @@ def test_no_scale_of_nothing(
     plots.plot([out])
     (axes,) = (axes for title, axes in maps_of(drawn[0]).items() if title.startswith(name))
     with h5py.File(out / "fields.h5") as file:
-        list(maps.draw_frames(file, name, {len(file["step"]) - 1: ""}))
+        list(maps.draw_frames(file, name, {len(file["step"]) - 1: ""}, Run(out).job))
         for found in (mesh(axes), mesh(drawn[-1].axes[0])):
             assert (found.colorbar is None) == (ticks is None)
             if found.colorbar is not None:
@@ -132,10 +134,14 @@ def test_rare_colours_stay() -> None:
 
 def test_contacts_that_stick_are_closed_where_their_gap_is_zero() -> None:
     """Pressures below 0, which only they have, are drawn; a rest of pressure where the gap is open closes nothing."""
+    given = {"grid": {"points": 8, "size": 1e-3}, "surface": {"shape": "flat"}, "history": [{"pressure": 1e3}]}
+    given["material"] = {"model": "elastic", "shear_modulus": 1e6}
+    job = Job.model_validate(given)
+    sticks = Job.model_validate({**given, "adhesion": {"work": 0.05, "range": 1e-7}})
     pressure, gap = np.array([[3.0, -2.0, 1e-6, -1e-9]]), np.array([[0.0, 0.0, 2e-6, 3e-6]])
-    assert np.isnan(maps.mask("gap", gap, pressure)).tolist() == [[True, True, False, False]]
-    assert np.array_equal(maps.mask("pressure", pressure, None), pressure)
-    assert np.isnan(maps.mask("gap", gap, np.abs(pressure))).all()
+    assert np.isnan(maps.mask("gap", gap, pressure, sticks)).tolist() == [[True, True, False, False]]
+    assert np.array_equal(maps.mask("pressure", pressure, None, sticks), pressure)
+    assert np.isnan(maps.mask("gap", gap, np.abs(pressure), job)).all()
 
 
 def test_the_colours_of_pressures_that_pull_and_push_show_both() -> None:

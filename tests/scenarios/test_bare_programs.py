@@ -35,7 +35,7 @@ def bare(planned: Job) -> Counter[str]:
         p[...] = last
         contact = solver.solve(Problem(*operators, heights, NonNegative(), load), p)
         last, p = p, last
-        probe.measure(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, (0.0, 0.0))
+        probe.measure(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, contact.p, (0.0, 0.0))
     return slab.tally.copy()
 
 
@@ -59,7 +59,7 @@ def lasting(planned: Job) -> Counter[str]:
         moduli, cells = [moduli[1], alpha], heights.offset
         load_of_step = MeanPressure(step.load / (alpha * base.units.pressure))
         contact = solver.solve(Problem(*operators, trial.effective, NonNegative(), load_of_step), p)
-        found = probe.measure(contact.p, alpha, contact.u, trial.effective, contact.d, step.position)
+        found = probe.measure(contact.p, alpha, contact.u, trial.effective, contact.d, contact.p, step.position)
         held = body.commit(held, trial, contact.u, p if held.displacement is None else held.displacement)
         if isinstance(body, ZenerBody) and step.dt != dt:
             # The error budget looks at what the other integrator would have done, once for some steps that are alike.

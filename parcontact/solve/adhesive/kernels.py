@@ -208,18 +208,6 @@ def weigh_off(p, a, level):
 
 
 @loop
-def count_flips(g_old, g):
-    """The number of points that are in contact in one of two maps of gaps, and not in the other."""
-    count = 0.0
-    for j in range(g.shape[0]):
-        row = 0.0
-        for i in range(g.shape[1]):
-            row += 1.0 if (g_old[j, i] == 0.0) != (g[j, i] == 0.0) else 0.0
-        count += row
-    return count
-
-
-@loop
 def surface_energy(law, g):
     """Sum of `-gamma(g)`."""
     total = 0.0

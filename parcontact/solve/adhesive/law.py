@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import loop
+from ...parallel.slab import Array
+from ..constraint import Mask
 
 EXPONENTIAL, DUGDALE = 0, 1
 LOG_TWO = math.log(2.0)
@@ -31,6 +33,11 @@ class Law(NamedTuple):
     strength: float
     range: float
     ramp: float = 0.0
+
+    @staticmethod
+    def touches(gap: Array) -> Mask:
+        """Return where the surfaces touch: at points whose gap is 0, under pressure and under tension."""
+        return gap == 0.0
 
 
 @loop

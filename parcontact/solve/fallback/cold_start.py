@@ -28,7 +28,7 @@ def prepare(
 
     Operator calls of solvers on other grids, or on tiles, are counted by their share of the points. With operators
     `on_tiles` a dilute contact is solved on these, to the solver's tolerance on the finest grid. It is returned if it
-    holds at all points.
+    holds at all points. Pressures beside the tiles are 0, which the constraint must admit.
     """
     if solver.slab.points < WORTHWHILE:
         return None
@@ -53,7 +53,7 @@ class _Descent:
 
     def __init__(self, solver: ContactSolver, problem: Problem, solver_on: SolverOn, on_tiles: OnTiles | None) -> None:
         self._solver, self._problem, self._solver_on = solver, problem, solver_on
-        self._on_tiles, self._tally = on_tiles, solver.slab.tally
+        self._on_tiles, self._tally = on_tiles if problem.constraint.bounds[0] == 0.0 else None, solver.slab.tally
         self._cost, self._before = 0.0, self._tally["operator"]
         self._blocks: tuple[Slab, Operators] | None = None
         self._below: tiles.Found | None = None
@@ -93,7 +93,8 @@ class _Descent:
             return None
         if self._on_tiles is None or not self._on_tiles.work_on(level.slab):
             return None
-        return tiles.choose(*self._blocks, self._below, level.slab, level.heights, self._on_tiles.periodic)
+        below, law = (*self._blocks, self._below), self._problem.constraint
+        return tiles.choose(*below, level.slab, level.heights, law, self._on_tiles.periodic)
 
     def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> tiles.OnTheseTiles:
         """Solve on tiles of a level from p."""

@@ -83,6 +83,8 @@ class SteadySolver:
     (`extension.pairs_for`); `least_cut` of the load, which is taken back near by (`local_load`).
     """
 
+    constraint = NonNegative()  # the only law that there is
+
     def __init__(
         self,
         slab: Slab,
@@ -98,7 +100,6 @@ class SteadySolver:
     ) -> None:
         self.slab, self.operator = slab, operator
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
-        self.constraint = NonNegative()
         self._projected = Projected(slab, operator, preconditioner, self.constraint, pairs, least_cut)
         kept = precision_of_directions(tolerance, LOOSE)
         self._striped = along is not None

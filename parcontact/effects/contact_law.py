@@ -1,0 +1,18 @@
+"""Which law a contact obeys, from its job: what pressures are admissible, and where surfaces touch in saved maps."""
+
+from ..job import Job
+from ..parallel.slab import Array
+from ..solve.adhesive.law import Law
+from ..solve.bounded import Bounded
+from ..solve.constraint import Constraint, Mask, NonNegative
+
+
+def constraint_of(job: Job, unit: float = 1.0) -> Constraint:
+    """Return which pressures a job admits without adhesion, in a unit of pressure [Pa]."""
+    hardness = job.material.hardness
+    return NonNegative() if hardness is None else Bounded(hardness / unit)
+
+
+def touching_of(job: Job, pressure: Array, gap: Array) -> Mask:
+    """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m]."""
+    return constraint_of(job).touches(pressure) if job.section("adhesion") is None else Law.touches(gap)

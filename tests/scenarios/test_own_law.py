@@ -1,0 +1,144 @@
+"""A contact law of one's own: a fluid of the pressure q in the gap. Where `p > q` the surfaces touch.
+
+The reference is the usual law, `p - q >= 0`, under the load that the fluid does not bear: an even pressure moves no
+point of a periodic half space against another.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from marching import column, marched
+from numpy.testing import assert_allclose
+
+import parcontact as pc
+from parcontact.effects import contact_law
+from parcontact.job import Job
+from parcontact.parallel.slab import Array, Slab
+from parcontact.plotting import maps
+from parcontact.report.leak import Gaps
+from parcontact.solve.constraint import Cells, Mask, NonNegative, Set
+
+FLUID, LOAD = 4e4, 6e4  # pressure of the fluid, and the load that it does not bear [Pa]
+ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1.25e-4, "rms_slope": 0.1}
+ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "relaxation_time": 1e-4}]}
+CELL = 1e-3 / 32
+
+
+@dataclass(frozen=True)
+class InFluid:
+    """`p >= q`, `g >= 0`, `(p - q) g = 0`."""
+
+    fluid: float
+    dry: NonNegative = field(default_factory=NonNegative)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        return self.fluid, np.inf
+
+    def touches(self, p: Array) -> Mask:
+        return p > self.fluid
+
+    def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
+        load, gap = p - self.fluid, u - h - d
+        sums = float(p.sum()), float((p * u).sum()), float((p * gap).sum()), float((p * u**2).sum())
+        return *sums, float(load.sum()), float((load * gap).sum())
+
+    def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
+        return self.dry.mark(p - self.fluid, u, h, d, working)
+
+    def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
+        load, cut = self.dry.advance(p_old - self.fluid, t, step, p, cells, sums)
+        p += self.fluid
+        return load + self.fluid * p.size, cut
+
+    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
+        even = self.fluid * slab.points
+        p -= self.fluid
+        self.dry.restore(slab, p, load - even, total - even, kept, cells)
+        p += self.fluid
+
+    def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
+        even = self.fluid * slab.points
+        p[...] = self.fluid + (p - self.fluid) * ((total - even) / (load - even))
+
+    def clip(self, p: Array) -> float:
+        return float(np.maximum(p, self.fluid, out=p).sum())
+
+    def next_set(self, x: Array, gap: Array, working: Set) -> Set:
+        return self.dry.next_set(x - self.fluid, gap, working)
+
+
+@pytest.fixture
+def with_fluid(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """All that a law of one's own needs."""
+    return lambda: monkeypatch.setattr(contact_law, "constraint_of", lambda job, unit=1.0: InFluid(FLUID / unit))
+
+
+def job(load: float, points: int = 32, **changes: Any) -> dict[str, Any]:
+    found = {
+        "grid": {"points": points, "size": 1e-3},
+        "surface": ROUGH,
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [{"pressure": load}],
+        "numerics": {"tolerance": 1e-8},
+    }
+    return found | changes
+
+
+def slide(load: float) -> dict[str, Any]:
+    history = [
+        {"pressure": load, "duration": 1e-4, "time_step": 2e-5},
+        {"pressure": load, "velocity": 0.5, "distance": 6 * CELL, "cells_per_step": 1},
+    ]
+    return job(load, material=ZENER, history=history, leakage={}, interface={"shear_stress": 1e4})
+
+
+@pytest.mark.parametrize("points", [32, 256])
+def test_the_area_is_where_the_pressure_is_above_that_of_the_fluid(points: int, with_fluid: Any) -> None:
+    """One press, on a small grid and on one that coarser grids and tiles prepare; pressures to the tolerance."""
+    expected, rows = marched(job(LOAD, points))
+    with_fluid()
+    found, others = marched(job(LOAD + FLUID, points))
+    dry, wet = rows[-1].measures, others[-1].measures
+    assert 0.05 < dry.contact_area < 0.6
+    assert wet.contact_area == dry.contact_area
+    assert wet.contact_area_corrected == dry.contact_area_corrected
+    assert_allclose(wet.pressure, LOAD + FLUID, rtol=1e-12)
+    assert_allclose(found.field("pressure") - FLUID, expected.field("pressure"), rtol=0, atol=1e-6 * dry.max_pressure)
+
+
+def test_effects_ask_the_law(with_fluid: Any) -> None:
+    """A slide of a viscoelastic body: contact area, tangential force with that of the interface, and leakage."""
+    march, rows = marched(slide(LOAD))
+    with_fluid()
+    wet, others = marched(slide(LOAD + FLUID))
+    for name in ("contact_area", "contact_area_corrected"):
+        assert np.array_equal(column(rows, name), column(others, name))
+    scale = np.abs(column(rows, "force_x")).max()
+    assert scale > 0.0
+    assert_allclose(column(others, "force_x"), column(rows, "force_x"), rtol=0, atol=1e-6 * scale)
+    flows, dry = (np.array([row.added for row in each])[1:, -3:] for each in (others, rows))
+    assert dry.max() > 0.0
+    assert_allclose(flows, dry, rtol=1e-4, atol=1e-6 * dry.max())
+    apart, errors = (column(each[1:], "error_area") for each in (others, rows))
+    assert_allclose(apart, errors, rtol=0.05, atol=1e-6)  # certificates are relative to the load
+    assert march.scene.slab.tally["retry"] == wet.scene.slab.tally["retry"] == 0
+
+
+def test_saved_maps_ask_the_law(tmp_path: Path, with_fluid: Any) -> None:
+    """Leakage from saved gaps, and pictures of these, are closed where the surfaces touch."""
+    with_fluid()
+    out = {"directory": str(tmp_path / "out"), "fields": ["pressure", "gap"]}
+    pc.Simulation(job(LOAD + FLUID, 64, output=out)).run()
+    touching = Gaps(tmp_path / "out").read(-1) == 0.0
+    with h5py.File(tmp_path / "out" / "fields.h5") as file:
+        pressure, gap = file["pressure"][-1], file["gap"][-1]
+    assert 0.05 < np.mean(pressure > FLUID) < 0.6
+    assert np.array_equal(touching | (gap <= 0.0), (pressure > FLUID) | (gap <= 0.0))
+    drawn = maps.mask("gap", gap, pressure, Job.model_validate(job(LOAD)))
+    assert np.array_equal(np.isnan(drawn), pressure > FLUID)
