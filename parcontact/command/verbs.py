@@ -67,9 +67,11 @@ def check(options: argparse.Namespace) -> int:
     print(jobs.describe(job))
     steps = describe_steps(job)
     steps = steps and f"chosen time steps: {steps}"
-    for text in filter(None, (job.included, job.origin.mesh, steps, *job.facts)):
+    notes: list[list[str]] = []
+    doubts = doubts_of(chosen, lambda one: _doubts(one, notes))
+    for text in filter(None, (job.included, job.origin.mesh, steps, *job.facts, "\n".join(notes[0]))):
         print(f"\n{text}")
-    for warning in doubts_of(chosen, _doubts):
+    for warning in doubts:
         print(f"warning: {warning}")
     if cases[0].settings:
         print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
@@ -77,8 +79,10 @@ def check(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _doubts(job: Job) -> list[str]:
-    """Return the doubts about a job, also those that only a look at heights and measured moduli raises."""
+def _doubts(job: Job, notes: list[list[str]]) -> list[str]:
+    """Return the doubts about a job, also those that only a look at heights and measured moduli raises; append what the
+    look shows of measured maps and spectra to `notes`."""
+    notes.append([])
     if not job.depends_on_heights and not job.measured:
         return list(job.warnings)
     from ..parallel.slab import Slab
@@ -88,6 +92,7 @@ def _doubts(job: Job) -> list[str]:
     if not sanity.is_quickly_made(job):
         return [*job.warnings, *describe_beyond(job)]
     setup = set_up(job, Slab.alone(*job.grid.points))
+    notes[-1] += setup.told.notes
     sanity.refuse_beyond_full_contact(setup)
     return sanity.find_doubts(setup)
 
@@ -105,7 +110,7 @@ def plan(options: argparse.Namespace) -> int:
     from ..run.sweep_warnings import doubts_of
 
     chosen = on_root(world, lambda: cases_of(options)[1])
-    doubts = on_root(world, lambda: doubts_of(chosen, _doubts))
+    doubts = on_root(world, lambda: doubts_of(chosen, lambda job: _doubts(job, [])))
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
     if len(chosen) > 1:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))

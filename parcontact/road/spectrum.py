@@ -6,6 +6,9 @@ in mm, um or nm. As in `road.statistics`, q = 2 pi/wavelength, and C1D is that o
     <h^2> = int C2D d2q = int_0^inf C1D dq,        Phi = 4 pi^2 C2D, the density of `physics.roughness`,
     C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq       (Abel's equation, with q = k cosh t)
 
+SurfaceTopography and contact.engineering write pi C1D and 4 pi^2 C2D (T. D. B. Jacobs, T. Junge, L. Pastewka, Surf.
+Topogr.: Metrol. Prop. 5 (2017) 013001): `normalisation: surface_topography` divides by these factors.
+
 Between its points a spectrum is a power law. For Abel's integral, C1D goes on beyond its last point: with the given
 Hurst exponent, as q^-(1 + 2 hurst), or else as the power law of its last decade.
 """
@@ -23,9 +26,11 @@ from ..parallel.slab import Array
 from .map_files import UNITS
 
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
+LARGER = {3: np.pi, 4: 4 * np.pi**2}  # factors of spectra written by SurfaceTopography, by the same power
 FEWEST = 3  # accuracy: rows of numbers
 ABEL_NODES = 12  # accuracy: of Gauss' rule, in each piece of Abel's integral
 ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
+NOTHING = 1e-20  # accuracy: of the largest C2D, whose square root is the precision of a height
 EDGE = 1e-9  # accuracy: relative: wavelengths that differ by this are the same
 HEADER = re.compile(r"q\[1/([^\]]+)\] (C1D|C2D)\[([^\]^]+)\^(\d)\]")
 FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
@@ -52,6 +57,8 @@ class Measured:
 def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
     """The spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
     q, values, power = _read(part.spectrum)
+    if part.normalisation == "surface_topography":
+        values = values / LARGER[power]
     if power == POWERS["C1D"]:
         q, values = _over_directions(part.spectrum, q, values, part.hurst)
     fall = 2.0 * (1.0 + part.hurst) if part.hurst is not None else 0.0
@@ -101,7 +108,8 @@ def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:
 
 
 def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tuple[Array, Array]:
-    """C2D at the wavenumbers of C1D, without those where noise makes it negative."""
+    """Return C2D at the wavenumbers of C1D from its first to its last positive value. Where C1D rises, or scatter makes
+    C2D negative between them, C2D is NOTHING times its maximum: profiles have no power of waves there."""
     log_q, log_c = np.log(q), np.log(c1)
     last = log_q >= log_q[-1] - np.log(10.0)
     last[-2:] = True
@@ -114,7 +122,8 @@ def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tu
     good = c2 > 0.0
     if good.sum() < FEWEST:
         raise InputError(f"{path}: C1D does not fall with q; such profiles are not those of an isotropic surface")
-    return q[good], c2[good]
+    used = slice(np.flatnonzero(good)[0], np.flatnonzero(good)[-1] + 1)
+    return q[used], np.where(good, c2, NOTHING * c2.max())[used]
 
 
 def _abel(k: float, edges: Array, logs: Array, slopes: Array) -> float:

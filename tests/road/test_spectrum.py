@@ -1,9 +1,12 @@
 """Surfaces with a measured spectrum: that of the surface made is the one in the table."""
 
+import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import SurfaceTopography
 from mpi4py import MPI
 from scipy.special import gamma
 
@@ -13,8 +16,14 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.report import prediction
 from parcontact.road import spectrum, statistics
+from parcontact.road.map_files import UNITS
 from parcontact.scene import rigid_surface
 from parcontact.theory import persson_rings
+
+from . import truth
+
+if TYPE_CHECKING:
+    from conftest import Main
 
 L, N = 1.0e-3, 128
 ROLL, POWER = 2e4, 3.6  # of C2 = A (1 + (q/ROLL)^2)^(-POWER/2), whose profiles are known in closed form
@@ -73,19 +82,19 @@ def test_each_wave_has_the_asked_density(tmp_path: Path) -> None:
     q, found = waves(heights)
     inside = (q >= Q[0]) & (q <= Q[-1])
     expected = np.exp(np.interp(np.log(q[inside]), np.log(Q), np.log(c2(Q))))
-    assert found[inside] == pytest.approx(expected, rel=1e-9)
+    assert found[inside] == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert found[~inside].max() < 1e-20 * expected.max()
     own = statistics.describe(heights, (L, L))
-    assert own.rms_height**2 == pytest.approx(found.sum() * (2 * np.pi / L) ** 2, rel=1e-12)
+    assert own.rms_height**2 == pytest.approx(found.sum() * (2 * np.pi / L) ** 2, rel=1e-12, abs=0.0)
 
 
 def test_profiles_become_directions(tmp_path: Path) -> None:
-    """Abel's integral of 60 points of C1D gives the C2D that they are the profiles of, to 1 %."""
+    """Abel's integral of 60 points of C1D gives the C2D that they are the profiles of, to 1.1 %."""
     q = np.geomspace(2e3, 1e6, 60)
     part = load(tmp_path, table("q[1/m],C1D[m^3]", q, c1(q))).surface[0]
     assert isinstance(part, jobs.RoughSpectrum)
     found, ends = spectrum.of(part)
-    assert found(q) / (4 * np.pi**2) == pytest.approx(c2(q), rel=0.01)
+    assert found(q) / (4 * np.pi**2) == pytest.approx(c2(q), rel=0.011, abs=0.0)
     assert ends == pytest.approx((2 * np.pi / 2e3, 2 * np.pi / 1e6))
 
 
@@ -99,7 +108,7 @@ def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
     own = statistics.describe(heights, (L, L))
     chosen = (own.qx > 1.5e4) & (own.qx < 1.0e5)
     assert chosen.sum() > 8
-    assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05)
+    assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05, abs=0.0)
 
 
 def test_units_are_those_of_the_columns(tmp_path: Path) -> None:
@@ -108,7 +117,46 @@ def test_units_are_those_of_the_columns(tmp_path: Path) -> None:
     other = load(tmp_path / "other", table("q[1/um];C2D[nm^4]", 1e-6 * Q, 1e36 * c2(Q))).surface[0]
     assert isinstance(plain, jobs.RoughSpectrum)
     assert isinstance(other, jobs.RoughSpectrum)
-    assert spectrum.of(other)[0](Q) == pytest.approx(spectrum.of(plain)[0](Q), rel=1e-12)
+    assert spectrum.of(other)[0](Q) == pytest.approx(spectrum.of(plain)[0](Q), rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize(("kind", "factor"), [("C1D[m^3]", np.pi), ("C2D[m^4]", 4 * np.pi**2)])
+def test_spectra_in_the_normalisation_of_surface_topography(tmp_path: Path, kind: str, factor: float) -> None:
+    """Their values are pi and 4 pi^2 times ours: with the key the density is the same to rounding."""
+    own = {"C1D[m^3]": c1, "C2D[m^4]": c2}[kind](Q)
+    plain = load(tmp_path, table(f"q[1/m] {kind}", Q, own)).surface[0]
+    assert isinstance(plain, jobs.RoughSpectrum)
+    expected = spectrum.of(plain)[0](Q)
+    theirs = load(tmp_path, table(f"q[1/m] {kind}", Q, factor * own), ", normalisation: surface_topography").surface[0]
+    assert isinstance(theirs, jobs.RoughSpectrum)
+    assert spectrum.of(theirs)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("kind", ["C1D[m^3]", "C2D[m^4]"])
+def test_spectra_that_surface_topography_writes(tmp_path: Path, main: "Main", kind: str) -> None:
+    """The surface of a spectrum that their library makes of a map of 1 um rms height has that height, and the slope of
+    the map, to 6 %: bins of the spectrum and waves of the box are few. A surface whose waves were continued to where
+    C1D rises had 18 % more. `check` prints both."""
+    heights = truth.rough(256, L, L / 4, L / 64, 0.05, hurst=0.7)
+    heights *= 1e-6 / heights.std()
+    whole = SurfaceTopography.Topography(heights, (L, L), periodic=True)
+    if kind.startswith("C1D"):
+        q, values = whole.power_spectrum_from_profile()
+    else:
+        q, values = whole.power_spectrum_from_area()
+    q, values = np.ma.filled(q, 0.0), np.ma.filled(values, 0.0)
+    good = (q > 0.0) & (values > 1e-6 * np.nanmax(values[q > 0.0]))
+    text = table(f"q[1/m] {kind}", q[good], values[good])
+    job = load(tmp_path, text, ", normalisation: surface_topography")
+    made, _, told = heights_of(job)
+    assert made.std() == pytest.approx(1e-6, rel=0.06, abs=0.0)
+    assert truth.rms_slope(made.astype(float), L) == pytest.approx(truth.rms_slope(heights, L), rel=0.06, abs=0.0)
+    code, out, _ = main("check", tmp_path / "job.yaml")
+    assert code == 0
+    assert told[-1] in out
+    (found,) = re.findall(r"an rms height of (\S+) (nm|um) and an rms slope of (\S+)", out)
+    assert float(found[0]) * UNITS[found[1]] == pytest.approx(made.std(), rel=1e-3, abs=0.0)
+    assert float(found[2]) == pytest.approx(truth.rms_slope(made.astype(float), L), rel=1e-3, abs=0.0)
 
 
 def test_continued_by_a_power_law(tmp_path: Path) -> None:
@@ -118,7 +166,7 @@ def test_continued_by_a_power_law(tmp_path: Path) -> None:
     q, found = waves(heights_of(job)[0])
     last = Q[short][-1]
     beyond = (q > last) & (q < 2 * np.pi / 2.5e-5)
-    assert found[beyond] == pytest.approx(c2(last) * (q[beyond] / last) ** -3.4, rel=1e-9)
+    assert found[beyond] == pytest.approx(c2(last) * (q[beyond] / last) ** -3.4, rel=1e-9, abs=0.0)
     assert found[q > 2 * np.pi / 2.5e-5 * (1 + 1e-6)].max() < 1e-20 * A
 
 
@@ -146,7 +194,9 @@ def test_theory_of_a_measured_spectrum(tmp_path: Path) -> None:
     q = np.geomspace(Q[0], Q[-1], 20001)
     density = spectrum.of(part)[0](q) / (4 * np.pi**2)
     for weight, own in ((1.0, power), (q**2, power * (kx**2 + ky**2))):
-        assert own.sum() == pytest.approx(np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3)
+        assert own.sum() == pytest.approx(
+            np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3, abs=0.0
+        )
     assert isinstance(rings, persson_rings.Rings)
 
 

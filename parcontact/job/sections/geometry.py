@@ -64,6 +64,7 @@ class RoughSpectrum(Part):
     label: ClassVar[str] = "shape rough with a spectrum"
     shape: Literal["rough"] = "rough"
     spectrum: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of a spectrum")]
+    normalisation: Literal["parcontact", "surface_topography"] = "parcontact"
     hurst: Number | None = Field(default=None, gt=0, le=1, description="a Hurst exponent above 0 and up to 1")
     long_wavelength: Wavelength | None = Field(default=None, description="a positive wavelength [m]")
     short_wavelength: Wavelength | None = Field(default=None, description="a positive wavelength [m]")
