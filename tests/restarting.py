@@ -44,14 +44,15 @@ TOUCH = {"name": "touch", "pressure": 1e5}
 SCENES: dict[str, tuple[str, Any, Any, list[Any], dict[str, Any]]] = {  # boundary, surface, material, history, numerics
     "elastic": ("periodic", ROUGH, ELASTIC, [TOUCH, SLIDE, FASTER], {}),
     "viscoelastic": ("periodic", ROUGH, ZENER, [PRESS, SLIDE, FASTER], {}),
-    "backward-euler": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"integrator": "backward-euler"}),
-    "sub-cell": ("periodic", ROUGH, ZENER, [PRESS, OBLIQUE, {**SLIDE, "cells_per_step": 0.7}], {}),
     "free": ("free", SPHERE, ZENER, [PRESS, {**OBLIQUE, "name": "slide"}], {}),
-    "yielding": ("periodic", ROUGH, {**ZENER, "hardness": 3e5}, [PRESS, SLIDE], {}),
     "approach": ("free", SPHERE, ZENER, [LIFT, {**LIFT, "velocity": 0.1}], {}),
-    "ramped": ("periodic", [ROUGH, SPHERE], ZENER, [RAMP, {**SLIDE, "pressure": {"from": 3e5, "to": 0.0}}], {}),
-    "mixed": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"precision": "mixed"}),
-    "single operator": ("periodic", ROUGH, ZENER, [PRESS, SLIDE], {"precision": "mixed", "tolerance": 1e-3}),
+    "mixed": (
+        "periodic",
+        [ROUGH, SPHERE],
+        {**ZENER, "hardness": 1e6},
+        [RAMP, OBLIQUE, {**SLIDE, "pressure": {"from": 3e5, "to": 0.0}, "cells_per_step": 0.7}],
+        {"precision": "mixed", "tolerance": 1e-3, "integrator": "backward-euler"},
+    ),
 }
 
 
