@@ -50,9 +50,11 @@ def environment() -> dict[str, str]:
     """The environment without the marks that MPI leaves in it, which would confuse another mpirun.
 
     An mpirun whose ranks have ended with an error ends at once, too: it would give each 3 s and again 3 s to do so.
+    A rank that waits for another one gives its core away, as other programs may need it.
     """
     clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    return clean | {"OMPI_MCA_odls_base_sigkill_timeout": "0", "PRTE_MCA_odls_base_sigkill_timeout": "0"}
+    times = {f"{name}_MCA_odls_base_sigkill_timeout": "0" for name in ("OMPI", "PRTE")}
+    return clean | times | {"OMPI_MCA_mpi_yield_when_idle": "1"}
 
 
 def ranks_of(pid: int) -> list[int]:

@@ -1,19 +1,21 @@
 """Whole studies: of a wave in full contact, whose friction has a closed form, and as a user runs them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Main, RunParcontact
+from conftest import Main
 from csv_rows import rows
+from mpi4py import MPI
 
-from parcontact.job import load
+from parcontact.job import Job, load
 from parcontact.job.sections.calculation import Study
 from parcontact.parallel.slab import Slab
-from parcontact.study import outcome, verdict
+from parcontact.study import outcome, study, verdict
 from parcontact.study.extrapolation import Limit
 from parcontact.study.ladders import Ladders, Settings, ladders, overrides
 from parcontact.study.outcome import Outcome
@@ -165,38 +167,60 @@ def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
     assert verdict.sentences(found, reference, 1)[-1].endswith("(the reference itself is known to 1 %)")
 
 
-def test_goes_on_case_by_case(run_parcontact: RunParcontact, main: Main, tmp_path: Path) -> None:
-    """Stopped by the file `stop` the same command goes on with what lacks, on another number of ranks too; where that
-    cannot be removed, a sentence says so."""
-    job = tmp_path / "wave.yaml"
-    job.write_text(WAVE.replace("[32, 64, 128]", "[32, 64]").replace(", backward-euler", ""))
-    code, out, err = main("study", job, "--out", "whole")
-    assert code == 0, err
-    assert "for 5 %: mesh" in out
-    table = rows(tmp_path / "whole" / "study.csv")
-    assert len(table) == 4
-    assert all(float(row["error_mu_end"]) < 0.1 for row in table)
-    for name in ("convergence.png", "work_precision.png", "study.txt"):
-        assert (tmp_path / "whole" / name).stat().st_size > 100
-    stop = tmp_path / "out" / "stop"
+SHORT = WAVE.replace("[32, 64, 128]", "[32, 64]").replace(", backward-euler", "")  # four cases
+
+
+def run_study(path: Path, out: Path, comm: MPI.Intracomm) -> int:
+    def make(changes: Sequence[str]) -> Job:
+        return load(path, [f"output.directory={out}", *changes])
+
+    job = make(())
+    return study.run(job, make, Slab(comm, *job.grid.points), quiet=True)
+
+
+def test_goes_on_case_by_case(main: Main, tmp_path: Path) -> None:
+    """Stopped by the file `stop` the same command goes on with what lacks; where that cannot be removed, a sentence
+    says so."""
+    job, stop = tmp_path / "wave.yaml", tmp_path / "out" / "stop"
+    job.write_text(SHORT)
     stop.mkdir(parents=True)
-    code, out, err = main("study", job)
+    code, _, err = main("study", job)
     assert (code, "stop, which cannot be removed: Is a directory; remove it" in err) == (1, True), err
     stop.rmdir()
     stop.touch()
     code, out, err = main("study", job)
     assert (code, "stopped after 0 of 4 cases" in out, stop.exists()) == (3, True, False), err
-    kept = (tmp_path / "whole" / "study.csv").read_text().splitlines(keepends=True)
-    (tmp_path / "out" / "study.csv").write_text("".join(kept[:3]))
-    again = run_parcontact(["study", job], ranks=2)
-    assert again.returncode == 0, again.stderr
-    assert "4 cases, 2 of them finished before" in again.stdout
-    for ours, theirs in zip(rows(tmp_path / "out" / "study.csv"), table, strict=True):
-        for name in ("mu_max", "mu_end", "area_corrected"):  # of one solve to 1e-7 each
-            assert float(ours[name]) == pytest.approx(float(theirs[name]), rel=1e-5)
+    code, out, err = main("study", job)
+    assert code == 0, err
+    assert "for 5 %: mesh" in out
+    for name in ("convergence.png", "work_precision.png", "study.txt"):
+        assert (tmp_path / "out" / name).stat().st_size > 100
     stop.touch()  # before the first case
     changed = main("study", job, "--set", "material.modulus_inf=3e5")[1]
     assert changed.startswith("4 cases\n")
+
+
+@pytest.mark.mpi(2)
+def test_goes_on_with_other_ranks(comm: MPI.Intracomm, shared_path: Path) -> None:
+    """Cases that one rank has made are kept, as others depend on them in nothing but the limits; the table is that of
+    one rank, to the tolerance of a solve, 1e-7."""
+    path, out = shared_path / "wave.yaml", shared_path / "out"
+    if comm.rank == 0:
+        path.write_text(SHORT)
+        assert run_study(path, out, MPI.COMM_SELF) == 0
+        whole = rows(out / "study.csv")
+        (out / "study.csv").write_text("".join((out / "study.csv").read_text().splitlines(keepends=True)[:3]))
+    comm.Barrier()
+    assert run_study(path, out, comm) == 0
+    if comm.rank:
+        return
+    table = rows(out / "study.csv")
+    assert len(whole) == 4
+    assert all(float(row["error_mu_end"]) < 0.1 for row in whole)
+    assert [row["cpu_seconds"] for row in table[:2]] == [row["cpu_seconds"] for row in whole[:2]]
+    for ours, theirs in zip(table, whole, strict=True):
+        for name in ("mu_max", "mu_end", "area_corrected"):
+            assert float(ours[name]) == pytest.approx(float(theirs[name]), rel=1e-5)
 
 
 @pytest.mark.parametrize(
