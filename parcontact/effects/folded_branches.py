@@ -1,17 +1,120 @@
-"""Folded branches: which of them need no map, from the time scales of a job and the waves of its surface."""
+"""Folded branches: branches of a material that need no map, and the error that this makes.
 
-from collections.abc import Iterable, Iterator
-from typing import Any
+With the notation of `physics.body`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to the
+stress of a step. Two rules save its map:
+
+    memoryless  tau far below the shortest step dt: `decay h` is dropped, and `gain du` stays
+    frozen      tau far above the duration T of the history: h = G u, a part of the spring
+
+Bounds. A wave of displacement u that passes with the frequency w has the modulus M = stress/u. An error |dM| changes
+friction by |dM|/G''(w), relatively, and the contact area, which follows 1/|M|, by |dM|/|M|; both are added. The modulus
+of what does not pass is at least G(T).
+
+    memoryless  |dM| <= decay |h|/u,  |h|/u <= G min(w tau, 1) in sliding, and <= G after a jump. The branch alone
+                has a G'' of half of G min(w tau, 1/(w tau)), and a step has the modulus `gain` at least, so that
+                error = decay (2 max(1, pi tau/dt) + G/gain),  w <= pi/dt, in any material
+    frozen      |dM| = (G/tau) |integral_0^t exp((s - t)/tau) u ds|/u <= G min(1 - exp(-T/tau), n pi/(w tau)), as each
+                of n stages begins with any phase of a wave
+                error = (|dM|(w = 0)/G(T) + the largest |dM|/G'' of 1/T <= w <= pi/dt, if the surface slides)
+
+A slower wave than 1/T does not pass within the history. A frozen branch can be woken at any time: its map is G u.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from .. import job as jobs
-from ..history.chosen import ChosenEnds
-from ..history.timeline import Span, Timeline
-from ..job import Grid
-from ..physics.folding import Band, FoldedBranches, Phase
-from ..physics.prony import Prony
+from ..history.timeline import Timeline
+from ..parallel.slab import Array
+from ..physics.prony import Integrator, Prony, coefficients, complex_modulus, relaxation
 from ..printed import per_cent
+
+PER_DECADE = 4  # accuracy: frequencies at which errors of friction are looked at
+MEMORYLESS_SHARE = 0.5  # tuning: of the error for memoryless branches, which must not depend on how long a job is
+
+
+class TimeScales(NamedTuple):
+    """Time scales of a history: its duration and its shortest step [s], the number of stages that last, whether the
+    load jumps after the start, whether the surface slides, and whether it begins in steady sliding."""
+
+    duration: float
+    shortest: float
+    stages: int = 1
+    jumps: bool = False
+    slides: bool = True
+    steady: bool = False
+
+
+def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
+    """Return the time scales of a history, which begins in steady sliding or in a virgin body."""
+    lasting = [span for span in timeline.spans if span.count]
+    jumps = any(span.jumps and (span.before or steady) for span in timeline.spans)
+    shortest = min((span.extremes[0] for span in lasting), default=0.0)
+    duration = sum(span.ends.elapsed(span.count) for span in lasting)
+    return TimeScales(duration, shortest, len(lasting), jumps, timeline.moves, steady)
+
+
+@dataclass(frozen=True)
+class FoldedBranches:
+    """The role of each branch, by its number in the material; plain data.
+
+    `bound` is the largest relative error of friction (where the body rests: of the modulus) that all folded branches
+    make together, at most `allowed`. `memoryless_errors` are what each branch would add to it without memory. `reason`
+    says why nothing may be folded, if so.
+    """
+
+    kept: tuple[int, ...]
+    memoryless: tuple[int, ...] = ()
+    frozen: tuple[int, ...] = ()
+    bound: float = 0.0
+    allowed: float = 0.0
+    memoryless_errors: tuple[float, ...] = ()
+    reason: str = ""
+
+    @property
+    def folded(self) -> int:
+        """The number of branches without a map."""
+        return len(self.memoryless) + len(self.frozen)
+
+
+def fold_branches(
+    prony: Prony, scales: TimeScales, integrator: Integrator, allowed: float, reason: str = ""
+) -> FoldedBranches:
+    """Return the branches of a material (Pa, s, in normal form) that need a map: all if there is a `reason`, else as
+    few as keep the sum of the errors of the others, of the fastest and of the slowest, at `allowed` or below."""
+    without_memory, as_spring = memoryless_errors(prony, scales, integrator), frozen_errors(prony, scales)
+    fast = (np.cumsum(without_memory) <= MEMORYLESS_SHARE * allowed) & (not reason)
+    left = allowed - float(without_memory[fast].sum())
+    slow = (np.cumsum(as_spring[::-1])[::-1] <= left) & ~fast & (not reason)
+    kept, memoryless, frozen = (tuple(np.flatnonzero(some).tolist()) for some in (~(fast | slow), fast, slow))
+    bound = float(without_memory[fast].sum() + as_spring[slow].sum())
+    return FoldedBranches(kept, memoryless, frozen, bound, allowed, tuple(without_memory.tolist()), reason)
+
+
+def memoryless_errors(prony: Prony, scales: TimeScales, integrator: Integrator) -> Array:
+    """Return the relative error of each branch without memory; infinite where a jump reads what it remembers."""
+    if scales.jumps or not scales.shortest:
+        return np.full_like(prony.moduli, np.inf)
+    decay, gain = coefficients(prony, integrator, scales.shortest)
+    waves = np.maximum(1.0, np.pi * prony.relaxation_times / scales.shortest)
+    return np.asarray(decay * (2.0 * waves + prony.moduli / gain))
+
+
+def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
+    """Return the relative error of each branch as a spring; infinite after steady sliding, where h is not G u."""
+    if scales.steady:
+        return np.full_like(prony.moduli, np.inf)
+    relaxed = prony.moduli * -np.expm1(-scales.duration / prony.relaxation_times)
+    with np.errstate(divide="ignore"):  # of a fluid long at rest no modulus is left
+        errors = relaxed / relaxation(scales.duration, *prony)
+    if scales.slides:
+        periods = np.pi * scales.duration / scales.shortest  # of the fastest wave, in radians
+        omega = np.geomspace(1.0, periods, 1 + math.ceil(PER_DECADE * math.log10(periods)))[:, None] / scales.duration
+        passed = np.minimum(relaxed, prony.moduli * (scales.stages * np.pi / (omega * prony.relaxation_times)))
+        errors = errors + np.max(passed / complex_modulus(omega[:, 0], *prony).imag[:, None], axis=0)
+    return np.asarray(errors)
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
@@ -29,48 +132,3 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
         f"Error of friction by this, at rest of the modulus: at most {per_cent(found.bound)} "
         f"(numerics.branch_error allows {per_cent(found.allowed)})"
     ]
-
-
-def phases(timeline: Timeline) -> Iterator[Phase]:
-    """The stages of a history as phases of one velocity."""
-    for span in timeline.spans:
-        first, last = _first_and_last(span)
-        duration = span.ends.elapsed(span.count) if span.count else 0.0
-        yield Phase(duration, first, last, span.stage.velocity, span.jumps)
-
-
-def _first_and_last(span: Span) -> tuple[float, float]:
-    """The first and the last step of a stage [s]; those that it chooses lie between the shortest and the longest."""
-    if isinstance(span.ends, ChosenEnds):
-        return span.ends.limits.least, span.ends.limits.most
-    first, last = (span.ends.interval(n) if n else 0.0 for n in (min(1, span.count), span.count))
-    return first, last
-
-
-def bands(grid: Grid, surface: Iterable[Any]) -> Iterator[Band]:
-    """The waves of a surface of these shapes. Round shapes and files may have every wave from the box to two cells."""
-    only = _direction_of_all_waves(grid)
-    longest = 2 * np.pi / max(grid.size)
-    finest = max(np.pi / min((cell for cell, n in _cells_and_points(grid) if n > 1), default=np.inf), longest)
-    for shape in surface:
-        if isinstance(shape, jobs.Wave) and any(shape.waves):
-            kx, ky = (2 * np.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True))
-            yield Band(float(np.hypot(kx, ky)), float(np.hypot(kx, ky)), finest, (kx, ky))
-        elif isinstance(shape, jobs.Rough):
-            low, high = (2 * np.pi / length for length in (shape.long_wavelength, shape.short_wavelength))
-            yield Band(max(low, longest), high, finest, only)
-        elif isinstance(shape, jobs.Cylinder):
-            yield Band(longest, finest, finest, (1.0, 0.0) if shape.axis == "y" else (0.0, 1.0))
-        elif isinstance(shape, jobs.Sphere | jobs.OnOneMesh | jobs.Topography | jobs.RoughSpectrum):
-            yield Band(longest, finest, finest, only)
-
-
-def _cells_and_points(grid: Grid) -> Iterator[tuple[float, int]]:
-    return zip((grid.dx, grid.dy), grid.points, strict=True)
-
-
-def _direction_of_all_waves(grid: Grid) -> tuple[float, float] | None:
-    """The direction of all waves on a grid of one line of points; None on a true one."""
-    if grid.nx == 1:
-        return 0.0, 1.0
-    return (1.0, 0.0) if grid.ny == 1 else None

@@ -28,7 +28,6 @@ from ..physics.heat_memory import Heating, HeatMemory
 from ..physics.prony import Prony
 from ..physics.units import Units
 from .effect import Decision, Effect, Instant
-from .folded_branches import phases
 from .relaxation import factor_at, feeds_back, temperature_of
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: of the memory of heat: a share of the job's accuracy, this at most
@@ -100,10 +99,10 @@ def exponentials_of(job: Any) -> Exponentials:
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
-    for phase in phases(Timeline.of(job)):
-        slides = slides or any(phase.velocity)
-        if slides and phase.duration:
-            steps += [phase.first, phase.last]
+    for span in Timeline.of(job).spans:
+        slides = slides or span.moves
+        if slides and span.count:
+            steps += span.extremes
     return fit(min(step for step in steps if step > 0.0), longest, min(LOOSEST, SHARE * job.numerics.asked.strictest))
 
 

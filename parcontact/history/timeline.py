@@ -76,6 +76,13 @@ class Span:
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
         return free and not any(self.stage.velocity) and self.stage.load.constant
 
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The first and the last step that lasts [s]; of steps that a stage chooses, the shortest and the longest."""
+        if isinstance(self.ends, ChosenEnds):
+            return self.ends.limits.least, self.ends.limits.most
+        return self.ends.interval(1), self.ends.interval(self.count)
+
     def time(self, index: int) -> float:
         """Return when the step `index` of those that last ends [s]."""
         return self.start + self.ends.elapsed(index)

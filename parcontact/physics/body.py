@@ -16,7 +16,7 @@ Eq. 9).
 A body is what has `begin` and `commit`. What it remembers from one step to the next is a `BodyMemory`, which these take
 and return: a step that is dropped leaves the memory from which it began.
 
-Two kinds of branches have no map (`physics.folding` says which and what it costs): of a memoryless one
+Two kinds of branches have no map (`effects.folded_branches` says which and what it costs): of a memoryless one
 `gain (u_new - u)` is all there is, its decay being 0 to the error allowed; a frozen one is the spring `h_k = G_k u`.
 """
 

@@ -4,7 +4,7 @@
 off allocates nothing, calls nothing and writes nothing.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,14 +12,13 @@ import numpy as np
 
 from ..effects.adhesion import law_of
 from ..effects.effect import Decision, Effect
-from ..effects.folded_branches import bands, phases
+from ..effects.folded_branches import FoldedBranches, fold_branches, time_scales
 from ..effects.interface import interface_of
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..physics.adhesion import AdhesionLaw
-from ..physics.folding import FoldedBranches, fold_branches, keep_all
 from ..physics.interface import InterfaceFriction
 from ..physics.prony import Prony
 from ..printed import per_cent
@@ -86,15 +85,13 @@ class Choices:
 
     @cached_property
     def folded(self) -> FoldedBranches:
-        """The branches of the material that need a map, and those that do not (`physics.folding`)."""
-        if self.prony.moduli.size == 0 or feeds_back(self.job):
-            return keep_all(self.prony, "heat changes them" if self.prony.moduli.size else "the body has no branch")
+        """The branches of the material that need a map, and those that do not (`effects.folded_branches`)."""
         reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
-        passing = list(phases(Timeline.of(self.job, self.until))), list(bands(self.grid, self.job.surface))
-        start = self.job.initial.velocity if self.steady_start.on else None
-        allowed = 0.0 if reason else self.numerics.branch_error
-        return replace(fold_branches(self.prony, *passing, self.numerics.integrator, allowed, start), reason=reason)
+        reason = "heat changes them" if feeds_back(self.job) else reason
+        reason = reason if self.prony.moduli.size else "the body has no branch"
+        scales = time_scales(Timeline.of(self.job, self.until), self.steady_start.on)
+        return fold_branches(self.prony, scales, self.numerics.integrator, self.numerics.branch_error, reason)
 
     @decided("viscoelasticity")
     def viscoelasticity(self) -> Verdict:

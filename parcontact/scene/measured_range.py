@@ -2,12 +2,10 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ..effects.folded_branches import bands, phases
 from ..effects.relaxation import time_factor_of
-from ..history.timeline import Timeline
-from ..job import Job, Zener
+from ..job import Flat, Grid, Job, Rough, Wave, Zener
 
 NEAR = 0.5  # accuracy: decades beyond the measured band that pass, as a surface has little of its last waves
 
@@ -29,13 +27,33 @@ class ExcitedBand(NamedTuple):
 def excited_band(job: Job) -> tuple[float, float] | None:
     """Return the frequencies [Hz] with which the waves of a job's surface pass a point of the body, over all stages and
     steady velocities; None for a surface that stands."""
-    velocities = [*(phase.velocity for phase in phases(Timeline.of(job))), job.initial.velocity]
+    velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
     speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
-    moving, waves = [speed for speed in speeds if speed > 0.0], list(bands(job.grid, job.surface))
+    moving, waves = (
+        [speed for speed in speeds if speed > 0.0],
+        [number for shape in job.surface for number in wave_numbers(shape, job.grid)],
+    )
     if not moving or not waves:
         return None
-    low, high = min(band.low for band in waves), max(band.high for band in waves)
+    low, high = min(waves), max(waves)
     return min(moving) * low / (2 * math.pi), max(moving) * high / (2 * math.pi)
+
+
+def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
+    """Return the wave numbers of a shape's waves [rad/m], or the lowest and the highest one; none of a flat surface.
+
+    Round shapes and files may have every wave from the box to two cells.
+    """
+    longest = 2.0 * math.pi / max(grid.size)
+    cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
+    if isinstance(shape, Flat):
+        return ()
+    if isinstance(shape, Wave):
+        waves = [2.0 * math.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True)]
+        return (math.hypot(*waves),) if any(waves) else ()
+    if isinstance(shape, Rough):
+        return max(2.0 * math.pi / shape.long_wavelength, longest), 2.0 * math.pi / shape.short_wavelength
+    return longest, max(math.pi / min(cells, default=math.inf), longest)
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:

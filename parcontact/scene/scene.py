@@ -12,14 +12,13 @@ import numpy as np
 
 from ..effects import contact_law
 from ..effects.effect import Effect, values_of
-from ..effects.folded_branches import describe_folded_branches
+from ..effects.folded_branches import FoldedBranches, describe_folded_branches
 from ..history.chosen import describe_steps
 from ..job import Grid, Job
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.body import Body, ElasticBody, ZenerBody
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
-from ..physics.folding import FoldedBranches
 from ..physics.halfspace import HalfSpace
 from ..physics.layer import Layer
 from ..physics.motion import PARTS, AlongX, AnyFraction, Motion, Vector

@@ -9,11 +9,11 @@ import pytest
 
 import parcontact as pc
 from parcontact.errors import InputError
-from parcontact.job import Job
+from parcontact.job import Flat, Job, Rough, Sphere, Wave
 from parcontact.rubber import compound, sane, tables
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, given
-from parcontact.scene.measured_range import describe_beyond
+from parcontact.scene.measured_range import describe_beyond, wave_numbers
 
 from . import measured
 
@@ -208,6 +208,16 @@ def test_a_job_beyond_the_measured_frequencies() -> None:
     assert "decades above" in cold
     (slow,) = describe_beyond(rubber(1e-5))
     assert "1.4 decades below" in slow
+
+
+def test_wave_numbers_of_shapes() -> None:
+    """Waves have their own; roughness its shortest and longest; round shapes and files those of box and cells."""
+    grid = rubber(0.1).grid
+    rough = Rough(hurst=0.8, long_wavelength=2e-4, short_wavelength=1e-4, rms_slope=0.1)
+    assert wave_numbers(rough, grid) == pytest.approx((2 * np.pi / 2e-4, 2 * np.pi / 1e-4))
+    assert wave_numbers(Sphere(radius=1e-2), grid) == pytest.approx((2 * np.pi / 1e-3, np.pi / (1e-3 / 32)))
+    assert wave_numbers(Wave(amplitude=1e-6, waves=(3, -4)), grid) == pytest.approx((5 * 2 * np.pi / 1e-3,))
+    assert wave_numbers(Flat(), grid) == ()
 
 
 def test_a_job_says_its_temperature() -> None:
