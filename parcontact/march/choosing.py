@@ -14,8 +14,7 @@ their length.
 While the surface slides, steps end at multiples of their length, counted in cells from where the surface was at first
 (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump,
 parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a transform. Halves,
-thirds and quarters start from the pressure of a whole cell ago; where such starts are no better than others, there are
-steps of two fifths, too (`starts`).
+thirds and quarters start from the pressure of a whole cell ago (`starts`).
 """
 
 import math
@@ -34,7 +33,6 @@ REJECTED = 1.19  # accuracy: times the error allowed; that of a slide varies fro
 MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: of a step over the one before it, or over one rejected
 LEVELS = 2  # tuning: the power of two of the number of lengths, of steps below a quarter of a cell, per factor of two
 REST_LEVELS = 4  # tuning: the same at rest
-BETWEEN = 2.5  # tuning: steps per cell, of those that start no better at whole cells
 LEAST_WAY = 0.35  # tuning: of a step that ends at a multiple of its length
 STRETCH = 1.1  # tuning: of the last step of a stage: no step shorter than a tenth of the one before is left over
 SNAP_SHARE = 1.0 / 64.0  # accuracy: of the longest step of a stage: in a shorter one the edge of contact may snap
@@ -42,14 +40,12 @@ RELAXING = 0.1  # tuning: of the shortest relaxation time: the first step at res
 SAME_LEVEL = 1e-6  # rounding: of a level
 
 
-def cells_per_step(most: float, whole_soon: bool = True) -> float:
-    """Return the longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of one;
-    two fifths, too, where it need not be at whole cells soon."""
+def cells_per_step(most: float) -> float:
+    """Return the longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of
+    one."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
     count = (1.0 - SAME_LEVEL) / most
-    if not whole_soon and 2.0 < count <= BETWEEN:
-        return 1.0 / BETWEEN
     unit = max(1, 2 ** (math.floor(math.log2(count)) - LEVELS))
     return 1.0 / (math.ceil(count / unit) * unit)
 
@@ -58,21 +54,16 @@ def cells_per_step(most: float, whole_soon: bool = True) -> float:
 class StepChooser:
     """Proposes the next step of a stage that chooses its own, and judges it when it has been tried.
 
-    `chosen` are the steps made so far; `at_whole_cells` says whether pressures of whole cells ago are good starts.
+    `chosen` are the steps made so far.
     """
 
     scene: Scene
     chosen: ChosenSteps
-    at_whole_cells: bool
 
-    def propose(self, span: Span, number: int, is_relaxed: bool) -> Step:
-        """Return the next step of a stage; it has this number. Where the body is relaxed, it ends the stage."""
-        wanted = self.chosen.next
-        if is_relaxed:
-            wanted = self._bounds(span).most
-        elif number == span.before + span.jumps + 1:
-            wanted = self._first(span)
-        return self._step(span, number, wanted)
+    def propose(self, span: Span, number: int) -> Step:
+        """Return the next step of a stage; it has this number."""
+        first = number == span.before + span.jumps + 1
+        return self._step(span, number, self._first(span) if first else self.chosen.next)
 
     def judge(
         self, span: Span, step: Step, end: float, rejected: bool, error: float, front: float = 0.0
@@ -121,7 +112,7 @@ class StepChooser:
             return min(max(dt, limits.least), limits.most)
         if span.stage.speed:
             cell = one_cell(span.stage, self.scene.choices.grid)
-            return min(cell * cells_per_step(dt / cell, self.at_whole_cells), limits.most)
+            return min(cell * cells_per_step(dt / cell), limits.most)
         power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
         return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
 

@@ -1,12 +1,8 @@
-"""The error budget of a step: what the step shows, with what is known of the run.
-
-What the embedded pair shows, and by how much the two views of friction differ, changes slowly while steps are alike:
-then each is looked at in every few of them only.
-"""
+"""The error budget of a step: what the step shows, with what is known of the run."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +12,6 @@ from ..job import Cylinder, Flat, Rough, Wave
 from ..physics.body import BodyMemory, Trial, surface_of
 from ..physics.budget import ErrorBudget, estimate
 from ..physics.embedded import EmbeddedPair, IntegratorDifference
-from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.slopes import friction_by_energy
@@ -26,67 +21,20 @@ from ..solve.constraint import Mask
 from ..solve.contact import Contact
 from .sticking import StuckContact
 
-PAIR, VIEWS, FRICTION = "budget/look", "budget/views", "budget/friction"  # in a checkpoint
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are all alike
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
-ALIKE_STEPS = 4  # tuning: of one stage and one length, to which one look at the embedded pair applies at most
-ALIKE_VIEWS = 5  # tuning: the same of the two views of friction; odd, as steps may be quarters of a cell
-
-
-@dataclass(frozen=True)
-class LastObservation:
-    """Memory of what a step of this stage and length [s] has shown; it stands for so many steps `so_far`."""
-
-    stage: float = -1.0
-    dt: float = 0.0
-    so_far: float = 0.0
-    observed: tuple[float, ...] = ()
-
-    def once_more(self, step: Step, most: int) -> "LastObservation | None":
-        """Return it with one more step for which it stands, of so many at most; None if it does not apply to one."""
-        applies = (self.stage, self.dt) == (step.stage, step.dt) and self.so_far < most
-        return replace(self, so_far=self.so_far + 1.0) if applies else None
-
-    @classmethod
-    def of(cls, step: Step, *observed: float) -> "LastObservation":
-        return cls(float(step.stage), step.dt, 1.0, observed)
-
-
-@dataclass(frozen=True)
-class Observations:
-    """Memory of the last looks at the embedded pair and at the two views of friction, and of the friction of the body
-    in the last step, infinite where that is not known or was a jump."""
-
-    pair: LastObservation = LastObservation()
-    views: LastObservation = LastObservation()
-    friction: float = math.inf
-
-    def entries(self) -> dict[str, Entry]:
-        """Return the entries of both; a checkpoint may lack them."""
-        looks = {PAIR: self.pair, VIEWS: self.views}
-        numbers = {name: [look.stage, look.dt, look.so_far, *look.observed] for name, look in looks.items()}
-        found = {name: Entry(np.array(each), optional=True) for name, each in numbers.items()}
-        return found | {FRICTION: Entry(self.friction, optional=True)}
-
-    @classmethod
-    def restored(cls, saved: Saved) -> "Observations":
-        """Return the looks of a checkpoint; one that it does not have is followed by a new one."""
-        looks = []
-        for name in (PAIR, VIEWS):
-            stage, dt, so_far, *observed = saved[name].tolist() if name in saved else (-1.0, 0.0, 0.0)
-            looks.append(LastObservation(stage, dt, so_far, tuple(observed)))
-        return cls(looks[0], looks[1], float(saved.get(FRICTION, math.inf)))
 
 
 @dataclass(frozen=True)
 class Estimate:
     """Errors of a step: its budget, None where nothing touches, and the error of its length alone, by which steps
-    that are chosen are judged; with the looks after it. `lasting` is the budget without the error of a rise of
-    friction, which passes: the tolerance of the next solves does not follow it."""
+    that are chosen are judged; with the friction of the body, from which a change in the next step is known, infinite
+    after a jump. `lasting` is the budget without the error of a rise of friction, which passes: the tolerance of the
+    next solves does not follow it."""
 
     budget: ErrorBudget | None
     step: float
-    observations: Observations
+    friction: float
     lasting: ErrorBudget | None
 
 
@@ -95,9 +43,7 @@ class Solved:
     """A step that has been solved: its contact, a map that is not 0 where the surfaces touch, what it measures and the
     memory of the body after it.
 
-    `remark` says what was unusual about it; `moved_start` whether its start was a pressure of whole cells ago, None
-    where there was no choice; `stuck` is what a contact with adhesion has besides; `rounding` tells whether the solve
-    needed double precision (`march.rounding`).
+    `remark` says what was unusual about it; `stuck` is what a contact with adhesion has besides.
     """
 
     step: Step
@@ -107,24 +53,22 @@ class Solved:
     measures: Measures
     body: BodyMemory
     remark: str = ""
-    moved_start: bool | None = None
     stuck: StuckContact | None = None
-    rounding: float = 0.0
 
 
-def estimate_errors(scene: Scene, observations: Observations, solved: Solved) -> Estimate:
-    """Return how wrong a step is; collective."""
+def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
+    """Return how wrong a step is, with the `friction` of the body in the step before, infinite where that is not known
+    or was a jump; collective."""
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
     points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
     prony = None if branches is None else branches.prony
     run = properties_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
-    pair, integrators = _compare_integrators(scene, observations.pair, solved)
-    views, apart = _compare_views(scene, observations.views, solved)
+    integrators, apart = _compare_integrators(scene, solved), _compare_views(scene, solved)
     own = measures.friction - measures.friction_interface
-    change, observations = own - observations.friction, Observations(pair, views, math.inf if step.jump else own)
+    change, own = own - friction, math.inf if step.jump else own
     if measures.contact_area == 0.0:
         still = StepObservation(0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0)
-        return Estimate(None, time_error(run, still, points), observations, None)
+        return Estimate(None, time_error(run, still, points), own, None)
     observed = StepObservation(
         complementarity=certificate.complementarity,
         difference=integrators.difference,
@@ -145,7 +89,7 @@ def estimate_errors(scene: Scene, observations: Observations, solved: Solved) ->
     lasting = estimate(run, observed, points, time)
     uneven = min(1.0, measures.max_pressure / measures.pressure - 1.0) if measures.pressure > 0.0 else 1.0
     budget = _with_rise(lasting, error_of_rise(run, observed, points, change, uneven))
-    return Estimate(budget, time, observations, lasting)
+    return Estimate(budget, time, own, lasting)
 
 
 def _with_rise(budget: ErrorBudget, rise: float) -> ErrorBudget:
@@ -162,45 +106,35 @@ def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> fl
     return math.hypot(step.velocity[0] / dx, step.velocity[1] / dy) * step.dt
 
 
-def _compare_integrators(
-    scene: Scene, last: LastObservation, solved: Solved
-) -> tuple[LastObservation, IntegratorDifference]:
-    """Return what the pair shows of a step, or of the one like it that was looked at last; collective."""
+def _compare_integrators(scene: Scene, solved: Solved) -> IntegratorDifference:
+    """Return what the embedded pair shows of a step; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
     branches = scene.material.branched
     if branches is None:
-        return last, NO_DIFFERENCE
+        return NO_DIFFERENCE
     pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if measures.contact_area == 0.0:
-        free = pair.compare_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
-        return LastObservation(), free
-    now = last.once_more(step, ALIKE_STEPS)
-    if now is None:
-        load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
-        pressure = contact.p
-        if solved.touching is not pressure:  # tension counts as pressure does
-            pressure = np.abs(contact.p) if solved.stuck else np.where(solved.touching, contact.p, 0.0)
-            load = scene.slab.sum(float(pressure.sum()))[0]
-        found = pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
-        now = LastObservation.of(step, *astuple(found))
-    return now, IntegratorDifference(*now.observed)
+        return pair.compare_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
+    load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
+    pressure = contact.p
+    if solved.touching is not pressure:  # tension counts as pressure does
+        pressure = np.abs(contact.p) if solved.stuck else np.where(solved.touching, contact.p, 0.0)
+        load = scene.slab.sum(float(pressure.sum()))[0]
+    return pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
 
 
-def _compare_views(scene: Scene, last: LastObservation, solved: Solved) -> tuple[LastObservation, float]:
+def _compare_views(scene: Scene, solved: Solved) -> float:
     """Return by how much friction by the slopes of the rigid surface and of the body differ; collective.
 
     Of an elastic body the latter is 0.
     """
     step, measures, grid = solved.step, solved.measures, scene.choices.grid
     if scene.material.branched is None or measures.friction == 0.0:
-        return last, max(measures.friction - measures.friction_interface, 0.0)
-    now = last.once_more(step, ALIKE_VIEWS)
-    if now is None:
-        direction, own = _viscous(step.velocity, measures)
-        maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.boundary == "periodic"
-        other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
-        now = LastObservation.of(step, abs(other * scene.units.height - own))
-    return now, now.observed[0]
+        return max(measures.friction - measures.friction_interface, 0.0)
+    direction, own = _viscous(step.velocity, measures)
+    maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.boundary == "periodic"
+    other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
+    return abs(other * scene.units.height - own)
 
 
 def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> RunProperties:

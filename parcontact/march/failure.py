@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from ..errors import RunError
 from ..history.timeline import Step
@@ -22,7 +21,12 @@ MANY_CELLS = 1.5  # tuning: by which a surface moves in a long step
 
 
 class StepError(RunError):
-    """A step that could not be made; the run is as it was before it."""
+    """A step that could not be made; the run is as it was before it. `beyond_precision` says whether its tolerance asks
+    for more digits than numbers of its precision have."""
+
+    def __init__(self, text: str, beyond_precision: bool = False) -> None:
+        super().__init__(text)
+        self.beyond_precision = beyond_precision
 
 
 class DetachedError(Exception):
@@ -58,21 +62,20 @@ def of_solve(
     `moved` is by how many cells the surface went in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
-    changes = ", or ".join(_changes(scene, step, failed, last, h, moved)) or FINITE
-    return StepError(f"{where(scene, step)}: the contact solve {failed.failure}{also}; {changes}")
-
-
-def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array, moved: float) -> Iterator[str]:
-    """Yield what may help, the likeliest first; collective up to its end."""
-    numerics = scene.choices.numerics
+    numerics, what = scene.choices.numerics, f"{where(scene, step)}: the contact solve {failed.failure}{also}"
     if not np.isfinite(last.certificate.worst):
-        yield FINITE
-        return
-    reach = reach_of(scene, last, h, last.u.dtype)
+        return StepError(f"{what}; {FINITE}")
+    reach = _reach(scene, last, h)
     if numerics.tolerance < reach:
         change = "try a larger numerics.tolerance" if reach <= USEFUL else FINITE
-        yield f"{numerics.precision} precision reaches only about {reach:.1g} here: {change}"
-        return
+        text = f"{what}; {numerics.precision} precision reaches only about {reach:.1g} here: {change}"
+        return StepError(text, beyond_precision=True)
+    return StepError(f"{what}; {', or '.join(_changes(scene, step, failed, last, moved)) or FINITE}")
+
+
+def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: float) -> Iterator[str]:
+    """Yield what may help, the likeliest first."""
+    numerics = scene.choices.numerics
     if "max_iterations" in failed.failure:
         yield f"try numerics.max_iterations above {numerics.max_iterations}"
     if moved > MANY_CELLS:
@@ -83,15 +86,15 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, h: Array,
         yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
 
 
-def reach_of(scene: Scene, last: Contact, h: Array, dtype: DTypeLike) -> float:
-    """Return the certificate that the rounding of heights, displacements and pressures of a type allows; collective.
+def _reach(scene: Scene, last: Contact, h: Array) -> float:
+    """Return the certificate that the rounding of heights, displacements and pressures allows; collective.
 
     A pressure p that is wrong in its last digit moves the body by that digit of `p (1 - nu) L/(2 pi)` in a wave as long
     as the box: a load far beyond full contact has no digits left for what differs from its mean.
     """
     sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
     sizes[2] *= scene.setup.half_space.largest_compliance
-    return ROUNDINGS * float(np.finfo(dtype).eps) * max(sizes) / last.certificate.length
+    return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / last.certificate.length
 
 
 def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> None:

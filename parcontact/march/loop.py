@@ -12,8 +12,8 @@ from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
+from .choosing import StepChooser
 from .failure import DetachedError, nothing_holds
-from .rest import next_step
 from .state import State, entries, first_state, restored, save
 from .step import make_step
 from .sticking import NEVER
@@ -111,6 +111,25 @@ class March:
         scene, state = self.scene, self.state
         image, apply = scene.solver.workspace.displacement, scene.operators.operator.apply
         return scene.material.displacement(state.body, lambda: apply(state.pressure, image), state.alpha)
+
+
+def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step:
+    """Return the step after the last one made.
+
+    At rest under a constant load nothing changes in a body without memory, where one step takes the place of all others
+    of a stage whose time steps grow. It does not pass a step after which fields are due, nor the step number `stop`.
+    What is decided follows from the state, and so is the same after a restart.
+    """
+    number = state.row.step + 1
+    span = timeline.span(number)
+    if state.chosen is not None and span.stage.chooses and span.place(number) > 0:
+        return StepChooser(scene, state.chosen).propose(span, number)
+    if scene.material.branched is not None or not span.rests or span.place(number) < 1:
+        return span.step(number)
+    output = scene.choices.output
+    due = [-(-number // output.every) * output.every] if output.fields else []
+    target = min([span.last, *due, *([stop] if stop >= number else [])])
+    return span.leap(number, target) if target > number else span.step(number)
 
 
 Task = Callable[[March], bool | None]

@@ -6,29 +6,18 @@ sliding, and a solve needs no iteration. With steps of a whole cell that is the 
 before it; with halves the one before it, with thirds and quarters those before that, which are kept in slides that
 choose their own steps.
 
-Where the body still changes, as long after a jump of velocity, the last two pressures, extrapolated in the body's
-frame, are the better start with parts of a cell: the edges of contact are then off by less than the changes of a whole
-cell. Which of the two takes fewer iterations is seen from the last solves with each.
+Where no such pressure is known, the last two are extrapolated in the body's frame.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import NamedTuple
-
-import numpy as np
 
 from ..history.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
-from ..physics.entries import Entry, Saved
 from ..physics.motion import are_whole, cells_between
 from ..scene import Scene
-
-NAME = "contact/iterations of starts"  # in a checkpoint
-TRY_AGAIN = 16  # tuning: steps after which the kind of start that was worse may have become the better one
-FORGET = 128  # tuning: steps without a choice after which nothing is known any more
-LEAST_MOVED, LEAST_EXTRAPOLATED = 0.0, 1.0  # tuning: iterations that a solve takes with each, if nothing is known
 
 
 class Past(NamedTuple):
@@ -40,69 +29,20 @@ class Past(NamedTuple):
     position: tuple[float, float] = (0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class StartStatistics:
-    """Memory of how many iterations solves took with either kind of start, in the mean of the last ones, and of how
-    many steps ago the better kind was last in doubt."""
-
-    moved: float = LEAST_MOVED
-    extrapolated: float = LEAST_EXTRAPOLATED
-    since: float = 0.0
-
-    @property
-    def prefers_moved(self) -> bool:
-        """Whether a pressure of whole cells ago took fewer iterations than the last two, or next to none."""
-        return self.moved <= LEAST_EXTRAPOLATED or self.moved < self.extrapolated
-
-    @property
-    def moves(self) -> bool:
-        """Whether the next start is a pressure of whole cells ago: the better kind, or now and then the other one."""
-        if self.since < TRY_AGAIN or self.moved <= LEAST_EXTRAPOLATED:
-            return self.prefers_moved
-        return not self.prefers_moved
-
-    def after(self, choice: bool | None, iterations: int) -> "StartStatistics":
-        """Return the statistics after a solve. `choice` says whether its start was a moved pressure, None where there
-        was no choice."""
-        since = self.since + 1.0
-        if choice is None:
-            return StartStatistics(since=since) if since >= FORGET else replace(self, since=since)
-        if choice:
-            found = replace(self, moved=0.5 * (self.moved + iterations), since=since)
-        else:
-            mean = max(0.5 * (self.extrapolated + iterations), LEAST_EXTRAPOLATED)
-            found = replace(self, extrapolated=mean, since=since)
-        changes = choice != self.prefers_moved or found.prefers_moved != self.prefers_moved
-        return replace(found, since=0.0) if changes else found
-
-    def entries(self) -> dict[str, Entry]:
-        """Return its entry; a checkpoint may lack it."""
-        return {NAME: Entry(np.array([self.moved, self.extrapolated, self.since]), optional=True)}
-
-    @classmethod
-    def restored(cls, saved: Saved) -> "StartStatistics":
-        """Return the statistics of a checkpoint; with one that has none all is to be learnt again."""
-        return cls(*saved[NAME].tolist()) if NAME in saved else cls()
-
-
-def make_start(
-    scene: Scene, pasts: Sequence[Past], statistics: StartStatistics, step: Step, alpha: float, out: Array
-) -> bool | None:
+def make_start(scene: Scene, pasts: Sequence[Past], step: Step, alpha: float, out: Array) -> None:
     """Put the start of a step, a map of p for the modulus `alpha`, into `out`.
 
-    `pasts` are the last pressures, the newest first. Returns whether it is a moved pressure, None without a choice.
+    `pasts` are the last pressures, the newest first.
     """
     if len(pasts) == 1:
         out[...] = pasts[0].pressure
-        return None
+        return
     now, before = pasts[:2]
     growth = step.growth if before.alpha > 0.0 else 0.0
     past = _whole_cells_ago(scene, pasts, step) if growth > 0.0 else None
-    moves = past is not None and statistics.moves
-    if past is not None and moves:
+    if past is not None:
         now, growth = past, 0.0
     _travel(scene, step, now, before, growth, alpha, out)
-    return moves if past is not None and scene.choices.further_starts.on else None
 
 
 def cells_moved(scene: Scene, step: Step, since: tuple[float, float]) -> tuple[float, float]:

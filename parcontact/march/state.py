@@ -22,13 +22,13 @@ from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
-from . import rounding, sticking
-from .errors import Observations
-from .starts import Past, StartStatistics
+from . import sticking
+from .starts import Past
 from .sticking import StickingMemory
 from .tolerance import StepTolerance, follows
 
 FURTHER = 2  # tuning: pressures before the earlier one that are kept for starts, of three and of four steps ago
+FRICTION = "budget/friction"  # in a checkpoint
 MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these
 
 
@@ -37,12 +37,11 @@ class State:
     """A run after a step. `make_step` returns another one and leaves this one as it was.
 
     `row` is what the step is recorded as. `pasts` are the last pressures, the newest first: a history of single solves
-    keeps one, others two or more. `approach` is the d of the body, `body` and `energy` are their memories; `starts` and
-    `looks` are what was learnt of starts and of the embedded pair, `errors` the sums of the error budget, `chosen` the
-    record of the steps that stages have chosen, which grows; `sticking` is the memory of a contact with adhesion,
-    `tolerance` that of the tolerance of solves, `rounding` that of solves that need double precision. The next pressure
-    will be in the map `spare`. Effects that follow the steps keep what they remember themselves, as they are told only
-    of steps that were made.
+    keeps one, others two or more. `approach` is the d of the body, `body` and `energy` are their memories; `friction`
+    is that of the body in the last step, infinite where that was a jump, `errors` the sums of the error budget,
+    `chosen` the record of the steps that stages have chosen, which grows; `sticking` is the memory of a contact with
+    adhesion, `tolerance` that of the tolerance of solves. The next pressure will be in the map `spare`. Effects that
+    follow the steps keep what they remember themselves, as they are told only of steps that were made.
 
     Two states share most maps, and the oldest ones of a state are spare in the next: a state can be used until a step
     begins from the one after it. Maps are in the run's units.
@@ -54,13 +53,11 @@ class State:
     body: BodyMemory
     energy: EnergyMemory | None
     approach: float = 0.0
-    starts: StartStatistics = field(default_factory=StartStatistics)
-    observations: Observations = field(default_factory=Observations)
+    friction: float = math.inf
     errors: ErrorSums = field(default_factory=ErrorSums)
     chosen: ChosenSteps | None = None
     sticking: StickingMemory | None = None
     tolerance: StepTolerance = field(default_factory=StepTolerance)
-    rounding: float = 0.0
 
     @staticmethod
     def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
@@ -111,8 +108,8 @@ def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approac
     for past in state.pasts[:2]:
         past.pressure[...] = pressure
     pasts = (*(past._replace(alpha=1.0) for past in state.pasts[:2]), *state.pasts[2:])
-    seen = Observations(friction=row.measures.friction - row.measures.friction_interface)
-    return completed(scene, replace(state, row=row, pasts=pasts, approach=approach, observations=seen))
+    friction = row.measures.friction - row.measures.friction_interface
+    return completed(scene, replace(state, row=row, pasts=pasts, approach=approach, friction=friction))
 
 
 def completed(scene: Scene, state: State) -> State:
@@ -152,15 +149,13 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
         numbers = state.chosen.numbers()
         found |= {name: Entry(np.array(value), 1.0, SYMBOLS[name], optional=True) for name, value in numbers.items()}
     if scene.material.branched is not None:
-        found |= state.observations.entries()
-    if scene.choices.further_starts.on:
-        found |= state.starts.entries()
+        found[FRICTION] = Entry(state.friction, optional=True)
     if follows(scene):
         found |= state.tolerance.entries()
     if state.sticking is not None:
         units = scene.units.height, scene.units.modulus
         found |= prefixed("sticking", sticking.entries(state.sticking, state.row.measures, *units))
-    return found | rounding.entries(scene, state.rounding) | state.errors.entries()
+    return found | state.errors.entries()
 
 
 def save(path: Path, scene: Scene, state: State, facts: Facts) -> None:
@@ -198,13 +193,11 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
         body=scene.material.restored(state.body, part_of("material", saved)),
         energy=energy,
         approach=float(saved["contact/approach"]),
-        starts=StartStatistics.restored(saved),
-        observations=Observations.restored(saved),
+        friction=float(saved.get(FRICTION, math.inf)),
         errors=ErrorSums.restored(saved),
         chosen=None if state.chosen is None else ChosenSteps.of(scene.job, saved),
         sticking=stuck,
         tolerance=StepTolerance.restored(saved),
-        rounding=rounding.restored(saved),
     )
     return completed(scene, found)
 

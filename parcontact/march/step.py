@@ -18,14 +18,13 @@ from ..history.timeline import Step
 from ..physics.body import Trial, surface_of
 from ..physics.energy import EnergyMemory, Pressed
 from ..scene import Scene, solver_on, solver_on_tiles
-from ..solve.contact import Contact, ContactSolver
+from ..solve.contact import Contact
 from ..solve.fallback import cold_start, retry
 from ..solve.problem import Approach, MeanPressure, Problem
 from ..storage.row import Row
 from . import failure, sticking, sticking_energies
 from .errors import Estimate, Solved, estimate_errors
 from .failure import DetachedError, StepError
-from .rounding import rounding_after, rounds_too_much
 from .starts import Past, cells_moved, make_start
 from .state import State, energies_of
 
@@ -72,11 +71,9 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         body=solved.body,
         energy=energy,
         approach=contact.d,
-        starts=state.starts.after(solved.moved_start, contact.iterations),
-        observations=errors.observations,
+        friction=errors.friction,
         sticking=None if solved.stuck is None else solved.stuck.memory,
         tolerance=state.tolerance.after(scene, contact, errors.lasting),
-        rounding=solved.rounding,
     )
 
 
@@ -102,7 +99,7 @@ def _accepted(scene: Scene, state: State, step: Step) -> tuple[Solved, Estimate,
                 raise
             step = shorter
             continue
-        errors = estimate_errors(scene, state.observations, solved)
+        errors = estimate_errors(scene, state.friction, solved)
         if step.judge is None:
             return _remarked(scene, state, solved), errors, None
         error = scene.slab.agree(errors.step)
@@ -189,16 +186,15 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     if state.sticking is not None:
         return _solve_stuck(scene, state, step, trial, control)
     tolerance = state.tolerance.of(scene, step)
-    double = state.rounding > 0.0 or rounds_too_much(scene, control, tolerance)
-    solver, operators = scene.in_double if double else (scene.solver, scene.operators)
-    problem = Problem(*operators, trial.effective, scene.constraint(trial.alpha), control)
-    moved_start, contact = make_start(scene, state.pasts, state.starts, step, trial.alpha, state.spare), None
+    solver, contact = scene.solver, None
+    problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha), control)
+    make_start(scene, state.pasts, step, trial.alpha, state.spare)
     if state.alpha == 0.0:  # nothing has been solved before
-        on = partial(solver_on, scene.setup, operator_type=np.float64 if double else None)
+        on = partial(solver_on, scene.setup)
         contact = cold_start.prepare(solver, problem, state.spare, on, solver_on_tiles(scene.setup))
     contact, remark = contact or solver.solve(problem, state.spare, tolerance=tolerance), ""
     if contact.failure:
-        contact, remark = _retry(scene, state, step, solver, problem, contact)
+        contact, remark = _retry(scene, state, step, problem, contact)
     if step.passed:
         remark = "; ".join(filter(None, (remark, _passed(scene, step))))
     touching = problem.constraint.touches(contact.p)
@@ -206,9 +202,8 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     measures = scene.probe.measure(*maps, step.position, step.velocity)
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
-    rounding = rounding_after(scene, state.rounding, contact, trial.effective)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
-    return Solved(step, trial, contact, touching, measures, memory, remark, moved_start, rounding=rounding)
+    return Solved(step, trial, contact, touching, measures, memory, remark)
 
 
 def _solve_stuck(scene: Scene, state: State, step: Step, trial: Trial, control: MeanPressure | Approach) -> Solved:
@@ -262,9 +257,7 @@ def _control(scene: Scene, step: Step, trial: Trial) -> MeanPressure | Approach:
     return MeanPressure(mean / (trial.alpha * scene.units.pressure))
 
 
-def _retry(
-    scene: Scene, state: State, step: Step, solver: ContactSolver, problem: Problem, failed: Contact
-) -> tuple[Contact, str]:
+def _retry(scene: Scene, state: State, step: Step, problem: Problem, failed: Contact) -> tuple[Contact, str]:
     """Retry a solve that failed, unless the job takes it as it is: then only in double precision.
 
     Returns the contact, and what to say of it; collective. Raises StepError when nothing helps.
@@ -274,7 +267,7 @@ def _retry(
     if would_do and in_double is None:
         return failed, ""
     on, most = partial(solver_on, scene.setup), 1 if would_do else None
-    contact, tried = retry.retry_solve(solver, problem, failed, on, in_double, most)
+    contact, tried = retry.retry_solve(scene.solver, problem, failed, on, in_double, most)
     if contact.failure:
         if would_do and _accepts(scene, contact):
             return contact, ""
@@ -292,4 +285,4 @@ def _accepts(scene: Scene, contact: Contact) -> bool:
 def _passed(scene: Scene, step: Step) -> str:
     """Return what to say of a step that stands for several."""
     what = f"{failure.where(scene, step)} takes the place of {step.passed} steps more"
-    return f"{what}: at rest, under a constant load, nothing changes by more than the tolerance"
+    return f"{what}: at rest, under a constant load, nothing changes"

@@ -242,11 +242,6 @@ class ZenerBody:
         loops.begin(memory.branches, *memory.pending, memory.increment, self._still[0], 0.0, u, u, 0)
         memory.pending = self._still
 
-    def relaxation_in(self, seconds: float) -> tuple[Array, float]:
-        """Return what share each branch map loses within a time if u is kept, and the modulus G that is left then."""
-        share = -np.expm1(-self.elapsed(seconds)[self.kept])
-        return share, self._spring + float(self.prony.moduli[self.kept] @ (1.0 - share))
-
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
         """Return the entries of the memory, and the branches, which a checkpoint must agree with."""
         return {

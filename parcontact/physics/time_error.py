@@ -183,6 +183,8 @@ def error_of_rise(run: RunProperties, observed: StepObservation, points: int, ch
     if run.prony is None or not run.exponential or not observed.slid or observed.friction <= 0.0:
         return 0.0
     x = max(_share_passed(run, observed, points), observed.angle)
+    if x == 0.0:
+        return 0.0
     if math.isinf(change):
         modulus = complex_modulus(np.array(x / observed.seconds), *run.prony)
         change = uneven * observed.slope * float(modulus.imag / abs(modulus))

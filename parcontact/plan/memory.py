@@ -15,7 +15,7 @@ from ..job import Job
 from ..job.checks.size import machines
 from ..march import sticking
 from ..march.state import State
-from ..march.sudden import tolerance_of_start
+from ..march.tolerance import tolerance_before
 from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
 from ..parallel.slab import deal, dealt_to
@@ -98,7 +98,7 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
         return 0
     part, points, even = _Part(job, ranks, rank), job.grid.points, not job.initial.velocity[1]
     spectrum, blocks = part.transform(points)
-    tolerance = min(tolerance_of(job.numerics.tolerance), tolerance_of_start(choices(job)))
+    tolerance = min(tolerance_of(job.numerics.tolerance), tolerance_before(choices(job), 0))
     pairs = pairs_for(job.grid.dx, job.grid.dy)
     held = SteadySolver.footprint(*points, tolerance, ranks, part.number, sets, pairs)
     held += 2 * 8 * part.cells(points)  # the heights and the start

@@ -181,7 +181,9 @@ class Choices:
 
     @decided("rest cut short")
     def short_rest(self) -> Verdict:
-        """One step that ends a stage at rest once nothing changes any more (`march.rest`)."""
+        """One step that ends a stage at rest of a body without memory, where nothing changes any more."""
+        if self.prony.moduli.size:
+            return False, "the body relaxes"
         if (span := next((span for span in self.timeline.spans if span.rests), None)) is None:
             return False, "no stage stands under a constant load with growing time steps"
         return True, f"stage {span.stage.name!r} stands under a constant load"

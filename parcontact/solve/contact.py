@@ -134,12 +134,12 @@ class ContactSolver:
             cells += LongWavePreconditioner.footprint(nx, ny, ranks, rank, long_waves)
         return Workspace.footprint(nx, ny, tolerance, ranks, rank, kept) + cells
 
-    def solve(self, problem: Problem, start: Array, length: float = 1.0, tolerance: float | None = None) -> Contact:
+    def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
         """Solve from the pressure `start`, which is admissible and in whose place the solution will be; collective.
 
-        Under load control the start is scaled to the load, or uniform where it is zero everywhere. `length` is that of
-        a step over the usual one; the `tolerance` is the solver's own unless it is given. A solve that does not reach
-        it says why in `failure`; its maps are then the last iterate, not a solution.
+        Under load control the start is scaled to the load, or uniform where it is zero everywhere. The `tolerance`
+        is the solver's own unless it is given. A solve that does not reach it says why in `failure`; its maps are then
+        the last iterate, not a solution.
         """
         mean = problem.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
@@ -148,7 +148,7 @@ class ContactSolver:
         p, other = start, self.workspace.pressure
         iterate = self._begin(problem, p)
         best, slope, iteration = (np.inf, 0), 0.0, 0
-        exact = self._rough_inverse or length != 1.0
+        exact = self._rough_inverse
         while True:
             members, excess, certificate = self._certify(problem, p, iterate)
             best = min(best, (certificate.worst, iteration))
@@ -162,7 +162,7 @@ class ContactSolver:
             unlike = not 1.0 / self._most_ratio < ratio < self._most_ratio
             exact |= unlike or iteration - best[1] > ITERATIONS_UNTIL_EXACT_STEPS
             usual = None if exact else STEP + (1.0 - STEP) * (members / self.slab.points) ** 3
-            iterate, cut = self._descend(problem, p, iterate, usual, length * slope, other)
+            iterate, cut = self._descend(problem, p, iterate, usual, slope, other)
             p, other = other, p
             iteration += 1
             exact |= cut == math.inf

@@ -34,12 +34,12 @@ def attempts(march: March, error: Errors, most: int = 1000) -> list[list[Step]]:
     so many steps."""
     chosen, found, number = march.state.chosen, list[list[Step]](), 0
     assert chosen is not None
-    chooser = StepChooser(march.scene, chosen, march.state.starts.prefers_moved)
+    chooser = StepChooser(march.scene, chosen)
     while (number := number + 1) <= len(march.timeline()) and len(found) < most:
         span = march.timeline().span(number)
         if span.place(number) == 0:
             continue
-        tries = [chooser.propose(span, number, is_relaxed=False)]
+        tries = [chooser.propose(span, number)]
         while isinstance(verdict := judged(tries[-1], error(number, tries[-1])), Step):
             tries.append(verdict)
         chosen.add(verdict)

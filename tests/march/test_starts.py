@@ -1,7 +1,6 @@
 """From which pressure the solve of a step starts."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from marching import SLS, begun, marched
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
 from parcontact.march.loop import March
-from parcontact.march.starts import FORGET, NAME, StartStatistics, make_start
+from parcontact.march.starts import make_start
 from parcontact.parallel.slab import Array
 
 CELL = 1e-3 / 32
@@ -21,7 +20,7 @@ SCENE = {"grid": {"points": 32, "size": 1e-3}, "surface": WAVES, "material": SLS
 def start_of(march: March, step: Step) -> Array:
     """The start of the next step for a modulus of 2."""
     state = march.state
-    make_start(march.scene, state.pasts, state.starts, step, 2.0, state.spare)
+    make_start(march.scene, state.pasts, step, 2.0, state.spare)
     return state.spare.copy()
 
 
@@ -66,46 +65,3 @@ def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> No
             np.testing.assert_array_equal(start, np.roll(pressures[-ago], 1, 1) * (past.alpha / 2.0))
         march.advance(step)
         pressures.append(march.state.pressure.copy())
-        march.state = replace(march.state, starts=StartStatistics())  # it has learnt nothing
-
-
-def test_the_last_two_pressures_are_the_start_where_that_took_fewer_iterations() -> None:
-    """Thirds of a cell of a slide that keeps pressures of further ago: extrapolated, not moved as less than half of a
-    cell is none; to rounding."""
-    chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
-    march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
-    given = Timeline.of(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / 3}]}))
-    for step in itertools.islice(given, 7):
-        march.state = replace(march.state, starts=StartStatistics(3.0, 2.0, 5.0))
-        start = start_of(march, step)
-        if step.number > 5:
-            last, earlier = march.state.pasts[:2]
-            line = (1.0 + step.growth) * last.alpha * last.pressure - step.growth * earlier.alpha * earlier.pressure
-            np.testing.assert_allclose(start, np.maximum(line / 2.0, 0.0), rtol=0, atol=1e-14 * start.max())
-        march.advance(step)
-
-
-def test_kinds_of_starts_are_compared() -> None:
-    """The last two pressures are the start once a pressure of whole cells ago has taken more iterations; after some
-    steps, the other one is tried again, and one that needs next to none is kept."""
-    starts = StartStatistics()
-
-    def kinds(moved: int, extrapolated: int) -> str:
-        nonlocal starts
-        found = ""
-        for _ in range(40):
-            found += "em"[starts.moves]
-            starts = starts.after(starts.moves, moved if starts.moves else extrapolated)
-        return found
-
-    assert kinds(1, 3) == 40 * "m"
-    first = kinds(8, 2)
-    assert first.startswith("m" + 16 * "e" + "m" + 16 * "e" + "m")
-    for _ in range(FORGET):
-        starts = starts.after(None, 9)
-    assert np.asarray(starts.entries()[NAME].value).tolist()[:2] == [0.0, 1.0]
-    preferred = [
-        StartStatistics.restored({NAME: np.array(numbers)}).prefers_moved
-        for numbers in ([3.0, 2.0, 5.0], [3.0, 4.0, 5.0])
-    ]
-    assert preferred == [False, True]

@@ -29,18 +29,15 @@ GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
 
 @pytest.fixture
 def moody(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Solves that fail up to twice: how often is a matter of the contact, and so is the same when repeated."""
-    solve, refused = ContactSolver.solve, [0]
+    """Solves that fail once or not at all: this is a matter of the contact, and so is the same when repeated."""
+    solve, refused = ContactSolver.solve, [False]
 
     def refuse(solver: ContactSolver, problem: Any, start: Any, *more: Any, **named: Any) -> Contact:
         contact = solve(solver, problem, start, *more, **named)
         if solver.slab.nx < GRID["points"][0]:
             return contact
-        if refused[0] < solver.slab.sum(float(np.count_nonzero(contact.p)))[0] % 3:
-            refused[0] += 1
-            return replace(contact, failure="is refused")
-        refused[0] = 0
-        return contact
+        refused[0] = not refused[0] and solver.slab.sum(float(np.count_nonzero(contact.p)))[0] % 2 > 0
+        return replace(contact, failure="is refused") if refused[0] else contact
 
     monkeypatch.setattr(ContactSolver, "solve", refuse)
 
@@ -49,7 +46,7 @@ def moody(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("moody")
 @pytest.mark.parametrize("name", ["viscoelastic", "free"])
 def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:
-    """Shorter steps and nested starts follow from the state before the step, whatever the process has done before."""
+    """Nested starts follow from the state before the step, whatever the process has done before."""
     data = bench.job(name, grid=GRID, history=[{**PRESS, "pressure": 1e4}, {**SLIDE, "cells_per_step": 4}])
     whole = bench.where / "whole"
     assert bench.run(data, whole) == 0
@@ -61,9 +58,9 @@ def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:
             same(whole, part, total)
     log = bench.comm.bcast((bench.where / "whole" / "run.log").read_text() if bench.comm.rank == 0 else "")
     retried = re.findall(r"step \d+ at .*: the contact solve is refused; solved when retried with (.*)", log)
-    assert len({text.count(", with ") for text in retried}) >= 2
-    assert all(("nested grids" in text) == (", with " in text) for text in retried)
-    assert f", retry {sum(1 + text.count(', with ') for text in retried)}" in log
+    assert 0 < len(retried) < total
+    assert all("nested grids" in text for text in retried)
+    assert f", retry {len(retried)}" in log
 
 
 @pytest.mark.parametrize("stretch", [1e-4, 1e4])

@@ -67,12 +67,10 @@ def test_steps_double_at_most() -> None:
 
 
 def test_lengths_of_steps() -> None:
-    """Whole cells in powers of two; then every part of one, and four to each factor of two below an eighth; two fifths
-    where it does not matter when the next whole cell comes."""
+    """Whole cells in powers of two; then every part of one, and four to each factor of two below an eighth."""
     parts = sorted({round(1.0 / cells_per_step(1.0 / most), 9) for most in np.arange(1.0, 40.0, 0.25)})
     assert parts == [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40]
     assert [cells_per_step(most) for most in (1.0, 1.9, 2.0, 3.9, 4.0)] == [1, 1, 2, 2, 4]
-    assert [cells_per_step(most, whole_soon=False) for most in (1.0, 0.5, 0.45, 0.4, 0.39)] == [1, 0.5, 0.4, 0.4, 1 / 3]
     assert all(cells_per_step(1.0 / most) <= (1.0 + 1e-5) / most for most in np.arange(1.0, 100.0, 0.3))
 
 

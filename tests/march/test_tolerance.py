@@ -1,5 +1,7 @@
 """The tolerance of steps, from the error budget: what it allows, what it saves, and that a restart changes nothing."""
 
+import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from sliding import rough, slide
 import parcontact as pc
 from parcontact.history.timeline import Step
 from parcontact.march.loop import March
-from parcontact.march.tolerance import MOST, SHARES, StepTolerance
+from parcontact.march.tolerance import CLOSE, FIRST, MOST, SHARES, StepTolerance, tolerance_before
 from parcontact.physics.budget import ErrorBudget, Parts
 from parcontact.solve.certificate import Certificate
 from parcontact.solve.contact import Contact
@@ -117,3 +119,71 @@ def test_a_restart_goes_on_with_it(tmp_path: Path, numerics: dict[str, float]) -
     again = pc.Simulation.restore(tmp_path / "state.h5", comm=MPI.COMM_SELF)
     rest = [(row.friction, row.error_friction, row.operator_calls) for row in again.steps()]
     assert rest == rows[-len(rest) :]
+
+
+# -- before a change --------------------------------------------------------------------------------------------------
+
+INF, ONE, TAU = 1e6, 4e6, 1e-3
+ZENER = {"model": "zener", "modulus_inf": INF, "branches": [{"modulus": ONE, "relaxation_time": TAU}]}
+ROUGH_SURFACE = {
+    "shape": "rough",
+    "hurst": 0.9,
+    "rms_slope": 0.02,
+    "long_wavelength": 2.5e-4,
+    "short_wavelength": 1.25e-4,
+}
+PRESSURE, SLOW, CELL = 1e5, 1e-2, 1e-3 / 128
+STEADY = {"state": "steady", "velocity": SLOW, "pressure": PRESSURE}
+BEFORE = {"pressure": PRESSURE, "velocity": SLOW, "distance": 4 * CELL, "cells_per_step": 1}
+FAST = {"pressure": PRESSURE, "velocity": 3.0, "distance": 0.25 * CELL, "time_step": {"first": 1e-9, "growth": 1.5}}
+
+
+def changing(history: list[dict[str, Any]], **sections: Any) -> dict[str, Any]:
+    return {
+        "grid": {"points": 128, "size": 128 * CELL},
+        "surface": {**ROUGH_SURFACE, "seed": 1},
+        "material": ZENER,
+        "history": history,
+        **sections,
+    }
+
+
+def at_ends(history: list[dict[str, Any]], **sections: Any) -> list[float]:
+    """The largest tolerance of the start, and of all steps."""
+    march = begun(changing(history, numerics={"tolerance": 0.1}, **sections))
+    tolerances = [StepTolerance().of(march.scene, each) or math.inf for each in march.timeline()]
+    return [tolerance_before(march.scene.choices, 0), *tolerances]
+
+
+def test_the_last_solve_before_a_change_is_close() -> None:
+    """Of velocity and of load, in a stage and in the steady state before the first; in the first step after it, 1 %."""
+    slow, rest = {**BEFORE, "velocity": 2e-3}, {"pressure": PRESSURE, "duration": 1e-2, "time_step": 5e-3}
+    assert at_ends([FAST], initial={**STEADY, "velocity": 2e-3})[:2] == [CLOSE, FIRST]
+    assert at_ends([slow, FAST])[1:7] == [math.inf, FIRST, math.inf, math.inf, CLOSE, FIRST]  # from the first load on
+    assert at_ends([rest, {"pressure": 2 * PRESSURE}])[3] == CLOSE
+
+
+def test_nothing_is_close_where_nothing_changes() -> None:
+    """Velocity and load go on, or the body has no memory; a tolerance that is smaller stays."""
+    ramp = {**BEFORE, "pressure": {"from": PRESSURE, "to": 2 * PRESSURE}}
+    assert CLOSE not in at_ends([BEFORE, BEFORE, ramp])[1:]
+    assert at_ends([BEFORE], initial=STEADY)[0] == math.inf
+    elastic = {"model": "elastic", "shear_modulus": 1e6}
+    assert all(map(math.isinf, at_ends([BEFORE, FAST], material=elastic)))
+    march = begun(changing([BEFORE, FAST], numerics={"tolerance": 1e-6}))
+    assert all(StepTolerance().of(march.scene, each) is None for each in march.timeline())
+
+
+@pytest.mark.parametrize(("history", "first"), [([FAST], 1), ([BEFORE, FAST], 5)])
+def test_stated_errors_hold_after_a_step_of_velocity(history: list[dict[str, Any]], first: int) -> None:
+    """Friction and the corrected area of the first steps at 10 %, against the same steps at a tolerance of 1e-6; the
+    compound becomes forty times as stiff."""
+    found = []
+    for numerics in ({"accuracy": 0.1}, {"tolerance": 1e-6, "branch_error": 1e-2}):
+        data = changing(history, initial=STEADY, numerics=numerics, material={"include": "synthetic_tyre"})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            found.append(list(pc.Simulation(data).steps())[first:])
+    for row, exact in zip(*found, strict=True):
+        assert abs(row.friction / exact.friction - 1.0) < row.error_friction
+        assert abs(row.contact_area_corrected / exact.contact_area_corrected - 1.0) < row.error_area

@@ -9,14 +9,13 @@ import numpy as np
 from parcontact.errors import RunError
 from parcontact.history import timeline as clock
 from parcontact.history.timeline import Step, Timeline
+from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Array
 from parcontact.storage.row import Row
 
 EPS = float(np.finfo(float).eps)
-SHALLOW = 0.05  # of the surface's height: less than this the length of a certificate rarely is
 ROUNDINGS = 64  # that a number may be off by, of the largest it is a difference of
-DIGITS = 4  # roundings of the displacement, of the size of the strain times the box, below which no gap is certain
 LOAD = 1e-12  # relative, of the sum over all points
 ENERGY = 1e-10  # relative, of sums over all steps: the weights of very short steps have ten digits
 
@@ -66,7 +65,7 @@ class Witness:
         try:
             run(self.march, [lambda march: self._note(timeline, march.row)])
         except RunError as error:
-            self.failure, self.beyond = str(error), self._beyond(timeline[self.last.step + 1])
+            self.failure, self.beyond = str(error), isinstance(error, StepError) and error.beyond_precision
         return self
 
     def _note(self, timeline: clock.Timeline, row: Row) -> None:
@@ -148,17 +147,6 @@ class Witness:
         scene, modulus = self.march.scene, self.march.state.alpha * self.march.scene.units.modulus
         self.scales.certified = max(self.scales.certified, self._length())
         return 2.0 * scene.job.numerics.tolerance * self.scales.certified * modulus, 2.0 * self.scales.length * modulus
-
-    def _beyond(self, step: Step) -> bool:
-        """Whether the last digits of the pressure move the body by more than the certificate allows."""
-        scene, grid = self.march.scene, self.march.scene.job.grid
-        if step.control == "approach":
-            return False
-        mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
-        alpha = scene.material.begin(self.march.state.body, step.dt, scene.motion.at(step.position)).alpha
-        strain = mean / (alpha * scene.units.modulus) * (1.0 - scene.job.material.poisson)
-        allowed = scene.job.numerics.tolerance * SHALLOW * scene.setup.height
-        return DIGITS * EPS * strain * max(grid.lx, grid.ly) > allowed
 
 
 def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> float:

@@ -63,8 +63,8 @@ class Bench:
     def problem(self, h: Array, control: MeanPressure | Approach) -> Problem:
         return Problem(self.operator, self.preconditioner, h, self.constraint, control)
 
-    def solve(self, h: Array, control: MeanPressure | Approach, start: Array, length: float = 1.0) -> Contact:
-        return self.solver.solve(self.problem(h, control), start, length)
+    def solve(self, h: Array, control: MeanPressure | Approach, start: Array) -> Contact:
+        return self.solver.solve(self.problem(h, control), start)
 
 
 def rough(points: int, seed: int = 1, cells: int = 8) -> Map:

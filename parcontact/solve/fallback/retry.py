@@ -1,5 +1,5 @@
-"""Further attempts when a contact solve has failed: an operator in double precision, if it was not, shorter steps from
-where it stands, a cold start on nested grids, and guesses of where contact is.
+"""Further attempts when a contact solve has failed: an operator in double precision, if it was not, a cold start on
+nested grids, and guesses of where contact is.
 
 Nothing here is made or called for a solve that succeeds. What is tried depends on the failed solve alone, so that all
 ranks try the same, and a run that is repeated tries it again.
@@ -15,8 +15,6 @@ from ..contact import Contact, ContactSolver
 from ..problem import Operators, Problem
 from . import active_set
 from .cold_start import SolverOn, start_on_coarse_grids
-
-SHORT_STEP = 0.5  # tuning: length of a safeguarded step over the exact one
 
 
 def retry_solve(
@@ -59,8 +57,6 @@ def _attempts(
         problem = replace(problem, operator=operator, preconditioner=preconditioner)
         contact = solver.solve(problem, p)
         yield "an operator in double precision", contact
-    if np.isfinite(contact.certificate.worst):
-        yield "shorter steps", solver.solve(problem, p, SHORT_STEP)
     grids, _ = start_on_coarse_grids(solver, problem, p, solver_on)
     contact = solver.solve(problem, p)
     yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact
