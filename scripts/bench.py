@@ -4,7 +4,7 @@
 
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
     dilute   cold elastic solves at 0.07 to 2 % contact on two and four times as many points: in free boxes, with
-             aspher's, and in periodic ones on all points and on tiles
+             aspher's
     free     operator calls of cold solves in free boxes at 0.2 to 35 % contact to a pressure error of 1e-5: on
              512 x 512 points, and on ever finer grids
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'

@@ -45,7 +45,7 @@ from .convolution import (
 from .layer import Layer, LongWaves
 from .love import cell_factor, love
 from .prony import CreepSpectrum, Prony, complex_modulus, creep_spectrum
-from .tile_operator import TileOperator, free_operator, periodic_operator
+from .tile_operator import TileOperator, free_operator
 from .tiles import LONGEST_CELL, TileConvolution, Tiles, tile_inverse
 from .wake import wake
 
@@ -176,20 +176,13 @@ class HalfSpace:
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     def works_on_tiles(self, nx: int, ny: int) -> bool:
-        """Return whether tiles have operators: on a half space, with the spectral kernel or nothing around, and on
-        cells that are not long."""
+        """Return whether tiles have operators: on a half space in a free box, on cells that are not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
-        one_of_both = self.free or self.kernel == "spectral"
-        return one_of_both and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
+        return self.free and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
-        """The operator of a half space on tiles of its grid, and a preconditioner."""
-        if self.free:
-            operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
-        else:
-            operator = periodic_operator(
-                tiles, self.size, self.poisson, lambda qx, qy: self.compliance(np.hypot(qx, qy)), tally
-            )
+        """The operator of a free half space on tiles of its grid, and a preconditioner."""
+        operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
     # -- of contacts that stick -------------------------------------------------------------------------------------

@@ -9,8 +9,7 @@ The first part vanishes beyond `REACH s`: it is a cyclic convolution between til
 their side. The second one varies over s: loads of points are given to the nodes of a regular grid, at distances of
 `s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A. Brandt
 and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell. What the
-two lengths leave out is below 1e-6 of the displacement; in a periodic box 2e-6, as far as its kernel, cut off at the
-Nyquist wavenumbers, reaches along x and y.
+two lengths leave out is below 1e-6 of the displacement.
 """
 
 import math
@@ -24,13 +23,13 @@ from ..parallel.fft import FFT
 from ..parallel.fft import footprint as footprint_of_transform
 from ..parallel.slab import Array, Slab, allocate
 from ..parallel.tally import Tally
-from .convolution import Convolution, padded_lengths, tabulate, wavenumbers
+from .convolution import Convolution, padded_lengths, tabulate
 from .tiles import SIDE, TileConvolution, Tiles, tiles_along
 
 ORDER = 8  # accuracy: nodes of an interpolation along each direction
 FINENESS = 6.0  # accuracy: distances of nodes in the length s
 REACH = 4.0  # accuracy: lengths s beyond which the first part is left out, which is 1.5e-8 there
-NODES, PERIODIC_NODES = 256, 512  # tuning: along the longer side of a box, at most, where a tile has enough of them
+NODES = 256  # tuning: along the longer side of a box, at most, where a tile has enough of them
 FEWEST_NODES = 2  # along a tile
 FAR = 6.0  # lengths s beyond which erf is 1 in double precision
 GAUSS = 0.5 / math.sqrt(3.0)  # of a cell: places of two points whose mean is that over the cell, to third degree
@@ -40,7 +39,7 @@ class TileOperator:
     """Pressure -> displacement on tiles: `near` are the coefficients of the first part at distances from 0 on along y
     and x, and `nodes` do the second one."""
 
-    def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes | PeriodicNodes", tally: Tally) -> None:
+    def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes", tally: Tally) -> None:
         self._tiles, self._tally = tiles, tally
         self._near = TileConvolution(tiles, len(near) // SIDE - 1, near, tally)
         step = step_of_nodes(tiles)
@@ -120,43 +119,12 @@ class FreeNodes:
         self._far.apply(self.map, self.map)
 
 
-class PeriodicNodes:
-    """Nodes of tiles of a periodic box, and those beyond its edges again; `smooth(qx, qy)` is the symbol of what they
-    do."""
-
-    def __init__(
-        self, tiles: Tiles, size: tuple[float, float], smooth: Callable[[Array, Array], Array], tally: Tally
-    ) -> None:
-        step = step_of_nodes(tiles)
-        slab = Slab.alone(tiles.points[0] // step, tiles.points[1] // step, tally)
-        self.map = allocate((slab.ny + ORDER, slab.nx + ORDER), np.float64, tally)
-        self._box = slab.zeros()
-        fft = FFT(slab, measured=False)
-        self._far = Convolution(fft, lambda rows: smooth(*wavenumbers(fft, size, rows)) / step**2, np.float64)
-
-    def displace(self) -> None:
-        """From loads to displacements, in their place."""
-        half, box = ORDER // 2, self._box
-        rows = self.map[half:-half]
-        rows[-half:] += self.map[:half]
-        rows[:half] += self.map[-half:]
-        box[...] = rows[:, half:-half]
-        box[:, -half:] += rows[:, :half]
-        box[:, :half] += rows[:, -half:]
-        self._far.apply(box, box)
-        self.map[...] = np.pad(box, half, mode="wrap")
-
-
 def footprint(tiles: Tiles, size: tuple[float, float]) -> int:
     """Bytes that the operator on tiles of a box of `size` holds."""
     *_, count = _lengths(tiles, size)
     step, item = step_of_nodes(tiles), 8
-    if tiles.periodic:
-        nx, ny = (n // step for n in tiles.points)
-        lengths, nodes = (nx, ny), (nx + ORDER) * (ny + ORDER) + nx * ny
-    else:
-        nx, ny = (SIDE // step * n + ORDER for n in tiles_along(tiles.points))
-        lengths, nodes = padded_lengths(nx, ny), nx * ny
+    nx, ny = (SIDE // step * n + ORDER for n in tiles_along(tiles.points))
+    lengths, nodes = padded_lengths(nx, ny), nx * ny
     spectrum, blocks, _ = footprint_of_transform((nx, ny), lengths, np.float64, 1, 0)
     far = spectrum + blocks + Convolution.footprint(spectrum, lengths[1])
     return TileConvolution.footprint(tiles.count, count // SIDE - 1) + item * nodes + far
@@ -181,26 +149,6 @@ def free_operator(
     return TileOperator(tiles, coefficient(x, y, dx, dy) - smooth(x, y), FreeNodes(tiles, size, smooth, tally), tally)
 
 
-def periodic_operator(
-    tiles: Tiles,
-    size: tuple[float, float],
-    poisson: float,
-    symbol: Callable[[Array, Array], Array],
-    tally: Tally,
-) -> TileOperator:
-    """Pressure -> displacement on tiles of a box of `size` that repeats itself, by its `symbol(qx, qy)`; that of the
-    second part is `(1 - nu)/q erfc(q s/2)`."""
-    dx, dy, length, count = _lengths(tiles, size)
-
-    def smooth(qx: Array, qy: Array) -> Array:
-        return (1.0 - poisson) * np.asarray(_smooth_wave(np.hypot(qx, qy), length))
-
-    qx, qy = (2.0 * np.pi * np.fft.fftfreq(2 * count, step) for step in (dx, dy))
-    waves = qx[None, : count + 1], qy[:, None]
-    near = np.fft.irfft2(symbol(*waves) - smooth(*waves), (2 * count, 2 * count))[:count, :count]
-    return TileOperator(tiles, near, PeriodicNodes(tiles, size, smooth, tally), tally)
-
-
 def _lengths(tiles: Tiles, size: tuple[float, float]) -> tuple[float, float, float, int]:
     """Sides of a cell, the length s, and points up to where the first part ends, in whole tiles."""
     dx, dy = size[0] / tiles.points[0], size[1] / tiles.points[1]
@@ -210,8 +158,8 @@ def _lengths(tiles: Tiles, size: tuple[float, float]) -> tuple[float, float, flo
 
 def step_of_nodes(tiles: Tiles) -> int:
     """Points from one node to the next, a divisor of SIDE."""
-    step, most = 4, PERIODIC_NODES if tiles.periodic else NODES
-    while step * most < max(tiles.points) and step < SIDE // FEWEST_NODES:
+    step = 4
+    while step * NODES < max(tiles.points) and step < SIDE // FEWEST_NODES:
         step *= 2
     return step
 
@@ -238,9 +186,3 @@ def _mean_smooth(x, y, a, b, length):  # type: ignore[no-untyped-def]  # numba f
             r = math.sqrt((x + i * a) ** 2 + (y + j * b) ** 2)
             total += (math.erf(r / length) if r < beyond else 1.0) / r
     return 0.25 * total
-
-
-@pointwise
-def _smooth_wave(q, length):  # type: ignore[no-untyped-def]  # numba finds the types itself
-    """Fourier transform of erf(r/length)/r over 2 pi; at q = 0 what takes that of the first part back."""
-    return math.erfc(0.5 * length * q) / q if q > 0.0 else -length / math.sqrt(math.pi)

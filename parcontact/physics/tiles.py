@@ -24,12 +24,11 @@ LONGEST_CELL = 2.0  # tuning: times its width: beyond it too many tiles are near
 @dataclass(frozen=True)
 class Tiles:
     """Tiles of a grid of `points = (nx, ny)`: their rows and columns among all tiles; the last ones may be cut off by
-    the end of the grid, but not of one that is `periodic`."""
+    the end of the grid."""
 
     points: tuple[int, int]
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
-    periodic: bool = False
 
     @property
     def count(self) -> int:
@@ -105,7 +104,7 @@ class TileConvolution:
     def _add_up(self, rows: NDArray[np.intp], columns: NDArray[np.intp], sums: NDArray[np.complex128]) -> None:
         """Sums of products at some tiles of the grid."""
         tiles = self.tiles
-        _add_products(tiles.numbers, tiles.periodic, rows, columns, self._symbols, self._waves, sums)
+        _add_products(tiles.numbers, rows, columns, self._symbols, self._waves, sums)
 
     def reached(self) -> NDArray[np.bool_]:
         """Which tiles of the grid are near one of these."""
@@ -143,7 +142,6 @@ def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally:
 @loop
 def _add_products(
     numbers: NDArray[np.intp],
-    periodic: bool,
     rows: NDArray[np.intp],
     columns: NDArray[np.intp],
     symbols: NDArray[np.complex128],
@@ -159,9 +157,7 @@ def _add_products(
         row, column = rows[own], columns[own]
         for j in range(row - reach, row + reach + 1):
             for i in range(column - reach, column + reach + 1):
-                if not periodic and not (0 <= j < down and 0 <= i < across):
-                    continue
-                other = numbers[j % down, i % across]
+                other = numbers[j, i] if 0 <= j < down and 0 <= i < across else -1
                 if other >= 0:
                     symbol, wave = symbols[row - j + reach, column - i + reach], waves[other]
                     for k in range(total.shape[0]):

@@ -36,7 +36,7 @@ from ..solve.fallback.cold_start import WORTHWHILE
 from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.preconditioner.cell_sums import CellSums
 from ..solve.preconditioner.extension import grids_for, pairs_for
-from ..solve.tiles import BLOCKS, LARGER_CELLS, LARGEST_PERIODIC_SHARE, LARGEST_SHARE, LEAST, SHARE
+from ..solve.tiles import BLOCKS, LARGER_CELLS, LARGEST_SHARE, LEAST, SHARE
 from ..steady_sliding.sliding import tolerance_of
 
 FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
@@ -117,16 +117,15 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
 def on_tiles(job: Job) -> int:
     """Bytes that rank 0 holds at most, beside those of `holdings`, while a dilute first contact is solved on tiles; 0
     for a run that does not try that."""
-    chosen, (nx, ny), free = choices(job), job.grid.points, choices(job).isolated.on
+    chosen, (nx, ny) = choices(job), job.grid.points
     body = _Part(job, 1, 0).half_space
     cold = bool(job.history) and not chosen.steady_start.on and chosen.adhesion is None
     large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
-    has_tiles = free or (job.numerics.kernel == "spectral" and nx % SIDE == ny % SIDE == 0)
-    if not (cold and large and has_tiles and body.works_on_tiles(nx, ny)):
+    if not (cold and large and body.works_on_tiles(nx, ny)):
         return 0
-    count = int((LARGEST_SHARE if free else LARGEST_PERIODIC_SHARE) * nx * ny / SIDE**2)
+    count = int(LARGEST_SHARE * nx * ny / SIDE**2)
     places = np.zeros(count, np.intp)
-    tiles = Tiles((nx, ny), places, places, periodic=not free)
+    tiles = Tiles((nx, ny), places, places)
     tolerance = max(SHARE * job.numerics.tolerance, LEAST)
     held = ContactSolver.footprint(SIDE, count * SIDE, tolerance, 1, 0, LARGER_CELLS)
     held += tile_operator.footprint(tiles, body.size) + TileConvolution.footprint(count, REACH_OF_INVERSE)

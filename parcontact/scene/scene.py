@@ -26,7 +26,8 @@ from ..physics.probe import Probe
 from ..physics.prony import Prony
 from ..physics.roughness import Moments, moments
 from ..physics.surface import Surface
-from ..physics.tiles import SIDE, Tiles
+from ..physics.tile_operator import TileOperator
+from ..physics.tiles import SIDE, TileConvolution, Tiles
 from ..physics.units import Units
 from ..printed import quantity
 from ..solve.adhesive.iterate import GapOperators
@@ -37,7 +38,7 @@ from ..solve.constraint import Constraint
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
-from ..solve.tiles import LARGER_CELLS, OnTiles, SolverOnTiles
+from ..solve.tiles import LARGER_CELLS, SolverOnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
 from .rigid_surface import Heights, Told, heights_of, make_surface, shortest_measured
@@ -216,17 +217,17 @@ def solver_on(
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
 
 
-def solver_on_tiles(setup: Setup) -> OnTiles | None:
+def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
     """Return what makes a solver and operators on tiles of a grid, on one rank; None if the body has none."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 
-    def on(tiles: Tiles, tolerance: float) -> SolverOnTiles:
+    def on(tiles: Tiles, tolerance: float) -> tuple[ContactSolver, TileOperator, TileConvolution]:
         workspace = Workspace(Slab.alone(SIDE, tiles.count * SIDE, tally), tolerance)
         solver = ContactSolver(workspace, height, tolerance, limit, LARGER_CELLS, body.free)
         return solver, *body.on_tiles(tiles, tally)
 
-    return OnTiles(on, not body.free) if body.works_on_tiles(setup.slab.nx, setup.slab.ny) else None
+    return on if body.works_on_tiles(setup.slab.nx, setup.slab.ny) else None
 
 
 def describe_scene(scene: Scene) -> Iterator[str]:

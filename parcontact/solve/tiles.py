@@ -1,4 +1,4 @@
-"""A dilute contact, solved on the tiles of the grid that may touch: its cost follows the contact, not the box.
+"""A dilute contact in a free box, solved on the tiles that may touch: its cost follows the contact, not the box.
 
 A coarser grid has told where contact is, and about how deep: with its pressure p on a grid of blocks and the
 displacement u that this causes there, a block can touch only if its highest point is near the rigid approach,
@@ -9,8 +9,7 @@ with L the length by which u varies within the contact (`certificate.Certificate
 pressure, or beside one, are stacked to a map of their own, on which `contact.ContactSolver` solves the same problem
 with operators on tiles (`physics.tile_operator`). These give the displacement at all points of the grid, too, by which
 `contact.ContactSolver.judge` sees whether the pressure holds everywhere. To less than FINEST, or if it does not, the
-operator of the whole grid judges it, and the solve goes on from there; so it does in a periodic box, where that costs
-less. Root solves and tells the others.
+operator of the whole grid judges it, and the solve goes on from there. Root solves and tells the others.
 """
 
 from collections.abc import Callable
@@ -31,26 +30,14 @@ from .problem import Control, MeanPressure, Operators, Problem
 
 MARGIN = 0.1  # tuning: of the length, by which a block may be off
 LARGEST_SHARE = 0.25  # tuning: of the points of a grid: on more tiles, solving on all points is as fast
-LARGEST_PERIODIC_SHARE = 0.06  # tuning: the same in a periodic box, whose transforms are not padded
 BLOCKS = 256  # points along the longer side of the grid of blocks, at most, unless tiles have fewer than one
 LARGER_CELLS = Grids(2)  # tuning: of solvers on tiles; still larger cells would be those of tiles far apart
 SHARE = 0.5  # of a tolerance, to which tiles are solved: the whole grid has to agree
 LEAST = 1e-7  # accuracy: tolerance: beyond it operators on tiles have no more digits
 FINEST = 1e-5  # accuracy: tolerance: to less the operator of the whole grid judges, of which tiles are off by 2e-7
 
-SolverOnTiles = tuple[ContactSolver, TileOperator, TileConvolution]  # with the body's operator, and a preconditioner
-
-
-@dataclass(frozen=True)
-class OnTiles:
-    """A maker of solvers on tiles, to a tolerance, of a body that may be periodic."""
-
-    make: Callable[[Tiles, float], SolverOnTiles]
-    periodic: bool
-
-    def work_on(self, slab: Slab) -> bool:
-        """Return whether a grid has tiles: a periodic one only whole ones."""
-        return not self.periodic or slab.nx % SIDE == slab.ny % SIDE == 0
+# from tiles and a tolerance, with the body's operator and a preconditioner
+SolverOnTiles = Callable[[Tiles, float], tuple[ContactSolver, TileOperator, TileConvolution]]
 
 
 @dataclass(frozen=True)
@@ -70,38 +57,32 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 
 
 def choose(
-    blocks: Slab,
-    operators: Operators,
-    below: Found,
-    slab: Slab,
-    heights: Array,
-    constraint: Constraint,
-    periodic: bool,
+    blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, constraint: Constraint
 ) -> Tiles | None:
     """Return the tiles of a grid that may touch, from the contact on the next coarser one; None where these are none,
     or more than LARGEST_SHARE of all; collective."""
-    most = (LARGEST_PERIODIC_SHARE if periodic else LARGEST_SHARE) * slab.points / SIDE**2
+    most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     touching = constraint.touches(p) != 0.0
-    if _tiles_with(blocks, touching, slab, periodic).count > most:
+    if _tiles_with(blocks, touching, slab).count > most:
         return None
     u = operators.operator.apply(p, blocks.empty())
     gap = u - regrid.highest(slab, blocks, heights) - below.d
-    tiles = _tiles_with(blocks, touching | (gap < MARGIN * below.length), slab, periodic)
+    tiles = _tiles_with(blocks, touching | (gap < MARGIN * below.length), slab)
     return tiles if 0 < tiles.count <= most else None
 
 
-def _tiles_with(blocks: Slab, near: NDArray[np.bool_], slab: Slab, periodic: bool) -> Tiles:
+def _tiles_with(blocks: Slab, near: NDArray[np.bool_], slab: Slab) -> Tiles:
     """The tiles of a grid with blocks that are near contact, or beside such a block; collective."""
     whole = blocks.to_root(np.where(near, 1.0, 0.0))
-    tiles = on_root(slab.comm, lambda: None if whole is None else _tiles_of(whole > 0.0, slab, periodic))
+    tiles = on_root(slab.comm, lambda: None if whole is None else _tiles_of(whole > 0.0, slab))
     assert tiles is not None
     return tiles
 
 
-def _tiles_of(near: NDArray[np.bool_], slab: Slab, periodic: bool) -> Tiles:
+def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles:
     down, across = near.shape
-    edged = np.pad(near, 1, mode="wrap") if periodic else np.pad(near, 1)
+    edged = np.pad(near, 1)
     around = np.zeros_like(near)
     for j in range(3):
         for i in range(3):
@@ -111,14 +92,14 @@ def _tiles_of(near: NDArray[np.bool_], slab: Slab, periodic: bool) -> Tiles:
     marked = np.zeros((down, across), np.bool_)
     marked[rows * slab.ny // near.shape[0] // SIDE, columns * slab.nx // near.shape[1] // SIDE] = True
     rows, columns = np.nonzero(marked)
-    return Tiles((slab.nx, slab.ny), rows, columns, periodic)
+    return Tiles((slab.nx, slab.ny), rows, columns)
 
 
 class OnTheseTiles:
     """A problem on tiles of a grid, and its solution; root has the operators."""
 
-    def __init__(self, tiles: Tiles, on_tiles: OnTiles, problem: Problem, slab: Slab, height: float) -> None:
-        self._tiles, self._on_tiles, self._problem, self._slab = tiles, on_tiles, problem, slab
+    def __init__(self, tiles: Tiles, solver_on: SolverOnTiles, problem: Problem, slab: Slab, height: float) -> None:
+        self._tiles, self._solver_on, self._problem, self._slab = tiles, solver_on, problem, slab
         self._height = height
         self._operator: TileOperator | None = None
         self._stacked: Array = np.empty(0)
@@ -133,7 +114,7 @@ class OnTheseTiles:
             assert heights is not None
             assert start is not None
             _bury(heights, tiles, lowest - self._height)
-            solver, self._operator, inverse = self._on_tiles.make(tiles, tolerance)
+            solver, self._operator, inverse = self._solver_on(tiles, tolerance)
             control = _on_part(problem.control, slab.points / solver.slab.points)
             contact = solver.solve(Problem(self._operator, inverse, heights, problem.constraint, control), start)
             return contact.p, contact.d, contact.certificate.length
@@ -145,7 +126,7 @@ class OnTheseTiles:
     def judge(self, solver: ContactSolver, p: Array) -> Contact | None:
         """The contact of the solution p, if it holds at all points to the solver's tolerance, None also where the
         operator of the whole grid is to judge; collective."""
-        if solver.tolerance < FINEST or self._tiles.periodic:
+        if solver.tolerance < FINEST:
             return None
         self._displace(solver.workspace.displacement)
         contact = solver.judge(replace(self._problem, operator=_Displaced()), p, "does not hold beside the tiles")

@@ -9,7 +9,6 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -18,15 +17,16 @@ import numpy as np
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.tiles import SIDE, Tiles
+from parcontact.physics.tile_operator import TileOperator
+from parcontact.physics.tiles import SIDE, TileConvolution, Tiles
 from parcontact.solve.contact import ContactSolver
 from parcontact.solve.fallback import cold_start
 from parcontact.solve.problem import Operators
-from parcontact.solve.tiles import LARGER_CELLS, OnTiles, SolverOnTiles
+from parcontact.solve.tiles import LARGER_CELLS
 from parcontact.solve.workspace import Workspace
 
 from .peers import installed
-from .table import Line, Map, compare, interleave, quartiles
+from .table import Line, Map, quartiles
 from .work import EXACT, MODULUS, TOLERANCES, Cold, Solver
 
 ERROR = 5e-5  # of pressures, of the other program; ours is never larger than its own
@@ -60,11 +60,11 @@ for line in sys.stdin:
 
 
 class Dilute(Cold):
-    """The same surface in a box with nothing around, or in one that repeats itself, on tiles where that costs less."""
+    """The same surface in a box with nothing around, on tiles where that costs less."""
 
-    def __init__(self, points: int, load: float, free: bool = True, on_tiles: bool = True) -> None:
+    def __init__(self, points: int, load: float) -> None:
         super().__init__(points, load=load)
-        self.body, self._uses_tiles = HalfSpace(self.size, free=free), on_tiles
+        self.body = HalfSpace(self.size, free=True)
         self.operators = Operators(self.body.operator(self.fft), self.body.inverse(self.fft))
 
     def solve_anew(self, tolerance: float) -> None:
@@ -84,7 +84,7 @@ class Dilute(Cold):
         fft = FFT(slab, measured=False)
         return solver, Operators(self.body.operator(fft), self.body.inverse(fft))
 
-    def on_tiles(self, tiles: Tiles, tolerance: float) -> SolverOnTiles:
+    def on_tiles(self, tiles: Tiles, tolerance: float) -> tuple[ContactSolver, TileOperator, TileConvolution]:
         work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, self.slab.tally), tolerance)
         solver = ContactSolver(work, self.height, tolerance, 500, LARGER_CELLS, self.body.free)
         return solver, *self.body.on_tiles(tiles, self.slab.tally)
@@ -92,8 +92,7 @@ class Dilute(Cold):
     def solve(self, solver: Solver) -> Map:
         start, (own, operators) = np.zeros_like(self.heights), solver
         coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
-        on_tiles = OnTiles(self.on_tiles, not self.body.free) if self._uses_tiles else None
-        contact = cold_start.prepare(own, self.problem(operators), start, coarse, on_tiles)
+        contact = cold_start.prepare(own, self.problem(operators), start, coarse, self.on_tiles)
         return np.asarray((self.go_on(solver, start) if contact is None else contact).p)
 
     def calls(self, solver: Solver) -> int:
@@ -104,28 +103,9 @@ class Dilute(Cold):
 
 
 def dilute(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
-    """Two grids of two and four times as many points along a side, at two loads each, free and periodic."""
+    """Two grids of two and four times as many points along a side, at two loads each."""
     for times, load in CASES:
         yield from _case(times * points, load, min(rounds, 5), asked.peers)
-    for times, load in CASES:
-        yield from _periodic_case(times * points, load, min(rounds, 5))
-
-
-def _periodic_case(points: int, load: float, rounds: int) -> Iterator[Line]:
-    """The same box as it repeats itself, solved on tiles and on all points in turns."""
-    everywhere = Dilute(points, load, free=False, on_tiles=False)
-    surfaces = {"on all points": everywhere, "on tiles": Dilute(points, load, free=False)}
-    reference = everywhere.solve(everywhere.solver(EXACT))
-    name = f"periodic {points} x {points}, {np.mean(reference > 0.0):.2%}"
-    solves: dict[str, Callable[[], object]] = {}
-    for where, surface in surfaces.items():
-        surface.reference = reference
-        solver, error = surface.loosest(ERROR)
-        yield Line(f"{name}: {where}: operator calls", surface.calls(solver))
-        yield Line(f"{name}: {where}: pressure error", error)
-        solves[where] = partial(surface.solve, solver)
-    for line in compare(interleave(solves, rounds), "on all points"):
-        yield replace(line, what=f"{name}: {line.what}")
 
 
 def free(points: int, *_: object) -> Iterator[Line]:

@@ -53,25 +53,6 @@ def test_displacement_is_that_of_the_whole_box(
     assert np.vdot(q, u) == pytest.approx(np.vdot(p, v), rel=1e-12)
 
 
-@pytest.mark.parametrize("nodes", [512, 64], ids=["near nodes", "distant nodes"])
-def test_displacement_is_that_of_the_whole_periodic_box(nodes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Under a smooth pressure on scattered tiles, two of which are beside each other across an edge, and a corner."""
-    monkeypatch.setattr(module, "PERIODIC_NODES", nodes)
-    nx, ny = points = 384, 512
-    tiles = Tiles(points, np.array([0, 2, 2, 9, 15]), np.array([0, 0, 11, 4, 11]), periodic=True)
-    along_x, along_y = (np.sin(np.pi * (np.arange(count) + 0.5) / SIDE) ** 2 for count in points)
-    marked = np.zeros((ny // SIDE, nx // SIDE))
-    marked[tiles.rows, tiles.columns] = np.arange(1.0, 6.0)
-    pressure = along_y[:, None] * along_x[None, :] * np.kron(marked, np.ones((SIDE, SIDE)))
-    body, p = HalfSpace((0.75, 1.0)), stacked(tiles, pressure)
-    expected = body.operator(FFT(Slab.alone(nx, ny), measured=False)).apply(pressure, np.empty((ny, nx)))
-    operator, _ = body.on_tiles(tiles, Tally())
-    u = operator.apply(p, np.empty_like(p))
-    assert_allclose(u, stacked(tiles, expected), rtol=0.0, atol=ERROR * np.abs(expected).max())
-    q = np.random.default_rng(1).random(tiles.shape)
-    assert np.vdot(q, u) == pytest.approx(np.vdot(p, operator.apply(q, np.empty_like(q))), rel=1e-12)
-
-
 def test_inverse_on_tiles_beside_each_other() -> None:
     """It is that of a periodic box of eight tiles, for a pressure within one of the tiles: to rounding on the tiles
     around it, and nothing beyond."""

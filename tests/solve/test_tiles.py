@@ -21,7 +21,7 @@ from parcontact.solve.workspace import Workspace
 from .bodies import Map
 
 POINTS, TOLERANCE = 256, 1e-5
-BODY, PERIODIC = HalfSpace((1.0, 1.0), free=True), HalfSpace((1.0, 1.0))
+BODY = HalfSpace((1.0, 1.0), free=True)
 LIGHT, HEAVY = MeanPressure(0.0005), MeanPressure(0.3)
 
 
@@ -41,7 +41,6 @@ def found(
     monkeypatch: pytest.MonkeyPatch,
     on_tiles: bool = True,
     tolerance: float = TOLERANCE,
-    body: HalfSpace = BODY,
 ) -> tuple[Contact, Array | None, int]:
     """A contact found from nothing, its whole pressure on root, and calls of the operators of the whole grid."""
     monkeypatch.setattr(module, "BLOCKS", POINTS // 4)
@@ -50,19 +49,17 @@ def found(
 
     def solver_on(on: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
         fft = FFT(on, measured=False)
-        solver = ContactSolver(Workspace(on, tolerance), height, tolerance, 500, free=body.free)
-        return solver, Operators(body.operator(fft), body.inverse(fft))
+        solver = ContactSolver(Workspace(on, tolerance), height, tolerance, 500, free=BODY.free)
+        return solver, Operators(BODY.operator(fft), BODY.inverse(fft))
 
-    def tiles_on(tiles: Tiles, tolerance: float) -> module.SolverOnTiles:
+    def tiles_on(tiles: Tiles, tolerance: float) -> Any:
         work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, slab.tally), tolerance)
-        solver = ContactSolver(work, height, tolerance, 500, module.LARGER_CELLS, body.free)
-        return solver, *body.on_tiles(tiles, slab.tally)
+        solver = ContactSolver(work, height, tolerance, 500, module.LARGER_CELLS, BODY.free)
+        return solver, *BODY.on_tiles(tiles, slab.tally)
 
     solver, operators = solver_on(slab, tolerance)
     problem, p = Problem(*operators, h, NonNegative(), control), slab.zeros()
-    contact = cold_start.prepare(
-        solver, problem, p, solver_on, module.OnTiles(tiles_on, not body.free) if on_tiles else None
-    )
+    contact = cold_start.prepare(solver, problem, p, solver_on, tiles_on if on_tiles else None)
     before = slab.tally["operator"]
     contact = contact or solver.solve(problem, p)
     return contact, slab.to_root(contact.p), slab.tally["operator"] - before
@@ -91,33 +88,12 @@ def test_few_calls_of_the_whole_operator(
         assert np.linalg.norm(p - expected) <= 1e-4 * np.linalg.norm(expected)
 
 
-@pytest.mark.mpi
-def test_periodic_box(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first certificate of the whole grid is good; the pressure is that of a solve without tiles."""
-    monkeypatch.setattr(module, "LARGEST_PERIODIC_SHARE", 0.25)
-    contact, p, calls = found(comm, LIGHT, monkeypatch, body=PERIODIC)
-    _, expected, more = found(comm, LIGHT, monkeypatch, on_tiles=False, body=PERIODIC)
-    assert contact.converged
-    assert (contact.iterations, calls) == (0, 1)
-    assert more > 5
-    if p is not None and expected is not None:
-        assert p[40, 250] > 0.0
-        assert np.linalg.norm(p - expected) <= 1e-4 * np.linalg.norm(expected)
-
-
 def test_tiles_beside_an_edge() -> None:
-    """In a periodic box a block at the edge has a neighbour at the opposite one, in a free box it has none."""
+    """A block at the edge has no neighbour beyond it."""
     near, slab = np.zeros((16, 16), np.bool_), Slab.alone(512, 512)
     near[5, 0] = True
-    free, periodic = (module._tiles_of(near, slab, repeats) for repeats in (False, True))
-    assert set(zip(free.rows, free.columns, strict=True)) == {(j, i) for j in (4, 5, 6) for i in (0, 1)}
-    assert set(zip(periodic.rows, periodic.columns, strict=True)) == {(j, i) for j in (4, 5, 6) for i in (0, 1, 15)}
-
-
-def test_only_whole_tiles_repeat() -> None:
-    """A periodic grid that its tiles do not divide has none."""
-    slab = Slab.alone(320, 336)
-    assert [module.OnTiles(None, each).work_on(slab) for each in (False, True)] == [True, False]  # type: ignore[arg-type]
+    found = module._tiles_of(near, slab)
+    assert set(zip(found.rows, found.columns, strict=True)) == {(j, i) for j in (4, 5, 6) for i in (0, 1)}
 
 
 @pytest.mark.mpi(2, 3, 4)
@@ -161,7 +137,7 @@ def test_all_ranks_learn_that_root_failed(comm: MPI.Intracomm) -> None:
     nothing: Any = None
     problem = Problem(nothing, nothing, slab.zeros(), NonNegative(), Approach(1.0))
     with pytest.raises(MemoryError, match="no room for tiles"):
-        module.OnTheseTiles(tiles, module.OnTiles(on, periodic=False), problem, slab, 1.0).solve(1e-3, slab.zeros())
+        module.OnTheseTiles(tiles, on, problem, slab, 1.0).solve(1e-3, slab.zeros())
     assert slab.sum(1.0) == [comm.size]
 
 
@@ -192,7 +168,7 @@ def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
     heights = np.random.default_rng(1).uniform(-3.0, -1.0, (36, 40))
     nothing: Any = None
     problem = Problem(nothing, nothing, heights, NonNegative(), Approach(1.0))
-    module.OnTheseTiles(grid, module.OnTiles(on, periodic=False), problem, slab, 2.0).solve(1e-3, slab.zeros())
+    module.OnTheseTiles(grid, on, problem, slab, 2.0).solve(1e-3, slab.zeros())
     (stacked,) = found
     assert (stacked[:36, :40] == heights).all()
     stacked[:36, :40] = heights.min() - 2.0

@@ -13,7 +13,7 @@ from ...physics.tiles import SIDE, Tiles
 from .. import nested, tiles
 from ..contact import Contact, ContactSolver
 from ..problem import Operators, Problem
-from ..tiles import OnTiles
+from ..tiles import SolverOnTiles
 
 LOOSE = 0.03  # tuning: tolerance on the coarse grids, whose pressure is only a start
 WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes longer than what they save
@@ -22,7 +22,7 @@ SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # of the sa
 
 
 def prepare(
-    solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: OnTiles | None = None
+    solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> Contact | None:
     """On a large grid put a start into `start`, which is 0, for a body that nothing has been pressed into; collective.
 
@@ -36,7 +36,7 @@ def prepare(
 
 
 def start_on_coarse_grids(
-    solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: OnTiles | None = None
+    solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> tuple[int, Contact | None]:
     """Solve loosely on coarser grids and put the start that follows into `start`, 0 if there is none; returns how many
     grids there are, and the contact if it was solved on tiles and holds at all points; collective."""
@@ -51,7 +51,9 @@ def start_on_coarse_grids(
 class _Descent:
     """From coarse grids to finer ones, on tiles of a grid as long as these are few."""
 
-    def __init__(self, solver: ContactSolver, problem: Problem, solver_on: SolverOn, on_tiles: OnTiles | None) -> None:
+    def __init__(
+        self, solver: ContactSolver, problem: Problem, solver_on: SolverOn, on_tiles: SolverOnTiles | None
+    ) -> None:
         self._solver, self._problem, self._solver_on = solver, problem, solver_on
         self._on_tiles, self._tally = on_tiles if problem.constraint.bounds[0] == 0.0 else None, solver.slab.tally
         self._cost, self._before = 0.0, self._tally["operator"]
@@ -91,10 +93,8 @@ class _Descent:
         """The tiles of a level that may touch, if they are few."""
         if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
             return None
-        if self._on_tiles is None or not self._on_tiles.work_on(level.slab):
-            return None
         below, law = (*self._blocks, self._below), self._problem.constraint
-        return tiles.choose(*below, level.slab, level.heights, law, self._on_tiles.periodic)
+        return tiles.choose(*below, level.slab, level.heights, law)
 
     def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> tiles.OnTheseTiles:
         """Solve on tiles of a level from p."""
