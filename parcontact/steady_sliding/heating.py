@@ -44,6 +44,8 @@ def warm(
     body without the interface.
     """
     slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
+    if not speed:  # nothing is dissipated
+        return Flash(), slab.zeros()
     place = fft, size, section.conductor, velocity
     made = sliding_heat_unbounded if setup.half_space.free else sliding_heat
     operator = partial(made, *place, time=section.sliding_time(setup.grid, speed))

@@ -24,7 +24,9 @@ SCENES: dict[str, tuple[Json, Json, tuple[float, float]]] = {
 }
 
 
-def job(grid: Json, surface: Json, velocity: tuple[float, float], branches: int = 2, tolerance: float = 5e-3) -> Job:
+def job(
+    grid: Json, surface: Json, velocity: tuple[float, float], branches: int = 2, tolerance: float = 5e-3, **more: Json
+) -> Job:
     times = [{"modulus": 1e6, "relaxation_time": 10.0 ** -(k / 4 + 1)} for k in range(branches)]
     return Job.model_validate(
         {
@@ -34,6 +36,7 @@ def job(grid: Json, surface: Json, velocity: tuple[float, float], branches: int 
             "initial": {"state": "steady", "velocity": velocity, "pressure": 1e5},
             "history": [{"pressure": 1e5, "velocity": velocity, "duration": 1e-4, "time_step": 1e-5}],
             "numerics": {"branch_error": 0.0, "tolerance": tolerance},
+            **more,
         }
     )
 
@@ -119,3 +122,14 @@ def test_at_rest_the_body_is_relaxed() -> None:
     assert point.friction == 0.0
     assert point.measures.contact_area == elastic.contact_area
     assert point.measures.max_pressure == pytest.approx(elastic.max_pressure, rel=1e-5)
+
+
+def test_at_rest_nothing_is_warm() -> None:
+    """A start at rest makes no heat, so that there is no time in which it warmed the rubber."""
+    thermal = {"conductivity": 0.2, "diffusivity": 1e-7}
+    planned = job({"points": 16, "boundary": "free"}, SPHERE, (0.0, 0.0), thermal=thermal)
+    march = start.first(planned, Slab.alone(16, 16))
+    assert march.scene.followers["thermal"].values() == (0.0, 0.0)
+    point = SteadySliding(march.scene.setup).solve((0.0, 0.0), 1e5)
+    assert point.flash is not None
+    assert (point.flash.mean, point.flash.highest) == (0.0, 0.0)
