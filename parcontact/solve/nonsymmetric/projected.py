@@ -83,6 +83,10 @@ class Projected:
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
         now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
+        if not now > 0.0:  # changes made on earlier sets took all load off this one; the first direction leaves its sum
+            np.multiply(self.t[0], sums[3] / (sums[6] - sums[0] ** 2 / members), out=x, where=working)
+            np.subtract(self.t[2], x, out=x, where=working)
+            now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
         self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > self._least_cut * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
