@@ -1,25 +1,31 @@
 #!/usr/bin/env python3
-"""Jobs and files that nobody would write: each must run, or end in a sentence, soon, in little memory, without a trace.
+"""Jobs of all sections mixed, sound and broken: what `check` accepts runs, and the rest ends in a sentence.
 
     .venv/bin/python scripts/fuzz_jobs.py [--jobs 2000] [--seed 0] [--only NUMBER]
 
-A third of the jobs are texts with characters changed, cut, doubled or put in; a third sound jobs with some values
-changed to extreme ones or to values of another kind; a third sound jobs with a file of heights, or a job file, that is
-damaged, of another type or length, no regular file, or leads elsewhere. All are driven in this process: read,
-described, built, and marched a few steps. Counted as faults: exceptions other than those that say a sentence, more than
-3 s of CPU time to refuse, files left after a refusal, results that are not finite, and more than 1 GB. Ends with 0 if
-there are none.
+Jobs are drawn by tests/robustness/any_job.py, on grids of a few hundred points. Half of them stay as they are. In a
+quarter some values are changed to extreme ones or to values of another kind. The others have characters of the text
+changed, cut, doubled or put in, or a file of heights, or a job file, that is damaged, of another type or length, no
+regular file, or leads elsewhere. All go through the command line, in this process: `check`, then the run.
+
+Counted as faults: an exception that is not a sentence, a warning of NumPy, a run that refuses what `check` accepts or
+fails for a reason that is none of physics, a result that is not finite or out of its bounds (area, pressure, load,
+energies), a mistake without its place, more than 3 s of CPU time to refuse, files left after a refusal, and more than
+1 GB. Ends with 0 if there are none.
 """
 
 import contextlib
+import csv
 import io
 import math
 import os
+import re
 import resource
 import signal
 import sys
 import tempfile
 import time
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from functools import partial
@@ -28,53 +34,31 @@ from random import Random
 from typing import Any
 
 import campaign
+import h5py
 import numpy as np
-import runs
 import yaml
+from runs import ROOT
 
+sys.path.insert(0, str(ROOT / "tests"))
+
+from robustness import any_job
+
+from parcontact import __main__
 from parcontact import job as jobs
-from parcontact.errors import InputError, RunError
-from parcontact.history.timeline import Timeline
+from parcontact.effects.adhesion import chosen_range
+from parcontact.job.checks import limits
 from parcontact.job.text import yamltext
-from parcontact.scene import sanity
 
 CPU_SECONDS = 3.0  # to refuse a job
-HANG_SECONDS = 20.0  # of CPU time for all that is done with a job
+HANG_SECONDS = 60.0  # of CPU time for all that is done with a job
 BYTES = 1e9
-POINTS = 2**14  # of a grid that is built here
-STEPS = 3  # that are made of a history
-ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1.25e-4, "rms_slope": 0.1}
-ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]}
-KELVIN = {"model": "zener", "poisson": 0.4, "branches": [{"G0": 2.75e6, "G1": 3e5, "eta1": 3e3}]}
-PRESS = {"name": "press", "pressure": 1e4, "duration": 1e-3, "time_step": {"first": 1e-5, "growth": 1.5}}
-SLIDE = {"pressure": 1e4, "velocity": [0.1, 0.0], "distance": 1e-4, "cells_per_step": 1}
-BASES: tuple[dict[str, Any], ...] = (
-    {"grid": {"points": 16, "size": 1e-3}, "surface": ROUGH, "material": ZENER, "history": [PRESS, SLIDE]},
-    {
-        "title": "a sphere",
-        "grid": {"points": [16, 12], "size": [1.5e-3, 1e-3], "boundary": "free"},
-        "surface": [{"shape": "sphere", "radius": 1e-2, "center": [7e-4, 5e-4], "profile": "exact"}],
-        "material": KELVIN,
-        "history": [{"force": 1e-2}, {"approach": {"from": 1e-5, "to": 2e-5}, "duration": 1e-3, "time_step": 2e-4}],
-        "numerics": {"tolerance": 1e-3, "integrator": "backward-euler", "kernel": "love"},
-    },
-    {
-        "grid": {"points": 16, "size": 1e-3},
-        "surface": [{"shape": "wave", "amplitude": 1e-6, "waves": [1, 2], "phase": 0.5}, {"shape": "flat"}],
-        "material": {"model": "elastic", "shear_modulus": 1e6, "poisson": 0.3},
-        "history": [{"pressure": 1e4}, {"pressure": {"from": 1e4, "to": 0.0}, "duration": 1.0, "time_step": 0.3}],
-        "output": {"fields": ["pressure", "gap"], "every": 2, "energy": True},
-        "checkpoint": {"every": 3, "keep": 1},
-    },
-    {
-        "grid": {"points": 16, "size": 1e-3},
-        "surface": {"shape": "cylinder", "radius": 1e-2, "axis": "y"},
-        "material": {"include": "synthetic_tyre"},
-        "initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4},
-        "history": [{"pressure": 1e4, "velocity": 0.1, "duration": 1e-3, "time_step": 3e-4}],
-        "steady": {"velocities": "1e-3:1:3", "pressures": [1e4]},
-    },
-)
+POINTS = 2**12  # of a grid on which a job is run here
+STEPS = 400  # of a history that is run here
+LATER = 8.0  # times the tolerance that steps may have
+SLACK = 1e-6  # of a load, relative: sums over all points
+DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
+PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S")
+NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points are nan)", re.IGNORECASE)
 EXTREME = (
     *(0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300, 1.7e308, -1e300, 1e18, 2**31,
     2**63, 2**64), *(2**128, 10**40, -(10**40), math.inf, -math.inf, math.nan, True, False, None, "", "x",
@@ -91,44 +75,163 @@ SPLICES = (
 BOMB = "\n".join(["b0: &b0 [x]", *(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 9)}]" for i in range(1, 12))])
 
 
-class HangError(Exception):
-    """More CPU time than anything here may take."""
+class HangError(BaseException):
+    """More CPU time than anything here may take; no code of the program catches it."""
 
 
-def drive(path: Path) -> str:
-    """Do with a job in this process what the program would do: how it ended."""
-    began = time.process_time()
-    try:
-        job = jobs.load_cases(path)[0].job
-    except InputError as error:
-        if not 0 < len(str(error).strip()) <= 50_000:
-            raise AssertionError(f"a message of {len(str(error))} characters") from error
-        if (spent := time.process_time() - began) > CPU_SECONDS:
-            raise HangError(f"{spent:.1f} s to refuse it") from error
-        return "refused"
-    jobs.describe(job)
-    again = jobs.Job.model_validate(yamltext.parse(job.resolved(), "resolved").data, context=None)
-    assert again.material == job.material or job.included, "the resolved job is another one"
-    assert again.title == job.title, "the resolved job has another title"
-    timeline = Timeline.of(job)
-    _ = job.warnings, [timeline[n] for n in {1, timeline.count // 2, timeline.count} if 1 <= n <= timeline.count]
-    try:
-        sanity.refuse_impossible(job, timeline)
-        if job.grid.nx * job.grid.ny > POINTS:
-            return "large"
-        marching = runs.begun(job)
-        sanity.check_heights(marching.scene.setup)
-        watch = sanity.ContactWatch(job.numerics.strict, timeline)
-        for step, _ in zip(timeline, range(STEPS), strict=False):
-            m = marching.advance(step).measures
-            watch.judge(step.number, m)
-            values = (m.pressure, m.force_x, m.friction, m.contact_area, m.approach, m.mean_gap, m.max_pressure)
-            assert all(map(math.isfinite, values)), f"not finite: {m}"
-    except InputError:
-        return "refused"
-    except RunError:
-        return "failed to run"
-    return "ran"
+# -- what the program does with a job ---------------------------------------------------------------------------------
+
+
+def command(*words: str | Path) -> tuple[int, str]:
+    """The exit code of a command line, and what it said: mistakes and warnings of `check`, all of a quiet run."""
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said if "--quiet" in words else io.StringIO()), contextlib.redirect_stderr(said):
+        try:
+            code = __main__.main([str(word) for word in words])
+        except SystemExit as error:
+            code = int(error.code or 0)
+    return code, said.getvalue()
+
+
+def drive(path: Path, here: Path) -> Iterator[str]:
+    """Check a job, and run it if that accepts it: yields how it ended, then faults."""
+    before, began = listing(here), time.process_time()
+    code, said = command("check", path)
+    spent = time.process_time() - began
+    if code == REFUSED:
+        yield "refused"
+        yield from refusal_faults(said)
+        if spent > CPU_SECONDS:
+            yield f"{spent:.1f} s to refuse it"
+        if listing(here) != before:
+            yield f"wrote {listing(here) - before}"
+        return
+    if code != DONE:
+        yield "ended in check"
+        yield f"check ends with {code}: {said[-400:]}"
+        return
+    cases = jobs.load_cases(path)
+    if any(is_large(case.job) for case in cases):
+        yield "large"
+        return
+    code, said = command(path, "--out", here / "results", "--quiet")
+    yield {DONE: "ran", FAILED: "failed to run", REFUSED: "refused by the run"}.get(code, f"ended with {code}")
+    yield from run_faults(code, said)
+    for case in cases:
+        for directory in {found.parent for found in (here / "results").rglob("measures.csv")}:
+            yield from history_faults(directory, case.job)
+        for table in (here / "results").rglob("steady.csv"):
+            yield from curve_faults(table, case.job)
+
+
+def is_large(job: jobs.Job) -> bool:
+    """Whether a job is too much for a campaign of thousands."""
+    steps = limits.count_steps(job.grid, job.history)
+    points = len(job.steady.velocities) * len(job.steady.pressures or (1,)) if job.steady else 0
+    return job.grid.nx * job.grid.ny > POINTS or steps > STEPS or points > STEPS
+
+
+def refusal_faults(said: str) -> Iterator[str]:
+    """Faults of what is said of a mistake."""
+    if not 0 < len(said.strip()) <= 50_000:
+        yield f"a message of {len(said)} characters"
+    if "Traceback" in said:
+        yield f"a traceback: {said[-300:]}"
+    for line in said.strip().splitlines():
+        if not PLACE.match(line):
+            yield f"a mistake without its place: {line[:200]}"
+
+
+def run_faults(code: int, said: str) -> Iterator[str]:
+    """Faults of how a run ended; a load that cannot be borne is physics, a solve that does not converge is not."""
+    if "Traceback" in said:
+        yield f"a traceback: {said[-400:]}"
+    elif code == REFUSED:
+        yield f"check accepts what the run refuses: {said[-400:]}"
+    elif code not in (DONE, FAILED):
+        yield f"ended with {code}: {said[-400:]}"
+    elif code == FAILED and not any(reason in said for reason in PHYSICS):
+        yield f"no reason of physics: {said[-500:]}"
+    if NOT_FINITE.search(said):
+        yield f"says nan or inf: {said[-400:]}"
+
+
+PHYSICS: tuple[str, ...] = ()  # what a run that fails may say
+
+
+# -- results ----------------------------------------------------------------------------------------------------------
+
+
+def rows_of(table: Path) -> Iterator[dict[str, float]]:
+    """Rows of a table of numbers, without what is empty."""
+    with table.open() as lines:
+        for row in csv.DictReader(lines):
+            yield {name: float(text) for name, text in row.items() if text not in ("", None)}
+
+
+def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
+    """Faults of a table of measures and of maps of pressure."""
+    stick, hardness = job.section("adhesion"), job.material.hardness
+    most = math.inf if hardness is None else hardness * (1.0 + SLACK)
+    beside = LATER * job.numerics.tolerance  # of the law, as far as certificates allow
+    least = -stick.work / range_of(job) * (1.0 + beside) if stick else 0.0
+    for row in rows_of(directory / "measures.csv"):
+        yield from row_faults(f"step {row['step']:g}", row, most)
+        if not stick:
+            yield from load_faults(row, job)
+    fields = directory / "fields.h5"
+    if fields.exists():
+        with h5py.File(fields) as file:
+            for pressure in file.get("pressure", ()):
+                if not (np.all(pressure >= least) and np.all(pressure <= most)):
+                    yield f"pressures from {np.min(pressure):g} to {np.max(pressure):g} Pa, not {least:g} to {most:g}"
+
+
+def load_faults(row: dict[str, float], job: jobs.Job) -> Iterator[str]:
+    """Faults of the load of a step: at its time each stage that has begun and not ended may be the one."""
+    if not row["step"]:
+        return
+    began, box, loads = 0.0, job.grid.lx * job.grid.ly, list[tuple[str, float, float]]()
+    for stage in job.history:
+        share = (row["time"] - began) / stage.seconds if stage.seconds else float(row["time"] != began)
+        began += stage.seconds
+        if -SLACK <= share <= 1.0 + SLACK and not (share and not stage.seconds):
+            load = stage.load.start + min(max(share, 0.0), 1.0) * (stage.load.end - stage.load.start)
+            name, unit = (
+                "approach" if stage.control == "approach" else "pressure",
+                box if stage.control == "force" else 1.0,
+            )
+            most = max(abs(stage.load.start), abs(stage.load.end)) / unit
+            loads.append((name, load / unit, most))
+    if not any(abs(row[name] - load) <= SLACK * most for name, load, most in loads):
+        yield f"step {row['step']:g} at {row['time']:g} s: {row['pressure']:g} Pa, {row['approach']:g} m, not {loads}"
+
+
+def range_of(job: jobs.Job) -> float:
+    section = job.section("adhesion")
+    return float(section.range) if section.range != "auto" else float(chosen_range(job) or math.nan)
+
+
+def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
+    """Faults of the numbers of a step, or of a point of a curve."""
+    wrong = [name for name, value in row.items() if not math.isfinite(value) and name != "seconds"]
+    if wrong:
+        yield f"{where}: not finite: {', '.join(wrong)}"
+    area, corrected = row["contact_area"], row.get("contact_area_corrected", 0.0)
+    if not 0.0 <= corrected <= area * (1.0 + SLACK) <= 1.0 + 2.0 * SLACK:
+        yield f"{where}: contact area {area:g}, corrected {corrected:g}"
+    if not 0.0 <= row["max_pressure"] <= most:
+        yield f"{where}: max_pressure {row['max_pressure']:g} Pa, at most {most:g}"
+    if row["pressure"] > row["max_pressure"] * (1.0 + SLACK):
+        yield f"{where}: mean pressure {row['pressure']:g} above the highest, {row['max_pressure']:g}"
+    if row["friction"] < 0.0:
+        yield f"{where}: friction {row['friction']:g}"
+
+
+def curve_faults(table: Path, job: jobs.Job) -> Iterator[str]:
+    """Faults of a friction curve."""
+    for row in rows_of(table):
+        yield from row_faults(f"{row['velocity']:g} m/s", row, math.inf)
 
 
 def listing(directory: Path) -> set[str]:
@@ -152,22 +255,21 @@ def bounded() -> Iterator[None]:
 
 def trial(seed: int, counts: Counter[str], number: int) -> Iterator[str]:
     """Faults of one job."""
-    with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
+    with tempfile.TemporaryDirectory() as name, contextlib.chdir(name), warnings.catch_warnings():
+        warnings.simplefilter("error")
         dice, here = Random(f"{seed} {number}"), Path(name)
-        path = dice.choice([changed_text, changed_values, changed_file])(dice, here)
-        before = listing(here)
-        with bounded(), contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            ended = drive(path)
-        counts[ended] += 1
-        if ended == "refused" and listing(here) != before:
-            yield f"wrote {listing(here) - before}"
+        made = dice.choices([as_drawn, changed_values, changed_text, changed_file], [4, 2, 1, 1])[0]
+        path = made(dice, here)
+        try:
+            with bounded():
+                ended, *faults = drive(path, here)
+        except HangError as error:
+            ended, faults = "hung", [str(error)]
+        counts[f"{made.__name__.replace('_', ' ')}: {ended}"] += 1
+        yield from faults
 
 
 # -- making them ---
-
-
-def _base(dice: Random) -> dict[str, Any]:
-    return yaml.safe_load(yaml.safe_dump(dice.choice(BASES)))
 
 
 def _write(directory: Path, text: str) -> Path:
@@ -176,8 +278,12 @@ def _write(directory: Path, text: str) -> Path:
     return path
 
 
+def as_drawn(dice: Random, directory: Path) -> Path:
+    return _write(directory, yamltext.dump(any_job.draw(dice, directory)))
+
+
 def changed_text(dice: Random, directory: Path) -> Path:
-    text = yamltext.dump(_base(dice))
+    text = yamltext.dump(any_job.draw(dice, directory))
     for _ in range(dice.choice([1, 1, 2, 4])):
         place, size = dice.randrange(len(text) + 1), dice.randint(0, 20)
         character = chr(dice.choice([dice.randrange(32, 127), dice.randrange(0xD7FF)]))
@@ -202,7 +308,7 @@ def leaves(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def changed_values(dice: Random, directory: Path) -> Path:
-    data = _base(dice)
+    data = any_job.draw(dice, directory)
     for _ in range(dice.choice([1, 1, 1, 2, 3])):
         *way, last = dice.choice(list(leaves(data)))
         node: Any = data
@@ -227,7 +333,8 @@ def changed_file(dice: Random, directory: Path) -> Path:
         return odd_file(dice, directory / "job.yaml")
     path = directory / f"road.{dice.choice(['npy', 'txt', 'xyz'])}"
     part = {"shape": "topography", "unit": "m", "size": [1e-3, 1e-3]} if path.suffix == ".xyz" else {"shape": "file"}
-    job = _write(directory, yamltext.dump({**_base(dice), "surface": {**part, "path": path.name}}))
+    grid, surface = {"points": 16, "size": 1e-3}, {**part, "path": path.name}
+    job = _write(directory, yamltext.dump({**any_job.draw(dice, directory), "grid": grid, "surface": surface}))
     heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((16, 16))
     odd = (heights * 1e300, heights * 1e-310, heights[:12], heights[0], heights.astype("S8"), heights * 1j)
     heights = dice.choice([*6 * [heights], *odd])

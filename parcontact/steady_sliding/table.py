@@ -129,7 +129,7 @@ class CurveTable:
                 self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
         lost = {f"dissipated_{k}": power for k, power in enumerate(point.dissipated)}
         cells = [lost[name] if name in lost else value_of(point, name) for name in self._names]
-        self._file.append([repr(float(value)) for value in cells])
+        self._file.append(tables.texts(float(value) for value in cells))
         self._points.append(point)
         self.say(
             f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.errors.area.total)} "

@@ -162,3 +162,4 @@ def test_one_point_is_a_flat_surface(main: Main, tmp_path: Path) -> None:
     assert code == 0, err
     (row,) = rows(tmp_path / "out" / "job" / "steady.csv")
     assert (float(row["contact_area"]), float(row["friction"]), float(row["max_pressure"])) == (1.0, 0.0, 1e5)
+    assert row["error_friction"] == "", "an error that cannot be relative is empty"
