@@ -3,17 +3,14 @@
     .venv/bin/python scripts/bench.py [PART...] [--points 512] [--rounds 15] [--json FILE] [--peers DIRECTORY]
 
     solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
-    dilute   cold elastic solves at 0.07 to 2 % contact on two and four times as many points: in free boxes, with
+    dilute   cold elastic solves in free boxes at 0.07 to 2 % contact on two and four times as many points; with peers,
              aspher's
     free     operator calls of cold solves in free boxes at 0.2 to 35 % contact to a pressure error of 1e-5: on
              512 x 512 points, and on ever finer grids
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
-    sticking operator calls of steps with adhesion over those of the same steps without, in nine scenes, to the same
-             tolerance and to the same errors
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
-    layers   operator calls of layers over those of the half space, at equal contact area: for --points 128 --rounds 5
     folded   what branches without a map save, and what friction is then wrong by
     effects  what each effect adds to a step at equal iterations; --picture draws it
     flow     leakage through the gap of a contact of 30 %, along x and along y: for --points 2048
@@ -44,13 +41,11 @@ import runs
 from bench.adhesive import adhesion
 from bench.dilute import dilute, free
 from bench.effects import effects
-from bench.layers import layers
 from bench.leakage import flow
 from bench.program import start
 from bench.scaling import WORLD, march, scale
 from bench.slides import folded, slide, steady
 from bench.solves import large, sizes, solve
-from bench.sticking import sticking
 from bench.table import Line
 
 FEWEST = 64  # points along a side
@@ -63,9 +58,7 @@ PARTS |= {
     "adhesion": adhesion,
     "dilute": dilute,
     "free": free,
-    "layers": layers,
     "flow": flow,
-    "sticking": sticking,
 }
 ON_TWO_RANKS = {"march": march, "scale": scale}
 

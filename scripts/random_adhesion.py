@@ -1,39 +1,32 @@
 #!/usr/bin/env python3
 """Random scenes of contacts that stick: laws, surfaces, bodies, loads, rates and grids; every run must come to its end.
 
-    .venv/bin/python scripts/random_adhesion.py [--scenes 200] [--seed 0] [--only NUMBER] [--finer 10] [--sample 10]
+    .venv/bin/python scripts/random_adhesion.py [--scenes 200] [--seed 0] [--only NUMBER] [--finer 10]
 
 A scene that was not pulled off under a load ends after its last step. After each step the gap is not negative, the
 pressure is minus the attraction where the gap is open, energies add up, and what snaps lose never falls. A solve that
 does not reach its tolerance is a fault. Each scene is made again in steps `--finer` times as short: where contact ends
-in one of both, it ends in the other, but for a step. One scene of `--sample` is made again on three ranks, to the same
-pressures and areas, and from a checkpoint in its middle, to the same bits. 0 leaves these out. Ends with 0 if all held.
+in one of both, it ends in the other, but for a step; 0 leaves that out. Restarts and ranks: tests/march. Ends with 0 if
+all held.
 """
 
-import json
 import math
-import subprocess
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
-from pathlib import Path
 from random import Random
 from typing import Any
 
 import campaign
 import numpy as np
 import runs
-from mpi4py import MPI
 from numpy.typing import NDArray
 
-import parcontact as pc
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march.loop import March
-from parcontact.python.row import Row
 
 MODULUS = 1e6  # Pa; of the relaxed body
 STEPS = 12  # of a stage
@@ -41,8 +34,6 @@ BALANCE = 1e-9  # of the largest energy: rounding
 WRONG = 0.05  # of all pressure: certificates allow a gap to be wrong by a part of the range
 LEAST = 1e-3  # of the strength, or of the work of adhesion: less is none
 LATE = 1.5  # steps: between the ends of contact with longer and with shorter ones
-APART = 0.05  # of the largest: areas and pressures on one rank and on three
-RANKS = 3
 Map = NDArray[np.float64]
 
 
@@ -134,11 +125,9 @@ def violations(march: March, before: float) -> Iterator[str]:
         yield f"snaps give back {before - lost:g} J"
 
 
-def go(
-    job: dict[str, Any], counts: Counter[str], comm: MPI.Intracomm = MPI.COMM_SELF, checks: bool = True
-) -> tuple[March, Map, list[str]]:
+def go(job: dict[str, Any], counts: Counter[str], checks: bool = True) -> tuple[March, Map, list[str]]:
     """March a job to its end: time, contact area and pressure of each step, and what was wrong, if it is checked."""
-    march, made, wrong, lost = runs.begun(Job.model_validate(job), comm=comm), [], list[str](), 0.0
+    march, made, wrong, lost = runs.begun(Job.model_validate(job)), [], list[str](), 0.0
     for step in march.steps():
         march.advance(step)
         row = march.row
@@ -158,8 +147,8 @@ def go(
     return march, np.array(made).reshape(-1, 3), wrong
 
 
-def trial(counts: Counter[str], seed: int, finer: int, sample: int, number: int) -> Iterator[str]:
-    """March a scene; once more in finer steps; and of some on several ranks, and from a checkpoint."""
+def trial(counts: Counter[str], seed: int, finer: int, number: int) -> Iterator[str]:
+    """March a scene, and once more in finer steps."""
     job = scene(Random(f"{seed} {number}"))
     about = f"({job['grid']['boundary']} {job['surface']['shape']} {job['material']['model']} {job['adhesion']['law']})"
     try:
@@ -168,15 +157,10 @@ def trial(counts: Counter[str], seed: int, finer: int, sample: int, number: int)
         counts["touched"] += bool(made[:, 1].max(initial=0.0) > 0.0)
         counts["came off"] += bool(march.detached)
         wrong += in_finer_steps(job, made, counts, finer) if finer else []
-        if sample and number % sample == 0:
-            wrong += [*on_ranks(seed, number, made), *restarted(job, len(made), counts)]
     except RunError as error:
         counts["failed"] += 1
         wrong = [str(error)[:250]]
     yield from (f"{about} {text}" for text in wrong)
-
-
-# -- the same scene in other ways --------------------------------------------------------------------------------------
 
 
 def in_finer_steps(job: dict[str, Any], made: Map, counts: Counter[str], finer: int) -> Iterator[str]:
@@ -205,58 +189,10 @@ def ends(made: Map, lasts: float) -> Iterator[float]:
             yield float(now[0])
 
 
-def on_ranks(seed: int, number: int, made: Map) -> Iterator[str]:
-    """By how much areas and pressures on several ranks differ from those on one."""
-    words = [Path(sys.executable).with_name("mpirun"), "-n", RANKS, sys.executable, __file__]
-    words += ["--seed", seed, "--only", number, "--inside"]
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=runs.environment())
-    if done.returncode:
-        yield f"on {RANKS} ranks: {done.stderr.strip()[-250:]}"
-        return
-    other = np.array(json.loads(done.stdout.splitlines()[-1])).reshape(-1, 3)
-    if len(other) != len(made):
-        yield f"{len(other)} steps on {RANKS} ranks, {len(made)} on one"
-        return
-    apart = np.abs(other - made).max(axis=0, initial=0.0) / np.maximum(np.abs(made).max(axis=0, initial=0.0), 1e-300)
-    for name, far in zip(("times", "areas", "pressures"), apart, strict=True):
-        if far > APART:
-            yield f"{name} on {RANKS} ranks and on one are {far:.2g} of the largest apart"
-
-
-def restarted(job: dict[str, Any], steps: int, counts: Counter[str]) -> Iterator[str]:
-    """Return what differs after a restart in the middle of so many steps."""
-    whole, rows = pc.Simulation(job, comm=MPI.COMM_SELF), list[tuple[float, ...]]()
-    with tempfile.TemporaryDirectory() as where:
-        file = Path(where, "middle.h5")
-        for row in whole.steps():
-            if row.step == steps // 2:
-                whole.save(file)
-            if row.step > steps // 2:
-                rows.append(numbers(row))
-        second = pc.Simulation.restore(file, comm=MPI.COMM_SELF)
-        later = [numbers(row) for row in second.steps() if row.step > steps // 2]
-    counts["restarts"] += 1
-    if later != rows:
-        yield f"rows differ after a restart at step {steps // 2}"
-    for name in ("gap", "pressure"):
-        if whole.field(name).tobytes() != second.field(name).tobytes():
-            yield f"maps of the {name} differ after a restart at step {steps // 2}"
-
-
-def numbers(row: Row) -> tuple[float, ...]:
-    return row.time, row.approach, row.pressure, row.contact_area, row.work, row.snap_loss, row.iterations
-
-
 def main() -> int:
-    more = {"finer": (10, "times as many steps, or 0"), "sample": (10, "scenes, of which one on ranks and restarted")}
-    options = campaign.parser(__doc__, trials=200, what="scenes", **more, inside=(False, "on several ranks"))
+    options = campaign.parser(__doc__, trials=200, what="scenes", finer=(10, "times as many steps, or 0"))
     asked, counts = options.parse_args(), Counter[str]()
-    if asked.inside:
-        _, made, _ = go(scene(Random(f"{asked.seed} {asked.only}")), counts, MPI.COMM_WORLD, checks=False)
-        if MPI.COMM_WORLD.rank == 0:
-            print(json.dumps(made.tolist()))
-        return 0
-    return int(campaign.go(asked, partial(trial, counts, asked.seed, asked.finer, asked.sample), counts) > 0)
+    return int(campaign.go(asked, partial(trial, counts, asked.seed, asked.finer), counts) > 0)
 
 
 if __name__ == "__main__":

@@ -80,6 +80,7 @@ def solve(tolerance):
     )
     return np.asarray(found.pressure).reshape(heights.shape)
 {COLD}"""
+ASPHER_DILUTE = ASPHER_COLD.replace('backend="periodic"', 'backend="h2", active_set=True')
 TAMAAS_ADHESIVE = f"""{TAMAAS}
 def solve(tolerance):
     model = tm.Model(tm.model_type.basic_2d, [1.0, 1.0], list(heights.shape))

@@ -42,22 +42,3 @@ def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
     for _ in range(66):
         slide.step()
     assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load
-
-
-@pytest.mark.parametrize("name", ["rough, elastic, middle", "rough, elastic, strong", "rough, rubber, middle"])
-def test_a_resolved_step_with_adhesion(name: str) -> None:
-    """It takes at most three times the operator calls of the same step without, and more than half of them: both are
-    solved to the same tolerance, or the one without to errors that are no larger."""
-    sticking = load_script("bench.sticking")
-    job = sticking.job_of(sticking.SCENES[name], 128)
-    plain = {key: value for key, value in job.items() if key != "adhesion"}
-    steps, without = sticking.count(job), sticking.count(plain)
-    exact = sticking.as_exact(job, plain, steps)
-    resolved = steps.front <= 1.0
-    assert resolved.sum() >= 5
-    assert not without.front.any()
-    for others in (exact, without):
-        assert 0.5 < steps.calls[resolved].sum() / others.calls[resolved].sum() < 3.0
-    own, allowed = (one.errors(sticking.count(each, 2e-5)) for one, each in ((exact, plain), (steps, job)))
-    assert own[0] <= allowed[0]
-    assert own[1] <= allowed[1]

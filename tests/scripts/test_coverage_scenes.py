@@ -10,7 +10,7 @@ from parcontact import job as jobs
 from parcontact import scene
 from parcontact.parallel.slab import Slab
 
-coverage_scenes = load_script("error_coverage.scenes")
+coverage_scenes = load_script("coverage_scenes")
 
 
 def sampled(number: int, finer: int, directory: Path) -> np.ndarray:
