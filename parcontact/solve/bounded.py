@@ -21,7 +21,7 @@ from .constraint import Cells, Mask, Set
 
 MAX_PASSES = 20  # accuracy: of scaling to the load, of which each takes in those that reach H; 2 or 3 do as a rule
 LOAD_ROUNDING = 1e-14  # accuracy: of the load, a smaller part of which cannot be told from none
-SNAP = 1.0 - 1e-12  # accuracy: of H: a higher pressure is H, as it was before it was scaled to another modulus
+SNAP = 1e-12  # accuracy: of H: pressures as near to H, or to 0, are H and 0, as they were for another modulus
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Bounded:
         factor = 1.0
         for _ in range(MAX_PASSES):
             free, held = slab.sum(*_scale_free(p, factor, self.highest))
-            if abs(free + held - total) <= LOAD_ROUNDING * total:
+            if abs(free + held - total) <= max(LOAD_ROUNDING * total, SNAP * self.highest):
                 return
             if free <= 0.0 or held >= total:
                 break
@@ -163,7 +163,8 @@ def _scale_free(p, factor, highest):
         row_free, row_held = 0.0, 0.0
         for i in range(p.shape[1]):
             value = p[j, i] * factor if p[j, i] < highest else p[j, i]
-            value = highest if value > SNAP * highest else value
+            value = highest if value > (1.0 - SNAP) * highest else value
+            value = 0.0 if value < SNAP * highest else value
             p[j, i] = value
             yields = value >= highest
             row_free += 0.0 if yields else value

@@ -17,7 +17,8 @@ on the working set and put 0 elsewhere, `C` = subtract the mean over it:
    step fell short of or went too far; or `t = z` where that is much less of a descent, or where much of the last step
    was cut off;
 4. `p <- p - alpha t`, cut off at the bounds of p, with a step alpha that is nearly exact, the load that cutting off
-   adds taken back near by if it is much (`local_load`), then scaled to the mean P0;
+   adds taken back near by if it is much (`local_load`), then scaled to the mean P0; if p is bounded by a hardness that
+   is far less than the stiffness, shorter, so that few points go from one bound to the other at once;
 5. f must not rise: else the step is halved along this path, without the former, and the direction is forgotten.
 
 The exact step would be `<r, t>/<t, A t>`, for one more application of the operator in each iteration. It is 0.95 within
@@ -61,6 +62,7 @@ MAX_STEP_RATIO_FREE = (
 )
 ITERATIONS_UNTIL_EXACT_STEPS = 5  # without a better certificate
 LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
+REACH = 4.0  # times the highest pressure: no step that is not cut off moves a pressure further
 LARGE_CUT = 0.003  # of the load: if more is cut off a step at the bounds, the next one takes no notice of its direction
 # accuracy
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of <p, A p>/2: a smaller rise of f cannot be told from none
@@ -249,6 +251,9 @@ class ContactSolver:
         step was halved."""
         work, constraint, mean = self.workspace, problem.constraint, problem.mean
         step = usual if usual is not None else self._exact(problem, slope)
+        if constraint.bounds[1] < math.inf:
+            most, largest = REACH * constraint.bounds[1], self._largest(work.direction)
+            step = most / largest if step * largest > most else step
         for halvings in range(MAX_HALVINGS + 1):
             load, cut = self._local_load.advance(constraint, old_p, work.direction, step, p)
             if mean is not None:
@@ -262,6 +267,10 @@ class ContactSolver:
             work.swap_displacements()
             step *= 0.5
         return new if mean is None else new.settled(), cut / load if halvings == 0 and load > 0.0 else math.inf
+
+    def _largest(self, t: Array) -> float:
+        """The largest size of a map; collective."""
+        return max(self.slab.reduce((), [float(t.max(initial=0.0)), -float(t.min(initial=0.0))]))
 
     def _exact(self, problem: Problem, slope: float) -> float:
         """The step that makes f the smallest, for a slope along the direction; by one more application of the

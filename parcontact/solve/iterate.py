@@ -17,7 +17,11 @@ LEAST_HEIGHT = 1e-9  # accuracy: of the height of the surface, the same: for dis
 @dataclass(frozen=True)
 class Iterate:
     """An iterate in numbers, for an approach d: the sums of p, of `p (A p)^2` and of p g, the sums of p and of p g
-    over points that are free to move, and `energy = <p, A p>/2`."""
+    over points that are free to move, and `energy = <p, A p>/2`.
+
+    Where no point is free, `between` is the lowest and the highest approach for which no point has to move, or the
+    other way round if there is none.
+    """
 
     d: float
     load: float
@@ -26,6 +30,7 @@ class Iterate:
     squares: float
     free_load: float
     free_gaps: float
+    between: tuple[float, float] | None = None
 
     @property
     def f(self) -> float:
@@ -33,10 +38,16 @@ class Iterate:
         return self.gaps - self.energy
 
     def settled(self) -> "Iterate":
-        """The same iterate, for the d at which `<p, g> = 0` over free points (over all if none is free), but for the
-        rounding of d."""
-        load, gaps = (self.free_load, self.free_gaps) if self.free_load > 0.0 else (self.load, self.gaps)
-        d = self.d + gaps / load
+        """The same iterate, for the d at which `<p, g> = 0` over free points, but for the rounding of d.
+
+        If none is free it is the middle of `between`, or, with all pressures at one bound, the d for all points.
+        """
+        if self.between is not None:
+            d = 0.5 * sum(self.between)
+        elif self.free_load > 0.0:
+            d = self.d + self.free_gaps / self.free_load
+        else:
+            d = self.d + self.gaps / self.load
         rest = self.free_gaps - (d - self.d) * self.free_load
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load, free_gaps=rest)
 
@@ -77,4 +88,15 @@ def certify(
 def weigh(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
     """A pressure and its image u in numbers, for an approach d; collective."""
     load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.weigh(p, u, h, d))
-    return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps)
+    between = _approaches(slab, constraint, p, u, h) if free_load <= 0.0 < load else None
+    return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps, between)
+
+
+def _approaches(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array) -> tuple[float, float] | None:
+    """Return `Iterate.between`: all pressures are at a bound, and the gaps of those at the upper one are at most 0, of
+    the others at least 0; None if no pressure is at one of the bounds; collective."""
+    level, yields = u - h, p >= constraint.bounds[1]
+    lowest = float(level.max(where=yields, initial=-np.inf))
+    highest = float(level.min(where=~yields, initial=np.inf))
+    lowest, highest = slab.reduce((), [lowest, -highest])
+    return (lowest, -highest) if math.isfinite(lowest) and math.isfinite(highest) else None

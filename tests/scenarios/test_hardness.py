@@ -48,6 +48,18 @@ def test_where_all_yields_the_load_is_hardness_times_area() -> None:
 
 
 @pytest.mark.mpi
+def test_steel_of_a_round_hardness(comm: Any) -> None:
+    """1 GPa under 1 MPa on 100 x 100 points, of which ten yield; what people type. The load is made up of these."""
+    steel = {"model": "elastic", "shear_modulus": 8e10, "poisson": 0.3, "hardness": 1e9}
+    rough = {**ROUGH, "long_wavelength": 2.5e-4, "short_wavelength": 4e-5, "rms_slope": 0.2, "seed": 0}
+    grid = {"points": 100, "size": 1e-3}
+    _, rows = marched(scene(grid=grid, surface=rough, material=steel, history=[{"pressure": 1e6}]), comm=comm)
+    assert rows[-1].measures.contact_area == 1e-3
+    assert_allclose(rows[-1].measures.max_pressure, 1e9, rtol=1e-12)
+    assert_allclose(rows[-1].measures.pressure, 1e6, rtol=1e-12)
+
+
+@pytest.mark.mpi
 def test_a_slide_of_a_viscoelastic_body(comm: Any) -> None:
     """The hardness is the same pressure whatever the modulus of a step; contact grows and friction falls with it."""
     data = scene(grid=GRID, surface=ROUGH, material=ZENER, history=[PRESS, SLIDE])

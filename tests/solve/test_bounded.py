@@ -120,6 +120,32 @@ def test_where_all_yields_the_area_is_load_over_hardness(highest: float) -> None
     assert abs(np.count_nonzero(found.p) - mean * h.size / highest) <= rim
 
 
+@pytest.mark.parametrize(("boundary", "kernel"), BODIES)
+@pytest.mark.parametrize("points", [20, 64])
+@pytest.mark.parametrize("ratio", [1.6, 2.0, 4.0, 8.0, 16.0])
+def test_whole_numbers_of_points_that_yield(boundary: str, kernel: str, points: int, ratio: float) -> None:
+    """A soft counterbody yields at the highest `N = nx ny p/H` points, and none is free: any approach between the
+    heights, beside what the body gives way, of the last that touches and of the next one solves the problem; the middle
+    is returned. The body gives way by some 1e-6 of the heights."""
+    highest, h = 1e-6, rough(points, cells=4)
+    body = bounded(h, highest, boundary=boundary, kernel=kernel, tolerance=1e-9)
+    found = body.solve(h, MeanPressure(highest / ratio), np.zeros_like(h))
+    count, falling = round(h.size / ratio), np.sort(h.ravel())[::-1]
+    assert found.converged
+    np.testing.assert_array_equal(found.p, np.where(h >= falling[count - 1], highest, 0.0))
+    assert_allclose(found.d, -0.5 * (falling[count - 1] + falling[count]), rtol=0, atol=1e-5 * np.ptp(h))
+
+
+@pytest.mark.parametrize("stiff", [1e-3, 1e-2, 0.1])
+def test_calls_do_not_grow_with_the_stiffness_over_the_hardness(stiff: float) -> None:
+    """Loads of a quarter of a hardness that is far below the pressures of an elastic contact: some 20 iterations."""
+    h = rough(64)
+    body = bounded(h, stiff, tolerance=1e-4)
+    found = body.solve(h, MeanPressure(0.25 * stiff), np.zeros_like(h))
+    assert found.converged
+    assert found.iterations <= 30
+
+
 @pytest.mark.parametrize("mean", LOADS)
 def test_the_approach_that_comes_of_a_load(mean: float) -> None:
     """A periodic body, too, whose mean surface may now be below its undeformed level."""
