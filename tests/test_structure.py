@@ -28,6 +28,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"mesh"},
     {"march"},
     {"steady_sliding"},
+    {"bands"},
     {"run", "plan"},
     {"doctor", "study", "report"},
     {"manual"},
@@ -108,7 +109,7 @@ MADE_BY = {  # which modules make objects of a kind
     "ContactSolver": {"scene.scene"},
     "HalfSpace": {"scene.scene", "plan.memory"},
     "SteadySolver": {"steady_sliding.sliding"},
-    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample", "python.curves"},
+    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample"},
     "March": {"steady_sliding.start", "study.outcome"},
 }
 

@@ -42,6 +42,7 @@ def steady(options: argparse.Namespace) -> int:
 
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
+    from ..bands.road_sliding import make_states
     from ..report import prediction
     from ..steady_sliding import curve
 
@@ -49,7 +50,8 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows, getattr(options, "others_file", None))
+    others_file = getattr(options, "others_file", None)
+    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows, others_file, make_states)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code
@@ -83,6 +85,12 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[str]:
     """Return the doubts about a job, also those that only a look at heights and measured moduli raises; append what the
     look shows of measured maps and spectra to `notes`."""
     notes.append([])
+    if job.bands is not None:
+        from ..bands.choice import choose, describe_cut, doubts_of_bands
+
+        cut = choose(job)
+        notes[-1] += describe_cut(cut, job)
+        return doubts_of_bands(job, cut)
     if not job.depends_on_heights and not job.measured:
         return list(job.warnings)
     from ..parallel.slab import Slab
@@ -115,6 +123,10 @@ def plan(options: argparse.Namespace) -> int:
     if len(chosen) > 1:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
         lines = planner.plan_sweep(chosen, Groups(world, at_once))
+    elif chosen[0].job.bands is not None:
+        from ..bands.trial import plan_bands
+
+        lines = plan_bands(chosen[0].job, Slab(world, 1, 1))
     else:
         lines = planner.plan(chosen[0].job, Slab(world, *chosen[0].job.grid.points))
     for line in (*(f"warning: {text}" for text in doubts), *lines):

@@ -21,6 +21,7 @@ from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Stud
 from .sections.geometry import Shape
 from .sections.materials import Dma, Material, Zener, describe_temperature, heated
 from .sections.part import Instead, Origin, Part, Rule
+from .sections.spectral_bands import BAND_RULES, SomeBands
 from .sections.stages import Initial, Stage, Steady
 from .text.overrides import Included
 from .text.python_data import is_array
@@ -30,6 +31,9 @@ OF_A_SECTION = {  # keys that newcomers look for at the top of a job
     **dict.fromkeys(("load", "pressure", "force", "velocity"), Instead("give it to the stages of history")),
     "temperature": Instead("give it to the material"),
 }
+
+
+NO_GRID = {"points": 1, "size": 1.0}  # of a job in bands, each of which has a grid of its own
 
 
 class Job(Part):
@@ -47,6 +51,7 @@ class Job(Part):
     steady: Steady | None = None
     study: Study | None = None
     body: Body | None = None
+    bands: SomeBands | None = Field(default=None, description="auto, or a mapping with count, points and waves")
 
     _origin: Origin = PrivateAttr(default=Origin())
 
@@ -57,7 +62,7 @@ class Job(Part):
         Rule(("grid", "body", "initial", "steady"), limits.no_wake_in_a_layer),
         Rule(("grid", "steady"), limits.waves_are_independent),
         Rule(("surface",), limits.some_shape),
-        Rule(("grid", "surface"), limits.waves_fit),
+        Rule(("grid", "surface", "bands"), limits.waves_fit),
         Rule(("grid", "surface"), limits.arrays_fit),
         Rule(("history", "steady"), limits.some_history),
         Rule(("history", "initial"), limits.some_load),
@@ -68,12 +73,17 @@ class Job(Part):
         Rule(("material", "steady"), limits.temperatures_are_reached),
         Rule(("grid", "history"), limits.steps_can_be_made),
         Rule(("output",), limits.no_temperature),
+        Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
+        *BAND_RULES,
     )
+    at_most_one = (("grid", "bands"),)
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Number unnamed stages, choose the kernel by the boundary, and name the output after the job file."""
         data = prepared(data)
+        if data.get("bands") is not None:
+            data.setdefault("grid", dict(NO_GRID))
         free = isinstance(data.get("grid"), dict) and data["grid"].get("boundary") == "free"
         _default(data, "numerics", "kernel", "love" if free else "spectral")
         _default(data, "output", "directory", str(Path("out", context.path.stem if context else "job")))
@@ -127,6 +137,9 @@ class Job(Part):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about what is allowed but will probably disappoint; errors with `numerics.strict`."""
+        if self.bands is not None:
+            doubts = self.material.doubts if isinstance(self.material, Dma) else ()
+            return (*doubts, *meaning.of_moduli(self.material.fitted), *self._told("doubts"))
         return (
             *(self.material.doubts if isinstance(self.material, Dma) else ()),
             *advice.resolution(self, self.directions, chosen=bool(self._origin.mesh)),
@@ -168,6 +181,9 @@ class Job(Part):
     def at_temperature(self, temperature: float) -> Job:
         """Return the job with its material at another temperature [deg C]; raises InputError without a shift."""
         return self.model_copy(update={"material": heated(self.material, temperature)})
+
+    def left_out(self) -> tuple[str, ...]:
+        return ("grid",) if self.bands is not None else ()
 
     def section(self, name: str) -> Any:
         """Return the section that an effect has added, None if this job has not given it."""
@@ -236,6 +252,8 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
 def describe(job: Job) -> str:
     """Return a table of the job with every default and its unit; times and cells that follow from it come last."""
     rows = list(listing.rows(job))
+    if job.bands is not None:
+        return listing.layout(rows)
     rows.append(("cell", listing.text((job.grid.dx, job.grid.dy)), "m"))
     seconds = math.fsum(stage.seconds for stage in job.history)
     rows.append(("time", listing.text(seconds), "s"))

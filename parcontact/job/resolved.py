@@ -5,12 +5,22 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ..errors import InputError
-from .model import Job
+from .model import NO_GRID, Job
 from .text import yamltext
 
 RESOLVED = "job.resolved.yaml"
 STEADY_RESOLVED = "steady.resolved.yaml"
-SHOWN = ("title", "grid", "surface", "material", "initial", "history", "steady", "adhesion")  # others differ by version
+SHOWN = (
+    "title",
+    "grid",
+    "surface",
+    "material",
+    "initial",
+    "history",
+    "steady",
+    "adhesion",
+    "bands",
+)  # others differ by version
 FILES = ("file", "topography")  # shapes that come from files
 
 
@@ -22,6 +32,8 @@ def shown_job(path: Path) -> Job:
         data["surface"] = [
             {"shape": "flat"} if shape["shape"] in FILES or "spectrum" in shape else shape for shape in data["surface"]
         ]
+        if data.pop("bands", None) is not None:  # pictures of it are of its tables
+            data["grid"], data["surface"] = NO_GRID, [{"shape": "flat"}]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]

@@ -59,7 +59,8 @@ LEAST_WAY = 1e-60  # m: smaller weights are those of rest
 @dataclass(frozen=True)
 class Parts:
     """Relative errors by what makes them; of the mesh's part `across` is what the cells across the sliding make, 0
-    where nothing slides, and `edges` what edges of contact lose in waves shorter than the cells."""
+    where nothing slides, and `edges` what edges of contact lose in waves shorter than the cells. Of surfaces in bands
+    `method` is what their coupling makes, and `scatter` what other surfaces of the same spectrum do."""
 
     solver: float
     time: float
@@ -67,10 +68,12 @@ class Parts:
     mesh: float
     across: float = 0.0
     edges: float = 0.0
+    method: float = 0.0
+    scatter: float = 0.0
 
     @property
     def total(self) -> float:
-        return self.solver + self.time + self.folded + self.mesh
+        return self.solver + self.time + self.folded + self.mesh + self.method + self.scatter
 
     @property
     def along(self) -> float:
@@ -82,7 +85,7 @@ class Parts:
         return {name: getattr(self, name) for name in NAMES} | {"mesh_across": self.across, "total": self.total}
 
 
-NAMES = ("solver", "time", "folded", "mesh")  # that add up
+NAMES = ("solver", "time", "folded", "mesh", "method", "scatter")  # that add up
 LITTLE = 0.05  # of the error by the mesh: what one direction makes is not told
 SUMS = "budget/sums"  # in a checkpoint
 REMEDIES = {
@@ -92,9 +95,16 @@ REMEDIES = {
     "mesh": "a finer grid",
     "along": "more grid.points along the sliding",
     "across": "more grid.points across the sliding",
+    "method": "fewer bands with more points each (bands.count)",
+    "scatter": "more surfaces of each band (bands.samples)",
 }
 SMALLER = "a smaller numerics.accuracy"  # where it has chosen the setting
-SHOWN = {"time": "time steps", "folded": "folded branches"}  # names of parts in sentences
+SHOWN = {
+    "time": "time steps",
+    "folded": "folded branches",
+    "method": "coupling of bands",
+    "scatter": "surfaces",
+}  # names of parts in sentences
 ROUNDED = 1.01  # accuracy: errors are said with three digits, and no closer to a limit than that are they beyond it
 
 

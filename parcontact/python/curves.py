@@ -10,20 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bands.road_sliding import make_states
 from ..errors import JobError, RunError
 from ..job import log_range
 from ..job.checks.cells import more_points
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
-from ..scene import set_up
 from ..scene.sanity import ContactWatch
 from ..steady_sliding import curve
 from ..steady_sliding.heating import describe_hot
 from ..steady_sliding.point import Point
-from ..steady_sliding.sliding import SteadySliding
 from ..steady_sliding.table import describe_missed, value_of
 from ..storage.curve_points import Wanted
-from .given_jobs import Given, all_ranks, read, warn, warn_of
+from .given_jobs import Given, all_ranks, read, warn
 from .wording import python_words
 
 Array = NDArray[np.float64]
@@ -95,10 +94,11 @@ def steady(
     slab = Slab(all_ranks(comm), *found.grid.points)
     with python_words():
         wanted = curve.request(found, *asked.values())
-    base = set_up(found, slab)
-    warn_of(base, wanted.temperatures)
-    sliding = SteadySliding(base)
-    contacts = ContactWatch(found.numerics.strict, base.choices.timeline, more=more_points(found.grid))
+    sliding = make_states(found, slab)
+    for text in sliding.doubts(wanted.temperatures):
+        if slab.root:
+            warn(text)
+    contacts = ContactWatch(found.numerics.strict, sliding.setup.choices.timeline, more=more_points(found.grid))
     points: list[Point | None] = []
     failures: list[str] = []
     doubts: list[str] = []

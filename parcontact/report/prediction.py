@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import job as jobs
 from .. import scene
+from ..bands.choice import choose
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..history.timeline import Span, Timeline
@@ -84,8 +85,8 @@ class SteadyInstant(NamedTuple):
 
 
 def has_spectrum(job: Job) -> bool:
-    """Return whether the theory can do without the heights of a job: a periodic one with one rough surface."""
-    return job.grid.boundary == "periodic" and _only_rough(job) is not None
+    """Return whether the theory can do without the heights of a job: one in bands, or with one rough surface."""
+    return job.bands is not None or (job.grid.boundary == "periodic" and _only_rough(job) is not None)
 
 
 def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
@@ -209,6 +210,10 @@ def _on_body(job: Job, rings: Rings) -> Rings:
 
 def _continuum(job: Job, slide: float) -> Rings:
     """Return the spectrum between the limits of the job; the box holds no waves longer than its longer side."""
+    if job.bands is not None:
+        spectrum = choose(job).spectrum
+        phi = lambda k: np.asarray(spectrum.phi(k), float)  # noqa: E731
+        return persson_rings.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks)
     part = _only_rough(job)
     if part is None:
         raise InputError(ONE_ROUGH)

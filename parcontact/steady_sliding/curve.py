@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from .. import scene
 from ..errors import InputError, RunError
@@ -15,8 +15,8 @@ from ..job.checks.cells import more_points
 from ..job.sections import listing
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
-from ..parallel.slab import Slab
-from ..scene import sanity
+from ..parallel.slab import Array, Slab
+from ..scene import Setup, sanity
 from ..storage import curve_points, hdf5, marker, stopfile
 from ..storage.console import always
 from ..storage.curve_points import Wanted
@@ -24,8 +24,9 @@ from ..storage.directory import ADVICE, Directory
 from ..storage.provenance import Link, Provenance, cite_lines
 from ..storage.steady_maps import SteadyMaps
 from ..storage.stopfile import StopFile
+from .point import Point
 from .sliding import SteadySliding
-from .table import CurveTable
+from .table import WAVES, CurveTable
 
 DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
 SAME = (*marker.SCENE, *marker.EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
@@ -79,6 +80,34 @@ def _pressures(job: Job) -> tuple[float, ...]:
     return ()
 
 
+class States(Protocol):
+    """Steady states of a job at one velocity and pressure after the other, as a curve asks for them; collective.
+
+    `setup` says what they are of. `table` is the name of a further table with its columns, None without one; `rows`
+    are its lines for the last state at a velocity [m/s].
+    """
+
+    setup: Setup
+    table: tuple[str, Sequence[str]] | None
+
+    def doubts(self, temperatures: Sequence[float]) -> list[str]: ...
+
+    def notes(self) -> list[str]: ...
+
+    def heat(self, temperature: float) -> None: ...
+
+    def solve(self, velocity: tuple[float, float], pressure: float) -> Point: ...
+
+    def rows(self, velocity: tuple[float, float]) -> list[list[float]]: ...
+
+    def field(self, name: str) -> Array: ...
+
+
+def on_one_grid(job: Job, slab: Slab) -> States:
+    """Return the steady states of a job on its grid; collective."""
+    return SteadySliding(scene.set_up(job, slab))
+
+
 def run(
     job: Job,
     slab: Slab,
@@ -87,12 +116,13 @@ def run(
     restart: str = "auto",
     shows: Callable[[str], bool] = always,
     others_file: StopFile | None = None,
+    make: Callable[[Job, Slab], States] = on_one_grid,
 ) -> int:
     """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
 
     A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
     of the warnings those are printed that it `shows`. The file `others_file` stops it like its own stop file, and stays
-    where it is.
+    where it is. `make` makes the steady states.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -100,14 +130,15 @@ def run(
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
-        setup = scene.set_up(job, slab)
-        doubts = sanity.find_doubts(setup, wanted.temperatures)
-        sliding = SteadySliding(setup)
+        sliding = make(job, slab)
+        doubts = sliding.doubts(wanted.temperatures)
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:
             directory.clear()
         table = _table(directory.path, sliding, wanted, quiet)
         if table:
+            for text in sliding.notes():
+                table.say(text)
             table.warn(doubts, shows)
         maps = _maps(job, slab, wanted, directory)
         try:
@@ -135,10 +166,10 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
     return True
 
 
-def _table(path: Path, sliding: SteadySliding, wanted: Request, quiet: bool) -> CurveTable | None:
+def _table(path: Path, sliding: States, wanted: Request, quiet: bool) -> CurveTable | None:
     """Begin the tables, or continue them, on root; collective. Raises InputError where that cannot be."""
-    columns, made = (wanted.waves, bool(wanted.temperatures)), list[CurveTable]()
-    act = lambda: made.append(CurveTable(path, sliding, *columns, quiet))  # noqa: E731
+    further, made = WAVES if wanted.waves else sliding.table, list[CurveTable]()
+    act = lambda: made.append(CurveTable(path, sliding.setup, further, bool(wanted.temperatures), quiet))  # noqa: E731
     hdf5.on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
     return made[0] if made else None
 
@@ -157,7 +188,7 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
 class _Curve:
     """The points of a curve, one after the other; methods are collective."""
 
-    sliding: SteadySliding
+    sliding: States
     wanted: Request
     table: CurveTable | None
     maps: SteadyMaps | None
@@ -212,13 +243,13 @@ class _Curve:
             self.failures += 1
             self._say(f"parcontact: {error}")
             return
-        shares = self.sliding.shares(velocity) if self.wanted.waves else None
+        rows = self.sliding.rows(velocity) if self.wanted.waves or self.sliding.table else []
         if self.maps:
             self.maps.save(index, {name: self.sliding.field(name) for name in self.maps.names})
 
         def write() -> None:
             if table:
-                table.write(point, shares)
+                table.write(point, rows)
                 table.warn(self.watch.judge_point(point.measures, str(wanted)), self.shows)
 
         hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +17,8 @@ from ..physics.convolution import Convolution
 from ..physics.flash import Flash
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
-from ..physics.time_error import StepObservation
-from ..scene import Setup, choices
+from ..physics.time_error import RunProperties, StepObservation
+from ..scene import Setup, choices, sanity
 from ..solve import kernels, nested
 from ..solve.local_load import LEAST_CUT
 from ..solve.nonsymmetric import proximal
@@ -44,6 +44,15 @@ class Level:
     slab: Slab
     fft: FFT
     heights: Array
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """A contact under a map of heights, and its friction by energy without an interface."""
+
+    contact: SteadyContact
+    heights: Array
+    by_energy: float
 
 
 Make = Callable[[Level, Vector], tuple[SteadySolver | Proximal, Convolution]]
@@ -126,7 +135,8 @@ class SteadySliding:
             raise RunError(f"{what}: its results would not be finite")
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
-        friction, errors = self._judge(contact, by_energy, velocity, measures)
+        state = SteadyState(contact, heights, by_energy)
+        friction, errors = judge_state(self.setup, self._known, state, velocity, measures)
         flash = self._warm(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
@@ -154,30 +164,20 @@ class SteadySliding:
             return heights * setup.units.height + setup.surface.datum
         return (contact.u if name == "displacement" else contact.u - heights - contact.d) * setup.units.height
 
-    def _judge(
-        self, contact: SteadyContact, by_energy: float, velocity: Vector, measures: Measures
-    ) -> tuple[float, ErrorBudget]:
-        """Return friction from that by energy, with what an interface adds, and how wrong it and the area are;
-        collective."""
-        setup, (x, y) = self.setup, _direction(velocity)
-        touching = SteadySolver.constraint.touches(contact.p)
-        load, rise = setup.slab.sum(*slope_under(contact.p, touching, self.levels[0].heights))
-        slopes = -(measures.force_x * x + measures.force_y * y) / measures.normal_force
-        friction = by_energy + measures.friction_interface
-        seen = StepObservation(
-            contact.certificate.complementarity,
-            difference=0.0,
-            order=2.0,
-            slope=math.sqrt(rise / load) / (2.0 * setup.grid.dx) * setup.units.height,
-            friction=friction,
-            area=measures.contact_area,
-            corrected=measures.contact_area_corrected,
-            penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
-            views_apart=abs(slopes - friction),
-            interface=measures.friction_interface,
-            way=velocity,
-        )
-        return friction, estimate_steady(replace(self._known, prony=setup.prony), seen, setup.slab.points)
+    table: tuple[str, Sequence[str]] | None = None
+
+    def doubts(self, temperatures: Sequence[float]) -> list[str]:
+        """Return warnings about the job, also at these temperatures [deg C]; collective."""
+        return sanity.find_doubts(self.setup, temperatures)
+
+    def notes(self) -> list[str]:
+        return []
+
+    def rows(self, velocity: Vector) -> list[list[float]]:
+        """Return the lines of steady_waves.csv for the last state. Collective."""
+        assert self.contact is not None
+        place = math.hypot(*velocity), self._pressure
+        return [[*place, *pair] for pair in zip(*map(np.ndarray.tolist, self.shares(velocity)), strict=True)]
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
         """Return the wavelengths [m] of `branch_powers`, and what share of the friction power the waves from each to
@@ -280,6 +280,31 @@ class SteadySliding:
         """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
         body, moved = self.setup.half_space, (level.fft, self.setup.in_units(velocity), self.setup.prony)
         return body.sliding_operator(*moved), body.sliding_inverse(*moved)
+
+
+def judge_state(
+    setup: Setup, known: RunProperties, state: SteadyState, velocity: Vector, measures: Measures
+) -> tuple[float, ErrorBudget]:
+    """Return friction by energy, with what an interface adds, and how wrong it and the area are; collective."""
+    contact, (x, y) = state.contact, _direction(velocity)
+    touching = SteadySolver.constraint.touches(contact.p)
+    load, rise = setup.slab.sum(*slope_under(contact.p, touching, state.heights))
+    slopes = -(measures.force_x * x + measures.force_y * y) / measures.normal_force
+    friction = state.by_energy + measures.friction_interface
+    seen = StepObservation(
+        contact.certificate.complementarity,
+        difference=0.0,
+        order=2.0,
+        slope=math.sqrt(rise / load) / (2.0 * setup.grid.dx) * setup.units.height,
+        friction=friction,
+        area=measures.contact_area,
+        corrected=measures.contact_area_corrected,
+        penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
+        views_apart=abs(slopes - friction),
+        interface=measures.friction_interface,
+        way=velocity,
+    )
+    return friction, estimate_steady(replace(known, prony=setup.prony), seen, setup.slab.points)
 
 
 def tolerance_of(asked: float) -> float:

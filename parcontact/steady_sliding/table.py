@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from .. import progress
 from ..effects.interface import InterfaceColumns
@@ -12,13 +11,13 @@ from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
 from ..physics.budget import advice, describe, exceeds
+from ..scene import Setup
 from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
 from ..storage.tables import GrowingTable
 from .heating import describe_hot
 from .point import Point
-from .sliding import SteadySliding
 
 COLUMNS = (
     *("velocity", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure"),
@@ -29,7 +28,7 @@ ERRORS = ("error_friction", "error_area", "friction_slopes")
 HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
 QUARTILES = ("lower_temperature", "upper_temperature")  # of the rise over the contact, with `thermal`
 FEEDBACK = ("friction_cold", "flash_shift", "rounds")  # with the feedback of `thermal`
-WAVES = ("velocity", "pressure", "wavelength", "share")
+WAVES = ("steady_waves.csv", ("velocity", "pressure", "wavelength", "share"))  # a further table
 FOUND: dict[str, Callable[[Point], float]] = {  # columns that are neither of the point nor of its measures by name
     "velocity": lambda point: point.speed,
     "pressure": lambda point: point.measures.pressure,
@@ -59,11 +58,13 @@ def value_of(point: Point, name: str) -> float:
 class CurveTable:
     """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
 
-    def __init__(self, directory: Path, sliding: SteadySliding, waves: bool, heated: bool, quiet: bool) -> None:
-        self._console, self._job = Console(directory / LOG, quiet, 0), sliding.setup.job
+    def __init__(
+        self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
+    ) -> None:
+        self._console, self._job = Console(directory / LOG, quiet, 0), setup.job
         self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
-        branches = sliding.setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
-        self.interface = InterfaceColumns.columns if sliding.setup.choices.interface else ()
+        branches = setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
+        self.interface = InterfaceColumns.columns if setup.choices.interface else ()
         thermal = self._job.section("thermal")
         self.thermal = (*ThermalColumns.columns, *QUARTILES) if thermal else ()
         self.thermal += FEEDBACK if thermal and thermal.feedback != "none" else ()
@@ -71,7 +72,7 @@ class CurveTable:
         self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
-        self._waves = GrowingTable(directory / "steady_waves.csv", WAVES) if waves else None
+        self._further = GrowingTable(directory / further[0], further[1]) if further else None
         self._points: list[Point] = []
         self._bar = progress.Bar(0, "")
         if self._job.origin.mesh:
@@ -119,14 +120,14 @@ class CurveTable:
         for text in texts:
             self._console.warn(text, shown(text))
 
-    def write(self, point: Point, waves: Any) -> None:
+    def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
         """Add a point, unless it was there before and is solved for its maps only."""
         m, speed = point.measures, point.speed
         if not curve_points.lacking([Wanted(speed, m.pressure, point.temperature)], self.known):
             return
-        if self._waves:
-            for wavelength, share in zip(*waves, strict=True):
-                self._waves.append([repr(float(value)) for value in (speed, m.pressure, wavelength, share)])
+        if self._further:
+            for row in rows:
+                self._further.append([repr(float(value)) for value in row])
         lost = {f"dissipated_{k}": power for k, power in enumerate(point.dissipated)}
         cells = [lost[name] if name in lost else value_of(point, name) for name in self._names]
         self._file.append(tables.texts(float(value) for value in cells))
@@ -168,8 +169,8 @@ class CurveTable:
         self._bar.close()
         self._console.close()
         self._file.close()
-        if self._waves:
-            self._waves.close()
+        if self._further:
+            self._further.close()
 
 
 def describe_missed(points: Sequence[Point], job: Job) -> Iterator[str]:

@@ -25,7 +25,7 @@ from .marker import SCENE, VERBS, Claim
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
-    "steady": ("steady.csv", "steady_waves.csv", "steady.h5", "steady_theory.csv", curve_points.LOG),
+    "steady": ("steady.csv", "steady_waves.csv", "bands.csv", "steady.h5", "steady_theory.csv", curve_points.LOG),
     "study": ("study.csv", "study.txt", "convergence.png", "work_precision.png"),
 }
 COPIES = {  # of the job: as given, and with every default

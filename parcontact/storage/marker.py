@@ -18,7 +18,7 @@ from . import files, tables
 MARKER = ".parcontact"
 FORMAT = 1
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
-SCENE = ("grid", "surface", "material", "body")  # sections in which all that shares a directory must agree
+SCENE = ("grid", "bands", "surface", "material", "body")  # sections in which all that shares a directory must agree
 SHOWN = 4  # differences of two jobs in a message
 EFFECTS = ("thermal", "interface", "adhesion.work", "adhesion.range", "adhesion.law")  # keys of steps that were made
 SECTIONS = (*SCENE, "thermal", "interface", "adhesion", "initial", "numerics", "steady")  # what a marker keeps of a job
@@ -116,8 +116,10 @@ def told(differences: Iterator[str]) -> str:
 
 def keep_mesh(job: Mapping[str, Any], different: str) -> str:
     """Return how to keep the mesh of a job, as plain data, where that is among what is `different`; '' elsewhere."""
+    if "grid.points" not in different:
+        return ""
     points = str(job["grid"]["points"]).replace(" ", "")
-    return f"give --set grid.points={points} to keep its mesh, or " if "grid.points" in different else ""
+    return f"give --set grid.points={points} to keep its mesh, or "
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:

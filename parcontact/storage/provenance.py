@@ -127,7 +127,7 @@ def cite(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str,
     used = {
         *("", *features),
         f"kernel {numerics['kernel']}",
-        f"boundary {job['grid']['boundary']}",
+        f"boundary {job.get('grid', {}).get('boundary', 'periodic')}",
         f"shift {shift['law'] if isinstance(shift, dict) else shift}",
         *(f"shape {shape['shape']}" for shape in job["surface"]),
         *(f"interface {key}" for key in job.get("interface") or {}),

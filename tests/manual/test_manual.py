@@ -18,6 +18,7 @@ from marching import ROOT
 from pydantic import TypeAdapter
 
 from parcontact import __main__, mesh
+from parcontact.bands import road_sliding
 from parcontact.command.arguments import parse_arguments
 from parcontact.effects.adhesion import AdhesionColumns
 from parcontact.effects.interface import InterfaceColumns
@@ -151,7 +152,8 @@ COLUMNS = {
         *(*steady_table.HEATED, *InterfaceColumns.columns, *ThermalColumns.columns),
         *(*steady_table.QUARTILES, *steady_table.FEEDBACK, *steady_table.ERRORS),
     ],
-    "steady_waves.csv": steady_table.WAVES,
+    "steady_waves.csv": steady_table.WAVES[1],
+    "bands.csv": road_sliding.COLUMNS,
     "theory.csv": prediction.Instant._fields,
     "steady_theory.csv": prediction.SteadyInstant._fields,
     "sweep.csv": ["case", *sweep_table.COLUMNS, *sweep_table.PULL_OFFS],
@@ -188,7 +190,8 @@ def test_a_block(language: str, name: str, index: int, elsewhere: Path) -> None:
 def load_job(text: str, where: Path) -> None:
     """A whole job, or sections of one."""
     data = yamltext.parse(text, "block").data
-    needed = {key: value for key, value in WHOLE.items() if key != "history" or "steady" not in data}
+    without = {key for key, other in (("history", "steady"), ("grid", "bands")) if other in data}
+    needed = {key: value for key, value in WHOLE.items() if key not in without}
     (where / "job.yaml").write_text(yamltext.dump({**needed, **data}))
     assert mesh.load_cases(where / "job.yaml")
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...errors import InputError
 from ..sections.calculation import Body, Grid, Numerics, Output
-from ..sections.geometry import Rough
+from ..sections.geometry import Flat, Rough, RoughSpectrum, Topography
 from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
@@ -18,6 +18,7 @@ from .advice import SAME_LENGTH, out_of_proportion
 from .cells import has_wave, one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
+BY_SPECTRUM = Rough | RoughSpectrum | Flat
 MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
 
 
@@ -43,8 +44,10 @@ def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
         yield Fault("needs a periodic box: the waves of a free one are not independent", ("steady", "waves"))
 
 
-def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
+def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Fault]:
     """Check that no wave is shorter than two cells (Nyquist), and that the shortest one fits into the box."""
+    if bands is not None:
+        return
     steps = zip((grid.dx, grid.dy), grid.size, "xy", grid.points, strict=True)
     cell, size, axis, _ = max((one for one in steps if one[-1] > 1), key=itemgetter(0), default=(0.0, 0.0, "", 0))
     for index, shape in enumerate(surface):
@@ -68,6 +71,22 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
             if abs(waves) > n / 2:
                 sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
                 yield Fault(sentence, ("surface", index, "waves", number))
+
+
+def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
+    """Check that a surface in bands is known by its spectrum, a measured map coming first, and that no map is saved."""
+    if bands is None:
+        return
+    for index, shape in enumerate(surface):
+        if not isinstance(shape, BY_SPECTRUM) and not (index == 0 and isinstance(shape, Topography)) and shape:
+            sentence = "must be rough in a job with bands (self-affine, or a spectrum); a topography comes first"
+            yield Fault(sentence, ("surface", index, "shape"))
+    if not any(shape is None or isinstance(shape, Rough | RoughSpectrum) for shape in surface):
+        yield Fault("needs a rough shape in a job with bands: finer waves follow from a spectrum", ("surface",))
+    if steady is not None and steady.waves:
+        yield Fault("does not go with bands: bands.csv has the friction of each band", ("steady", "waves"))
+    if output.fields:
+        yield Fault("does not go with bands: there is no map of all waves", ("output", "fields"))
 
 
 def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:

@@ -40,7 +40,7 @@ def warnings(job: Sections) -> Iterator[str]:
     """Yield sentences, in the order of the sections."""
     material = job.material.fitted
     yield from _slopes(job.grid, job.surface)
-    yield from _moduli(material)
+    yield from of_moduli(material)
     yield from _pressures(job, material)
     yield from _instants(job, material)
     yield from _band(job, material)
@@ -81,7 +81,7 @@ def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
         yield text
 
 
-def _moduli(material: Elastic | Zener) -> Iterator[str]:
+def of_moduli(material: Elastic | Zener) -> Iterator[str]:
     modulus = material.instant_modulus
     if modulus < SOFTEST:
         yield (

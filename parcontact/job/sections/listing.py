@@ -31,7 +31,8 @@ def plain(value: Any) -> Any:
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
     """Return the keys of a part that have a value, as they are written in a job."""
-    return ((name, value) for name in type(part).model_fields if (value := getattr(part, name)) is not None)
+    names = (name for name in type(part).model_fields if name not in part.left_out())
+    return ((name, value) for name in names if (value := getattr(part, name)) is not None)
 
 
 def plain_job(job: Any) -> dict[str, Any]:

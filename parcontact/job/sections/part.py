@@ -85,6 +85,10 @@ class Part(BaseModel):
         """Return `data` with the defaults that depend on other keys or on the job file."""
         return data
 
+    def left_out(self) -> tuple[str, ...]:
+        """Return the keys that have a value but are not written."""
+        return ()
+
     @classmethod
     def words(cls) -> tuple[str, ...]:
         """Return the keys as they are written in a job."""

@@ -1,0 +1,178 @@
+"""One band of the spectrum on a grid of its own: a surface of its waves, and its steady states under many pressures."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from ..errors import RunError
+from ..job import Grid, HeightArray, Job
+from ..job.sections.height_arrays import Heights
+from ..march.errors import properties_of
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.slab import Array, Slab
+from ..physics.convolution import Convolution, wavenumbers
+from ..physics.roughness import Roughness
+from ..scene import Setup, choices, set_up
+from ..solve import kernels
+from ..solve.constraint import NonNegative
+from ..solve.interface_law import InterfaceLaw
+from ..solve.nonsymmetric.splitting import Splitting, step_for
+from ..steady_sliding.losses import branch_powers
+from ..steady_sliding.sliding import SteadyState, judge_state, tolerance_of
+from .choice import Cut
+from .ladder import Ladder
+
+PARTS = 6  # accuracy: of a cell of wavenumbers, along each side, over which the spectrum is summed
+MOST_STEPS = 20000  # tuning: of one contact, more than any has needed
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Rung:
+    """Steady state of one band under a mean `pressure` [Pa]: friction of its waves by energy and by slopes [-], area as
+    a share, counted and corrected, approach [m], highest pressure [Pa]; weights of the rungs of the next finer band and
+    the share of the load above them; power [W/m^2] that each branch loses; relative errors of friction and area by the
+    solver and by the grid; residual, and calls of the operator."""
+
+    pressure: float
+    friction: float
+    friction_slopes: float
+    contact_area: float
+    contact_area_corrected: float
+    approach: float
+    max_pressure: float
+    weights: Array
+    load_lost: float
+    powers: Array
+    errors: Array  # friction by solver and by grid, area by solver and by grid
+    residual: float
+    penetration: float
+    operator_calls: float
+
+
+class Band:
+    """A surface with the waves of one band, on this rank alone.
+
+    `number` counts bands from the coarsest; each `sample` is another surface of the same spectrum. All waves have the
+    amplitude of the spectrum, so that surfaces differ in their phases only.
+    """
+
+    def __init__(self, job: Job, cut: Cut, number: int, sample: int) -> None:
+        (nx, ny), side = cut.points, cut.waves * cut.wavelengths(number)[0]
+        grid = Grid(points=cut.points, size=(side, side if ny > 1 else side / nx))
+        slab = Slab.alone(nx, ny)
+        fft = FFT(slab, measured=False)
+        heights = fft.backward(_make_waves(cut, number, _seed(job, number, sample), fft, side), slab.empty())
+        surface = (HeightArray(heights=Heights(np.asarray(heights))),)
+        own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
+        self._take(set_up(own, slab))
+        self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
+
+    def _take(self, setup: Setup) -> None:
+        self.setup = setup
+        self.probe = replace(setup.probe(), interface=None)
+        self._known = properties_of(setup, 0.0, True, None)
+        self._velocity: Vector = (math.nan, math.nan)
+
+    def heat(self, temperature: float) -> None:
+        """Take the material at this temperature [deg C] from now on. Raises InputError where it has no shift."""
+        self._take(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
+
+    def slide(self, velocity: Vector) -> None:
+        """Slide at a velocity [m/s] from now on."""
+        if velocity != self._velocity:
+            body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
+            self.operator: Convolution = body.sliding_operator(*moved)
+            pressure = body.sliding_inverse(*moved).apply(self._heights, self.setup.slab.empty())
+            self._full = float(np.std(pressure))
+            sizes = np.abs(np.concatenate([np.abs(part).ravel() for part in self.operator.symbols]))
+            self._stiffest, self._softest = (sizes[sizes > 0.0].min(), sizes.max()) * np.full(2, self.setup.slab.points)
+            self._velocity = velocity
+
+    @property
+    def full_contact_rms(self) -> float:
+        """The rms pressure [Pa] that its waves have in full contact."""
+        return self._full * self.setup.units.pressure
+
+    @cached_property
+    def rms_slope(self) -> float:
+        return self.setup.roughness.rms_slope if self.setup.roughness else 0.0
+
+    def solve(self, pressure: float, law: InterfaceLaw, below: Ladder | None) -> Rung:
+        """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its
+        distribution over the ladder `below`, that of the next finer band. Raises RunError where it is not found."""
+        setup, velocity, units = self.setup, self._velocity, self.setup.units
+        mean = pressure / units.pressure
+        gamma = step_for(self._stiffest, self._softest, mean / self._full)
+        what = setup.height / units.height, tolerance_of(setup.choices.numerics.tolerance), MOST_STEPS
+        solver = Splitting(setup.slab, self.operator, self._resolvent, *what)
+        contact = solver.solve(self._heights, mean, law.in_units(units.pressure, units.height), gamma)
+        if contact.failure:
+            raise RunError(f"a band of {max(setup.grid.size):.3g} m at {pressure:.3g} Pa: {contact.failure}")
+        seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
+        measures = self.probe.measure(contact.p, 1.0, *seen, (0.0, 0.0), velocity)
+        lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.total(contact.p)
+        state = SteadyState(contact, self._heights, lost * units.height / units.length)
+        friction, budget = judge_state(setup, self._known, state, velocity, measures)
+        weights, above = (np.zeros(0), 0.0) if below is None else below.weigh(contact.p * units.pressure)
+        area, along = setup.grid.lx * setup.grid.ly, _unit(velocity)
+        parts = [(part.solver, part.mesh) if part else (0.0, 0.0) for part in (budget.friction, budget.area)]
+        return Rung(
+            pressure,
+            friction,
+            -(measures.force_x * along[0] + measures.force_y * along[1]) / (pressure * area),
+            measures.contact_area,
+            measures.contact_area_corrected,
+            measures.approach,
+            measures.max_pressure,
+            weights,
+            above,
+            branch_powers(setup, contact, velocity).sum(axis=1) / area,
+            np.array(parts).ravel(),
+            contact.certificate.worst,
+            contact.certificate.penetration,
+            float(contact.steps),
+        )
+
+    def _resolvent(self, gamma: float) -> Convolution:
+        return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.setup.fft.complex)
+
+
+def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spectrum:
+    """Return the transform of the heights [m] of a band on a box with this side [m].
+
+    Each wave of the box has the mean square slope that the spectrum has in its cell of wavenumbers, as far as the cell
+    is within the band; phases are random, those of `physics.roughness`.
+    """
+    step, line = 2.0 * np.pi / side, fft.my == 1
+    low, high = float(cut.edges[number]), float(cut.edges[number + 1])
+    widest = 2.0 * np.pi / (low - step), 2.0 * np.pi / (high + step)
+    unit = Roughness(1.0, widest[0], *widest, seed, False, rms_height=1.0, measured=np.ones_like)
+    waves = unit.spectrum(fft, (side, side))
+    parts = step * ((np.arange(PARTS) + 0.5) / PARTS - 0.5)
+    qx, qy = wavenumbers(fft, (side, side))
+    slopes = np.zeros(waves.shape)
+    for dx, dy in product(parts, parts[:1] * 0.0 if line else parts):
+        q = np.hypot(qx + dx, qy + dy)
+        slopes += cut.spectrum.density_of_slopes(q, low, high)
+    area = step / (2.0 * np.pi * PARTS) if line else (step / (2.0 * np.pi * PARTS)) ** 2
+    q = np.hypot(qx, qy)
+    heights = np.divide(slopes * area, q**2, out=np.zeros_like(q), where=q > 0.0)
+    sizes = np.abs(waves)
+    return np.divide(waves, sizes, out=waves, where=sizes > 0.0) * np.sqrt(heights) * (fft.mx * fft.my)
+
+
+def _seed(job: Job, number: int, sample: int) -> int:
+    """Return the seed of a surface: that of the job for the first one of the coarsest band, others follow from it."""
+    seed = next((part.seed for part in job.surface if hasattr(part, "seed")), 0)
+    if number == sample == 0:
+        return int(seed)
+    return int(np.random.SeedSequence([seed, number, sample]).generate_state(1, np.uint64)[0])
+
+
+def _unit(velocity: Vector) -> Vector:
+    speed = math.hypot(*velocity)
+    return velocity[0] / speed, velocity[1] / speed

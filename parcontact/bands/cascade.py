@@ -1,0 +1,204 @@
+"""The upward pass, from the finest band to the coarsest, and the downward pass back.
+
+Upward each band is solved on the rungs of its ladder with the closing of all finer bands as the law of its interface;
+its own approach is the law of the next coarser one. Downward the distribution of pressure goes through the bands,
+
+    P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) hat_j(p) dp,
+    mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
+
+with the friction stress tau_k and the share of contact a_k of band k under p_j, and the distribution F_k of pressure
+within it. Contacts of one pass are independent: ranks share them, each a whole one at a time.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, RunError
+from ..job import Job
+from ..parallel.slab import Array, Slab
+from ..solve.interface_law import HARD, InterfaceLaw
+from .band import Band, Rung, Vector
+from .choice import Cut
+from .ladder import Ladder
+
+NEGLIGIBLE = 1e-12  # accuracy: of the load: a rung that carries less is not solved behind hard walls
+
+
+class Task(NamedTuple):
+    """One contact: band, sample, rung, and the law of all finer bands."""
+
+    band: int
+    sample: int
+    rung: int
+    law: InterfaceLaw
+
+
+@dataclass(frozen=True)
+class BandResult:
+    """What one band comes to under a distribution of pressure: the load [Pa] on it and its weights; friction of its
+    waves over the whole load [-], by energy and by slopes; area down to it, counted and corrected; shares of the load
+    above its ladder; power [W/m^2] per branch; errors of friction [-, absolute] and of area (absolute) by solver and
+    grid."""
+
+    weights: Array
+    load: float
+    friction: float
+    friction_slopes: float
+    contact_area: float
+    contact_area_corrected: float
+    load_lost: float
+    powers: Array
+    errors: Array
+
+
+Results = tuple[BandResult, ...]
+Solved = Mapping[tuple[int, int], Sequence[Rung]]  # rungs by band and sample
+
+
+class Cascade:
+    """Bands of a job on the ranks of `slab`, whose points do not matter; methods are collective.
+
+    `solve_tasks` may be replaced to keep what is solved.
+    """
+
+    def __init__(self, job: Job, cut: Cut, slab: Slab) -> None:
+        self.job, self.cut, self.slab = job, cut, slab
+        self._bands: dict[tuple[int, int], Band] = {}
+        self._temperatures = [math.nan] * cut.count
+        self.velocity: Vector = (1.0, 0.0)
+        self.ladders: list[Ladder] = []
+        self.pressure = math.nan
+
+    def band(self, number: int, sample: int) -> Band:
+        """Return a band, sliding at the velocity at its temperature; on this rank alone."""
+        if (number, sample) not in self._bands:
+            self._bands[number, sample] = Band(self.job, self.cut, number, sample)
+            if not math.isnan(temperature := self._temperatures[number]):
+                self._bands[number, sample].heat(temperature)
+        found = self._bands[number, sample]
+        found.slide(self.velocity)
+        return found
+
+    def heat(self, temperatures: Sequence[float]) -> None:
+        """Take these temperatures [deg C] of the bands from now on; NaN for that of the material."""
+        for (number, _), band in self._bands.items():
+            if temperatures[number] != self._temperatures[number]:
+                band.heat(temperatures[number])
+        self._temperatures = list(temperatures)
+
+    def press(self, velocity: Vector, pressure: float) -> None:
+        """Slide at a velocity [m/s] under a mean pressure [Pa] from now on."""
+        self.velocity, self.pressure = velocity, pressure
+        squares = np.cumsum([0.0, *(self.band(k, 0).full_contact_rms ** 2 for k in range(self.cut.count))])
+        self.ladders = [Ladder.over(pressure, math.sqrt(square)) for square in squares[:-1]]
+
+    def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
+        """Solve all rungs of all bands with the laws of finer ones: the upward pass, for each sample on its own."""
+        found: dict[tuple[int, int], list[Rung]] = {}
+        laws = dict.fromkeys(samples, HARD)
+        for number in reversed(range(self.cut.count)):
+            rungs = range(len(self.ladders[number].rungs))
+            tasks = [Task(number, sample, rung, laws[sample]) for sample in samples for rung in rungs]
+            solved = iter(self.solve_tasks(tasks))
+            for sample in samples:
+                found[number, sample] = [next(solved) for _ in rungs]
+                if number:
+                    laws[sample] = self._law(number, found[number, sample])
+        return found
+
+    def _law(self, number: int, rungs: Sequence[Rung]) -> InterfaceLaw:
+        """Return how a band and all finer ones close; what the solver leaves of a rise is taken off."""
+        closings = np.maximum.accumulate([rung.approach for rung in rungs])
+        return InterfaceLaw.of_table(self.ladders[number].rungs, closings)
+
+    def fall(self, solve: Callable[[int, Array], Sequence[Rung]]) -> Results:
+        """Send the load down through the bands: the downward pass. `solve(band, weights)` returns its rungs."""
+        weights, found, lost = np.ones(1), list[BandResult](), 0.0
+        for number, ladder in enumerate(self.ladders):
+            rungs = solve(number, weights)
+            result = self._sum(weights, ladder, rungs)
+            found.append(replace(result, load_lost=lost))
+            loads = weights * ladder.rungs
+            lost = float(sum(load * rung.load_lost for load, rung in zip(loads, rungs, strict=True)) / loads.sum())
+            if number + 1 < self.cut.count:
+                weights = np.sum([w * rung.weights for w, rung in zip(weights, rungs, strict=True)], axis=0)
+        return tuple(found)
+
+    def _sum(self, weights: Array, ladder: Ladder, rungs: Sequence[Rung]) -> BandResult:
+        loads = weights * ladder.rungs
+        energy = np.array([rung.friction for rung in rungs])
+        areas = weights * [rung.contact_area_corrected for rung in rungs]
+        errors = np.array([rung.errors for rung in rungs])
+        return BandResult(
+            weights,
+            float(loads.sum()),
+            float(loads @ energy) / self.pressure,
+            float(loads @ [rung.friction_slopes for rung in rungs]) / self.pressure,
+            min(float(weights @ [rung.contact_area for rung in rungs]), 1.0),
+            min(float(areas.sum()), 1.0),
+            0.0,
+            np.sum([w * rung.powers for w, rung in zip(weights, rungs, strict=True)], axis=0),
+            np.array([*((loads * energy) @ errors[:, :2] / self.pressure), *(areas @ errors[:, 2:])]),
+        )
+
+    def hard(self, sample: int) -> Results:
+        """Return the results without laws, each band on its own: behind hard walls."""
+
+        def solve(number: int, weights: Array) -> Sequence[Rung]:
+            ladder = self.ladders[number]
+            there = np.flatnonzero(weights * ladder.rungs > NEGLIGIBLE * self.pressure)
+            solved = self.solve_tasks([Task(number, sample, int(rung), HARD) for rung in there])
+            nothing = replace(solved[0], friction=0.0, friction_slopes=0.0, contact_area=0.0)
+            found = [nothing] * len(ladder.rungs)
+            for rung, one in zip(there, solved, strict=True):
+                found[rung] = one
+            return found
+
+        return self.fall(solve)
+
+    def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
+        """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if one is not found."""
+        rank, size = self.slab.comm.rank, self.slab.comm.size
+        own: list[Rung | None] = []
+        problem = ""
+        for task in tasks[rank::size]:
+            try:
+                own.append(self._solve(task))
+            except (RunError, InputError) as error:
+                problem = str(error)
+                own.append(None)
+        everyone = self.slab.from_all((own, problem))
+        if problem := next((text for _, text in everyone if text), ""):
+            raise RunError(problem)
+        found: list[Rung] = []
+        for index in range(len(tasks)):
+            rung = everyone[index % size][0][index // size]
+            assert rung is not None
+            found.append(rung)
+        return found
+
+    def _solve(self, task: Task) -> Rung:
+        below = self.ladders[task.band + 1] if task.band + 1 < self.cut.count else None
+        pressure = float(self.ladders[task.band].rungs[task.rung])
+        return self.band(task.band, task.sample).solve(pressure, task.law, below)
+
+
+def mean_rungs(found: Solved, band: int, samples: Sequence[int]) -> list[Rung]:
+    """Return the rungs of a band as the mean of some samples."""
+    each = zip(*(found[band, sample] for sample in samples), strict=True)
+    return [_mean(rungs) for rungs in each]
+
+
+def _mean(rungs: Sequence[Rung]) -> Rung:
+    if len(rungs) == 1:
+        return rungs[0]
+    worst = ("residual", "penetration", "max_pressure")
+    values = {
+        name: (max if name in worst else lambda each: sum(each) / len(each))([getattr(rung, name) for rung in rungs])
+        for name in Rung.__dataclass_fields__
+    }
+    return Rung(**values)

@@ -1,0 +1,201 @@
+"""Steady sliding of a surface in bands: points of a friction curve with the same columns as those of one grid."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effects.relaxation import temperature_of
+from ..errors import RunError
+from ..job import Job
+from ..parallel.slab import Array, Slab
+from ..physics.budget import ErrorBudget, Parts
+from ..physics.measures import Measures
+from ..scene import Setup, choices
+from ..solve.certificate import Certificate
+from ..steady_sliding.curve import States, on_one_grid
+from ..steady_sliding.point import Point
+from .band import Rung, Vector
+from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
+from .choice import FEWEST, MOST, SAMPLE_SHARE, choose, describe_cut, doubts_of_bands
+from .limits import STRAIN
+
+SURE = 2.0  # accuracy: standard errors of the scatter of surfaces that count as an error
+TABLE = "bands.csv"
+COLUMNS = (
+    *("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength", "friction", "contact_area"),
+    *("rms_slope", "flash_temperature", "load_lost", "rms_slope_to", "strain_to"),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What all bands come to: results with laws from all samples, friction and area of the first sample with laws and
+    behind hard walls, and standard errors of friction and area by the scatter of surfaces; the rungs of each band."""
+
+    results: Results
+    with_laws: tuple[float, float]
+    hard: tuple[float, float]
+    scatter: tuple[float, float]
+    rungs: Sequence[Sequence[Rung]]
+
+    @property
+    def friction(self) -> float:
+        return sum(result.friction for result in self.results)
+
+    @property
+    def method(self) -> tuple[float, float]:
+        """The error of the method in friction and in the corrected area: hard walls against laws."""
+        return abs(self.hard[0] - self.with_laws[0]), abs(self.hard[1] - self.with_laws[1])
+
+
+class RoadSliding:
+    """Steady states of a job in bands, on the ranks of `slab`; making and calling it are collective.
+
+    It has what a friction curve asks of `steady_sliding.sliding.SteadySliding`.
+    """
+
+    table: tuple[str, Sequence[str]] | None = (TABLE, COLUMNS)
+
+    def __init__(self, job: Job, slab: Slab) -> None:
+        self.job, self.slab, self.cut = job, slab, choose(job)
+        self._cascade = Cascade(job, self.cut, slab)
+        self.setup: Setup = replace(self._cascade.band(0, 0).setup, slab=slab)
+        self.temperature, self._own_temperature = math.nan, temperature_of(job.material)
+        self._point: Point | None = None
+        self._results: Results = ()
+
+    def doubts(self, temperatures: Sequence[float]) -> list[str]:
+        """Return warnings about the job."""
+        return doubts_of_bands(self.job, self.cut, temperatures)
+
+    def notes(self) -> list[str]:
+        """Return what was chosen, and where linear theory fails."""
+        return describe_cut(self.cut, self.job)
+
+    def heat(self, temperature: float) -> None:
+        """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
+        if temperature != self.temperature:
+            self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
+            self._cascade.heat([temperature] * self.cut.count)
+            self.temperature = temperature
+
+    def field(self, name: str) -> Array:
+        raise RunError(f"a job in bands has no map of {name}")
+
+    def solve(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at a velocity [m/s] under a mean pressure [Pa]; raises RunError."""
+        began = time.perf_counter()
+        self._cascade.press(velocity, pressure)
+        outcome = self._solve()
+        self._results = outcome.results
+        self._point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
+        return self._point
+
+    def rows(self, velocity: Vector) -> list[list[float]]:
+        """Return the lines of bands.csv for the last state."""
+        point, cut, rows = self._point, self.cut, []
+        assert point is not None
+        for number, result in enumerate(self._results):
+            last = number + 1 == cut.count
+            friction = result.friction + (point.measures.friction_interface if last else 0.0)
+            slope_to = cut.rms_slope(number, 0)
+            place = point.speed, point.measures.pressure, point.temperature, float(number)
+            found = friction, result.contact_area, cut.rms_slope(number), math.nan, result.load_lost
+            rows.append([*place, *cut.wavelengths(number), *found, slope_to, STRAIN * slope_to])
+        return rows
+
+    # -- samples and errors -------------------------------------------------------------------------------------------
+
+    def _solve(self) -> Outcome:
+        """Solve surfaces until their scatter is below its share of the accuracy asked for."""
+        asked, fixed = self.job.numerics.asked, self.cut.samples
+        samples = list(range(fixed or FEWEST))
+        rungs: dict[tuple[int, int], list[Rung]] = dict(self._cascade.climb(samples))
+        hard = _sums(self._cascade.hard(0))
+        while True:
+            outcome = self._outcome(rungs, samples, hard)
+            found = zip(outcome.scatter, _sums(outcome.results), asked.both, strict=True)
+            enough = all(SURE * error <= SAMPLE_SHARE * share * whole for error, whole, share in found)
+            if fixed or enough or len(samples) >= MOST:
+                return outcome
+            samples.append(len(samples))
+            rungs.update(self._cascade.climb(samples[-1:]))
+
+    def _outcome(self, rungs: Solved, samples: Sequence[int], hard: tuple[float, float]) -> Outcome:
+        means = [mean_rungs(rungs, band, samples) for band in range(self.cut.count)]
+        results = self._cascade.fall(lambda band, _: means[band])
+        first = self._cascade.fall(lambda band, _: rungs[band, 0])
+        variances = np.zeros(2)
+        if len(samples) > 1:
+            for changed in range(self.cut.count):
+                each = [
+                    _sums(self._cascade.fall(lambda band, _: rungs[band, s] if band == changed else means[band]))  # noqa: B023
+                    for s in samples
+                ]
+                variances += np.var(each, axis=0, ddof=1) / len(samples)
+        scatter = np.sqrt(variances)
+        return Outcome(results, _sums(first), hard, (float(scatter[0]), float(scatter[1])), means)
+
+    def _to_point(self, outcome: Outcome, velocity: Vector, pressure: float, seconds: float) -> Point:
+        results, finest, coarsest = outcome.results, outcome.results[-1], outcome.rungs[0][0]
+        interface, box = self.setup.choices.interface, self.setup.grid.lx * self.setup.grid.ly
+        rubbed = 0.0 if interface is None else math.hypot(*interface.force(finest.contact_area_corrected, velocity))
+        slopes = sum(result.friction_slopes for result in results) + rubbed / pressure
+        friction = outcome.friction + rubbed / pressure
+        direction = (velocity[0] / math.hypot(*velocity), velocity[1] / math.hypot(*velocity))
+        pressed = [rung for rung, weight in zip(outcome.rungs[-1], finest.weights, strict=True) if weight > 0.0]
+        measures = Measures(
+            pressure=finest.load,
+            force_x=-slopes * pressure * box * direction[0],
+            force_y=-slopes * pressure * box * direction[1],
+            friction=slopes,
+            contact_area=finest.contact_area,
+            approach=coarsest.approach,
+            mean_gap=-coarsest.approach,
+            max_pressure=max(rung.max_pressure for rung in pressed),
+            contact_area_corrected=finest.contact_area_corrected,
+            normal_force=pressure * box,
+            friction_interface=rubbed / pressure,
+            force_interface=rubbed * box,
+        )
+        worst = max((rung for each in outcome.rungs for rung in each), key=lambda rung: rung.residual)
+        certificate = Certificate(worst.residual, worst.penetration, abs(finest.load / pressure - 1.0))
+        powers = np.sum([result.powers for result in results], axis=0) * box
+        calls = sum(rung.operator_calls for each in outcome.rungs for rung in each)
+        factor = self.setup.choices.time_factor
+        errors = self._errors(outcome, friction)
+        return Point(
+            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, 0, seconds),
+            tuple(powers.tolist()),
+        )
+
+    def _errors(self, outcome: Outcome, friction: float) -> ErrorBudget:
+        """Return relative errors: those of grids and of load beyond ladders add up over bands."""
+        area = outcome.results[-1].contact_area_corrected
+        lost = sum(result.load_lost for result in outcome.results)
+        of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:2]
+        of_area = outcome.results[-1].errors[2:]
+        method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
+        parts = [
+            Parts(solver / whole, 0.0, 0.0, mesh / whole, method=method[k] / whole + lost, scatter=scatter[k] / whole)
+            for k, (whole, (solver, mesh)) in enumerate(((friction, of_bands), (area, of_area)))
+        ]
+        own = self._interface_share(outcome, friction)
+        with_interface = replace(parts[0], method=parts[0].method + own * parts[1].method)
+        return ErrorBudget(with_interface if friction > 0.0 else None, parts[1])
+
+    def _interface_share(self, outcome: Outcome, friction: float) -> float:
+        return 1.0 - outcome.friction / friction if friction > 0.0 else 0.0
+
+
+def make_states(job: Job, slab: Slab) -> States:
+    """Return the steady states of a job, in bands or on its grid; collective."""
+    return on_one_grid(job, slab) if job.bands is None else RoadSliding(job, slab)
+
+
+def _sums(results: Sequence[BandResult]) -> tuple[float, float]:
+    """Return friction of all bands, and the corrected area of the finest."""
+    return sum(result.friction for result in results), results[-1].contact_area_corrected

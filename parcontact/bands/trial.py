@@ -1,0 +1,31 @@
+"""What a job in bands will do, and what it costs, by a trial of its finest band."""
+
+import time
+from collections.abc import Iterator
+
+from ..job import Job
+from ..parallel.slab import Slab
+from ..solve.interface_law import HARD
+from ..steady_sliding.curve import request
+from .cascade import Cascade, Task
+from .choice import FEWEST, choose, describe_cut
+
+
+def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
+    """Yield lines on the bands of a job and the time of its points; collective, all ranks must take every line."""
+    wanted, cut = request(job), choose(job)
+    yield from describe_cut(cut, job)
+    cascade = Cascade(job, cut, slab)
+    fastest = max(wanted.velocities)
+    began, contacts = time.perf_counter(), 0
+    cascade.press(wanted.velocity(fastest), wanted.pressures[0])
+    for number in sorted({0, cut.count // 2, cut.count - 1}):
+        rungs = range(len(cascade.ladders[number].rungs))
+        cascade.solve_tasks([Task(number, 0, rung, HARD) for rung in rungs])
+        contacts += len(rungs)
+    each = slab.agree((time.perf_counter() - began) / contacts)
+    samples = cut.samples or FEWEST
+    of_point = (samples + 1) * sum(len(ladder.rungs) for ladder in cascade.ladders)
+    points = len(wanted.points)
+    yield f"parcontact steady: {points} steady states of {of_point} contacts or more, {each * 1e3:.3g} ms each"
+    yield f"on {slab.comm.size} rank{'s' * (slab.comm.size > 1)}: {points * of_point * each:.3g} s or more in all"

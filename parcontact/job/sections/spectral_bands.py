@@ -1,0 +1,60 @@
+"""The `bands` section: the spectrum of a surface cut into bands, each solved on a grid of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo
+
+from ..text.fault import Fault, refuse
+from .part import Part, Rule
+from .quantities import Count, Positive, Whole, both
+
+Auto = Literal["auto"]
+AUTO: Auto = "auto"
+LEAST_CELLS = 2.0  # accuracy: per shortest wave of a band: the grid has no waves shorter than two
+
+
+class Bands(Part):
+    """Bands of the spectrum; keys that are not given follow from `numerics.accuracy`."""
+
+    count: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        default=None, description="a whole number of bands from 1 to 100"
+    )
+    points: Annotated[tuple[Count, Count], BeforeValidator(both)] | None = Field(
+        default=None, description="a positive whole number of points"
+    )
+    waves: Annotated[Whole, Field(ge=1)] | None = Field(
+        default=None, description="a positive whole number of the longest waves of a band along a side of its box"
+    )
+    samples: Count | None = Field(default=None, description="a positive whole number of surfaces of each band")
+    cutoff_slope: Positive | None = Field(default=None, description="a positive rms slope [-]")
+
+
+def _choose(value: Any, info: ValidationInfo) -> Bands | Auto:
+    if value == AUTO:
+        return AUTO
+    if isinstance(value, str):
+        refuse(Fault(f"must be auto, or a mapping with count, points and waves, got {value!r}"))
+    return Bands.model_validate(value, context=info.context)
+
+
+SomeBands = Annotated[Bands | Auto, PlainValidator(_choose, json_schema_input_type=Bands | Auto)]
+
+
+def _without(name: str, why: str) -> Rule:
+    """Return the rule that a job in bands does not have a section."""
+
+    def check(bands: Any, section: Any) -> Iterator[Fault]:
+        if bands is not None and section:
+            yield Fault(f"does not go with bands: {why}", (name,))
+
+    return Rule(("bands", name), check)
+
+
+BAND_RULES = (
+    _without("history", "a job in bands is steady sliding (steady); a history needs a grid"),
+    _without("body", "a layer changes the coarsest waves only; give it a grid"),
+    _without("study", "a study refines one grid"),
+)

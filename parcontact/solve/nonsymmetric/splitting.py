@@ -1,0 +1,84 @@
+"""Contact with a law of the interface, in steady sliding or at rest, by Douglas and Rachford's splitting.
+
+Find p >= 0 with mean P0 and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is a multiplication in
+Fourier space, and c acts point by point, so that each of them alone is inverted exactly. With J_A = (1 + gamma A)^-1
+under the mean P0, J_c the pressure of `interface_law.resolve`, and a map s,
+
+    p = J_c(s),    y = J_A(2 p - s),    s <- s + y - p
+
+(J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
+(1979) 964). It converges for every gamma > 0 and every A whose real part is not negative, also where the body loses
+nearly all work. Only the certificate of an admissible pressure ends it, with `A p + c(p)` as its displacement.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...parallel.slab import Array, Slab
+from .. import kernels
+from ..certificate import Certificate
+from ..constraint import NonNegative
+from ..interface_law import InterfaceLaw, follow, resolve
+from ..iterate import certify, weigh
+from ..problem import Operator
+from .steady import SteadyContact
+
+LEAST_STEPS, LATER = 10, 0.1  # tuning: steps before a certificate, and the share of all steps before the next one
+SLOWEST, FASTEST, AT_UNIT = 2.0, 16.0, 8.0  # tuning: of `step_for`, found on grids of 96 x 96 from 1 % to full contact
+
+
+def step_for(stiffest: float, softest: float, ratio: float) -> float:
+    """Return gamma for an operator whose symbol is between `stiffest` and `softest` in size, and a mean pressure that
+    is `ratio` times the rms pressure of full contact."""
+    return min(max(AT_UNIT * math.sqrt(ratio), SLOWEST), FASTEST) / math.sqrt(stiffest * softest)
+
+
+@dataclass(frozen=True)
+class Splitting:
+    """Solver on one grid: `operator` A, `resolvent` that makes J_A (without the mean) for a gamma, the `height` of the
+    surface, the `tolerance` on the certificate, and `most` steps. A law and pressures are in the units of A."""
+
+    slab: Slab
+    operator: Operator
+    resolvent: Callable[[float], Operator]
+    height: float
+    tolerance: float
+    most: int
+
+    def solve(self, h: Array, mean: float, law: InterfaceLaw, gamma: float) -> SteadyContact:
+        """Solve for heights h under the mean pressure, from a uniform one; collective.
+
+        The contact has new maps. Its displacement `u = A p` is without the closing of the law.
+        """
+        slab, inverse, sums = self.slab, self.resolvent(gamma), law.pressures + gamma * law.closings
+        p, y, u, s = (slab.empty() for _ in range(4))
+        s[...] = mean - gamma * h
+        steps, due = 0, LEAST_STEPS
+        d, certificate = math.nan, Certificate(math.nan, math.nan, math.nan)
+        for steps in range(1, self.most + 1):
+            (total,) = slab.sum(resolve(s, h, gamma, law.pressures, sums, p, u))
+            if steps >= due or steps == self.most:
+                due = steps + max(LEAST_STEPS, int(LATER * steps))
+                (load,) = slab.sum(kernels.total(p))
+                if load > 0.0 and abs(load / (mean * slab.points) - 1.0) <= self.tolerance:
+                    p *= mean * slab.points / load
+                    d, certificate = self._certify(h, mean, law, p, u)
+                    if certificate.worst <= self.tolerance:
+                        return SteadyContact(p, u, d, certificate, 0, 0, steps, "")
+                    (total,) = slab.sum(resolve(s, h, gamma, law.pressures, sums, p, u))
+            inverse.apply(u, y)
+            follow(s, y, p, mean - total / slab.points)
+        reached = f"the residual is {certificate.worst:.3g} where {self.tolerance:.3g} was asked for"
+        return SteadyContact(p, u, d, certificate, 0, 0, steps, f"not converged in {steps} steps: {reached}")
+
+    def _certify(self, h: Array, mean: float, law: InterfaceLaw, p: Array, u: Array) -> tuple[float, Certificate]:
+        """Return the approach and the certificate of an admissible pressure, and leave its displacement in u."""
+        slab, constraint = self.slab, NonNegative()
+        self.operator.apply(p, u)
+        whole = u + law.closing(p)
+        iterate = weigh(slab, constraint, p, whole, h, 0.0).settled()
+        found = certify(slab, constraint, p, whole, h, iterate, mean, self.height, np.zeros(slab.shape, np.bool_))
+        return iterate.d, found[-1]

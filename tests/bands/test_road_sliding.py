@@ -1,0 +1,93 @@
+"""Surfaces in bands: one band against the steady solver on one grid, full contact against its closed form."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from parcontact import job as jobs
+from parcontact.bands.band import Band
+from parcontact.bands.cascade import Cascade, mean_rungs
+from parcontact.bands.choice import choose
+from parcontact.bands.road_sliding import RoadSliding
+from parcontact.bands.wave_spectrum import spectrum_of
+from parcontact.effects.relaxation import relaxation_of
+from parcontact.parallel.slab import Slab
+from parcontact.physics.prony import complex_modulus
+from parcontact.scene import set_up
+from parcontact.steady_sliding.sliding import SteadySliding
+
+LONG, SHORT = 4e-3, 5e-4
+ROUGH = {
+    **{"shape": "rough", "hurst": 0.8, "long_wavelength": LONG, "short_wavelength": SHORT, "rms_slope": 0.2},
+    **{"seed": 3, "amplitudes": "fixed"},
+}
+JOB = {
+    "surface": ROUGH,
+    "material": {"include": "synthetic_tyre"},
+    "steady": {"velocities": [0.1], "pressures": [1e6]},
+    "numerics": {"tolerance": 1e-4},
+}
+
+
+def sliding(changes: dict[str, object], comm: MPI.Intracomm = MPI.COMM_SELF) -> RoadSliding:
+    return RoadSliding(jobs.load({**JOB, "bands": {"samples": 1}, **changes}), Slab(comm, 1, 1))
+
+
+@pytest.mark.parametrize("pressure", [1e5, 2e6])
+def test_one_band_is_steady_on_one_grid(pressure: float) -> None:
+    """On the same heights friction and area agree with the steady solver to the tolerance of both, 1e-3."""
+    found = sliding({"surface": {**ROUGH, "short_wavelength": 1e-3}, "bands": {"count": 1, "points": 64, "samples": 1}})
+    bands, band = found.solve((0.1, 0.0), pressure), Band(found.job, found.cut, 0, 0).setup
+    heights = band.surface.heights((0.0, 0.0), band.slab.empty()) * band.units.height
+    on_grid = jobs.load({**JOB, "surface": heights, "grid": {"points": 64, "size": 4 * LONG}})
+    grid = SteadySliding(set_up(on_grid, Slab.alone(64, 64))).solve((0.1, 0.0), pressure)
+    assert bands.friction == pytest.approx(grid.friction, rel=1e-3)
+    assert bands.measures.contact_area == pytest.approx(grid.measures.contact_area, rel=3e-3)  # of some 500 points
+    assert bands.measures.friction == pytest.approx(grid.measures.friction, rel=1e-2)  # by slopes: of first order
+    assert bands.measures.mean_gap == pytest.approx(grid.measures.mean_gap, rel=1e-3)
+    assert bands.dissipated == pytest.approx(grid.dissipated, rel=2e-3)
+    assert (bands.errors.friction or bands.errors.area).method == 0.0
+
+
+def full_contact(job: jobs.Job, speed: float, pressure: float) -> float:
+    """`mu = 1/(p0 v) int Phi |q| w G''(w) d2q/(4 pi^2)`, w = q v cos, of an incompressible half space."""
+    spectrum = spectrum_of(job)
+    edges = np.geomspace(2 * np.pi / spectrum.longest, 2 * np.pi / spectrum.shortest, 2001)
+    q, dq = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)
+    angle = (np.arange(400) + 0.5) * 2 * np.pi / 400
+    omega = q[:, None] * speed * np.cos(angle)
+    loss = complex_modulus(np.abs(omega), *relaxation_of(job.material)).imag * np.abs(omega)
+    power = 2.0 * np.sum(spectrum.phi(q) * q * q * dq * loss.mean(axis=1)) / (2 * np.pi)
+    return float(power / (pressure * speed))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6])
+def test_full_contact_is_the_closed_form(count: int) -> None:
+    """Each wave loses on its own. What is left are the directions of the few waves of a box: 0.2 %."""
+    changes = {"surface": {**ROUGH, "rms_slope": 0.02}, "bands": {"count": count, "samples": 1}}
+    found = sliding(changes)
+    point = found.solve((0.1, 0.0), 1e7)
+    assert point.friction == pytest.approx(full_contact(found.job, 0.1, 1e7), rel=2e-3)
+    assert point.measures.contact_area == pytest.approx(1.0, abs=1e-9)
+
+
+def test_load_is_kept_from_band_to_band() -> None:
+    """To rounding, also under a load of which some is beyond the ladder; bands of friction add up."""
+    job = jobs.load({**JOB, "bands": {"count": 3, "samples": 1}})
+    cascade = Cascade(job, choose(job), Slab.alone(1, 1))
+    cascade.press((0.1, 0.0), 1e6)
+    rungs = cascade.climb([0])
+    results = cascade.fall(lambda band, _: mean_rungs(rungs, band, [0]))
+    assert [result.load for result in results] == pytest.approx([1e6] * 3, rel=1e-13)
+    assert all(result.friction > 0.0 for result in results)
+
+
+@pytest.mark.mpi(2, 3)
+def test_ranks_agree() -> None:
+    """Whole contacts on other ranks: friction and area to the last digits but those of transforms."""
+    changes = {"bands": {"count": 2, "samples": 2}, "numerics": {"tolerance": 5e-2}}
+    alone, together = sliding(changes), sliding(changes, MPI.COMM_WORLD)
+    one, other = alone.solve((0.1, 0.0), 1e6), together.solve((0.1, 0.0), 1e6)
+    assert other.friction == pytest.approx(one.friction, rel=1e-9)
+    assert other.measures.contact_area == pytest.approx(one.measures.contact_area, rel=1e-9)
+    assert together.rows((0.1, 0.0)) == [pytest.approx(row, rel=1e-9, nan_ok=True) for row in alone.rows((0.1, 0.0))]
