@@ -1,5 +1,5 @@
 """Grids of ever larger cells, each made of two by two cells of the one before, down to a single cell; the first of
-them, if so many are wanted, of two cells along y.
+them, if so many `pairs` are wanted, of two cells along x, or for numbers below 0 along y.
 
 A cell that is cut by the end of the grid has what there is of it. Each cell is with the rank that has its last row in
 the grid before, until there are so few cells that every rank has all of them, which needs no more messages.
@@ -8,7 +8,7 @@ the grid before, until there are so few cells that every rank has all of them, w
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice, pairwise
+from itertools import count, islice, pairwise
 from typing import Any
 
 from numpy.typing import NDArray
@@ -18,56 +18,68 @@ from .regrid import fetch
 from .rows import RowsBeside
 from .slab import Slab, dealt_to
 
+Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
 FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
 
 
 def steps_of(slab: Slab, pairs: int = 0) -> list["Step"]:
-    """All steps from a grid to a single cell, the finest first; so many to `pairs` along y come first. A grid that
-    every rank has is that of a rank alone."""
+    """All steps from a grid to a single cell, the finest first; so many to `pairs` come first. A grid that every rank
+    has is that of a rank alone."""
     grids = [slab]
-    dealt = slab.dealt
-    for nx, ny, alone in _larger(slab.nx, slab.ny, len(dealt), pairs):
-        dealt = [slice(0, ny)] if alone else halves(dealt)
+    dealt, shapes = slab.dealt, []
+    for nx, ny, shape, alone in _larger(slab.nx, slab.ny, len(dealt), pairs):
+        dealt = [slice(0, ny)] if alone else parts_of(dealt, shape[1])
+        shapes.append(shape)
         grids.append(Slab(MPI.COMM_SELF if alone else slab.comm, nx, ny, slab.tally, dealt))
-    return [Step(fine, coarse) for fine, coarse in pairwise(grids)]
+    return [Step(fine, coarse, shape) for (fine, coarse), shape in zip(pairwise(grids), shapes, strict=True)]
 
 
 def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None, pairs: int = 0) -> int:
-    """Cells of the next grids, `most` of them or all, that a rank has; the first of so many `pairs` along y."""
+    """Cells of the next grids, `most` of them or all, that a rank has; the first of so many `pairs`."""
     total, part, last = 0, dealt_to(ny, ranks, rank), rank == ranks - 1
-    for width, height, alone in islice(_larger(nx, ny, ranks, pairs), most):
-        part = slice(0, height) if alone else slice(part.start // 2, (part.stop + last) // 2)  # as in `halves`
+    for width, height, (_, tall), alone in islice(_larger(nx, ny, ranks, pairs), most):
+        if alone:
+            part = slice(0, height)
+        elif tall == 2:
+            part = slice(part.start // 2, (part.stop + last) // 2)  # as in `parts_of`
         total += width * (part.stop - part.start)
     return total
 
 
-def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, bool]]:
-    """Cells along x and y of each larger grid, and whether every rank has all of them."""
+def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, Shape, bool]]:
+    """Cells along x and y of each larger grid, of which shape, and whether every rank has all of them."""
     enough, alone = nx * ny // (FEW * ranks), ranks == 1
-    while nx * ny > 1:
-        nx, ny, pairs = nx if pairs > 0 else (nx + 1) // 2, (ny + 1) // 2, pairs - 1
-        alone = alone or nx * ny <= enough
-        yield nx, ny, alone
+    for pair in count():
+        if nx * ny == 1:
+            return
+        wide, tall = (1 if pair < -pairs else 2), (1 if pair < pairs else 2)
+        nx, ny = -(-nx // wide), -(-ny // tall)
+        alone = alone or (tall == 2 and nx * ny <= enough)
+        yield nx, ny, (wide, tall), alone
 
 
-def halves(dealt: list[slice]) -> list[slice]:
-    """The rows of cells that end in each part of the rows of a finer grid."""
+def parts_of(dealt: list[slice], tall: int) -> list[slice]:
+    """The rows of cells of so many rows that end in each part of the rows of a finer grid."""
+    if tall == 1:
+        return dealt
     ends = [part.stop // 2 for part in dealt[:-1]]
     return [slice(start, stop) for start, stop in pairwise([0, *ends, (dealt[-1].stop + 1) // 2])]
 
 
 @dataclass(frozen=True)
 class Step:
-    """From a grid to the next, called points and cells here. Methods are collective among the ranks of the points."""
+    """From a grid of points to the next one of cells of a `shape`. Methods are collective among the ranks of the
+    points."""
 
     fine: Slab
     coarse: Slab
+    shape: Shape
     _kept: dict[tuple[str, tuple[int, ...]], "RowsBeside"] = field(default_factory=dict)
 
     @property
     def above(self) -> int:
         """Rows of points of the first own cell that are with another rank: 0 or 1."""
-        return self.fine.rows.start % 2
+        return self.fine.rows.start % self.shape[1]
 
     @cached_property
     def own(self) -> slice:
@@ -85,19 +97,23 @@ class Step:
         """Rows beside those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape (offsets, nx).
 
         After the last row comes the first again; of an odd number of rows, one of zeros before it. Of a rank without
-        points, nothing.
+        points, nothing; nor of cells of one row.
         """
+        if self.shape[1] == 1:
+            return points[:0]
         cycle = self.fine.ny + self.fine.ny % 2
         return self._beside("points", self.fine, self.fine.dealt, cycle, offsets).fetch(points)
 
     def cells_beside(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """The same of rows beside the cells that end in points of this rank, of which none are missing."""
+        if self.shape[1] == 1:
+            return cells[:0]
         return self._beside("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
 
     @cached_property
     def _ending(self) -> list[slice]:
         """The rows of cells that end in points of each rank."""
-        return halves(self.fine.dealt)
+        return parts_of(self.fine.dealt, self.shape[1])
 
     def _beside(self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]) -> "RowsBeside":
         """Beside the part of each rank that has points; kept for the next time."""

@@ -70,11 +70,11 @@ def test_units_of_memory(points: int, unit: str) -> None:
 
 def test_cells_of_larger_grids_are_those_that_are_made() -> None:
     """Rank by rank, from the rows of that rank alone."""
-    for nx, ny, ranks, pairs in [(32, 24, 1, 0), (32, 24, 5, 2), (33, 70, 7, 1), (512, 301, 16, 0), (8, 5, 9, 3)]:
+    for nx, ny, ranks, pairs in [(32, 24, 1, 0), (32, 24, 5, 2), (33, 70, 7, 1), (512, 301, 16, 0), (8, 5, 9, -3)]:
         sizes = list(pyramid._larger(nx, ny, ranks, pairs))
         dealt, made = deal(ny, ranks), []
-        for _, height, alone in sizes:
-            dealt = [slice(0, height)] * ranks if alone else pyramid.halves(dealt)
+        for _, height, (_, tall), alone in sizes:
+            dealt = [slice(0, height)] * ranks if alone else pyramid.parts_of(dealt, tall)
             made.append(dealt)
         for rank in range(ranks):
             cells = [(parts[rank].stop - parts[rank].start) * size[0] for parts, size in zip(made, sizes, strict=True)]

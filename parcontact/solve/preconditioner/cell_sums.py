@@ -15,9 +15,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...parallel.pyramid import count_cells
 from ...parallel.slab import Array, Slab, dealt_to
 from .extension import pairs_for
-from .levels import count_cells, interpolate, interpolate_back, levels_of
+from .levels import interpolate, interpolate_back, levels_of
 
 Compliance = Callable[[Array], Array]  # displacement over pressure of waves, over their wavenumbers
 POINTS, CELLS = 1.5, 2.5  # tuning: with them M is near A: most waves yield 0.9 to 1.5 of what they should

@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import loop
+from ...parallel.pyramid import count_cells
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
-from .levels import count_cells, interpolate, interpolate_back, levels_of
+from .levels import interpolate, interpolate_back, levels_of
 
 FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
 LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none

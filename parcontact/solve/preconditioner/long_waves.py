@@ -26,7 +26,7 @@ from ...parallel.slab import Array, Slab, dealt_to
 from ...physics.layer import LongWaves
 from ..problem import Operator
 from .extension import ExtendedPreconditioner, lengths
-from .squares import add_up, add_up_back
+from .levels import levels_of
 
 DAMPING = np.float32(0.8)  # tuning: of the Jacobi steps
 DECAY = 2.0  # tuning: thicknesses over which z decays outside contact
@@ -39,9 +39,9 @@ class LongWavePreconditioner:
     """An extended preconditioner and what long waves add; four maps in single precision on each grid of cells."""
 
     def __init__(self, slab: Slab, waves: LongWaves, extended: ExtendedPreconditioner) -> None:
-        self._extended, self._steps = extended, pyramid.steps_of(slab)
+        self._extended, self._levels = extended, levels_of(slab)
         self._first = _first_grid(slab.nx, slab.ny, waves)
-        grids = [slab, *(step.coarse for step in self._steps)]
+        grids = [slab, *(level.coarse for level in self._levels)]
         kept = [grid if level or not self._first else None for level, grid in enumerate(grids)]
         none = np.empty((0, 0), np.float32)
         self._given, self._z, self._left, self._diagonal = (
@@ -81,10 +81,8 @@ class LongWavePreconditioner:
     def _weigh(self, working: NDArray[Any]) -> None:
         """Find the diagonals of all grids, from how many points of each cell are in the set."""
         counts = [working, *self._diagonal[1:]]
-        for k, step in enumerate(self._steps):
-            points, cells = counts[k : k + 2]
-            add_up(points, step.points_beside(points, 0, -1), step.above, cells[step.own])
-            step.complete(cells)
+        for k, cells in enumerate(self._levels):
+            cells.add_up(*counts[k : k + 2])
         for level, (diagonal, lines) in enumerate(zip(self._diagonal, self._cell_lengths, strict=True)):
             if level or not self._first:
                 faces = 2.0 * sum(self._faces)
@@ -93,7 +91,7 @@ class LongWavePreconditioner:
     def _cycle(self, level: int, r: Array) -> None:
         """Put z of a grid for what is given there into its map."""
         given, z, left, diagonal = (maps[level] for maps in (self._given, self._z, self._left, self._diagonal))
-        if level == len(self._steps):  # a single cell, whose neighbour is itself
+        if level == len(self._levels):  # a single cell, whose neighbour is itself
             z[...] = given / (diagonal - 2.0 * sum(self._faces))
         elif level < self._first:
             self._add_up(level, given if level else r)
@@ -113,19 +111,16 @@ class LongWavePreconditioner:
 
     def _find_rest(self, level: int) -> None:
         z = self._z[level]
-        beside = self._steps[level].points_beside(z, 0, -1)
+        beside = self._levels[level].step.points_beside(z, 0, -1)
         _rest(z, beside, self._given[level], self._diagonal[level], *self._faces, self._left[level])
 
     def _add_up(self, level: int, points: NDArray[Any]) -> None:
         """Give the next grid the sums over its cells."""
-        step, cells = self._steps[level], self._given[level + 1]
-        add_up(points, step.points_beside(points, 0, -1), step.above, cells[step.own])
-        step.complete(cells)
+        self._levels[level].add_up(points, self._given[level + 1])
 
     def _add_up_back(self, level: int, points: NDArray[Any]) -> None:
         """Add z of the next grid to points."""
-        step, cells = self._steps[level], self._z[level + 1]
-        add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, points)
+        self._levels[level].add_up_back(self._z[level + 1], points)
 
 
 def _first_grid(nx: int, ny: int, waves: LongWaves) -> int:

@@ -1,0 +1,105 @@
+"""Loops between points and cells of `wide` by `tall` points, each 1 or 2: sums over cells, interpolation between them,
+and the transposes of both. The interpolation takes 3/4 of a point's own cell and 1/4 of the nearest other one."""
+
+import numpy as np
+
+from ...compiled import loop
+
+
+@loop
+def row_of(own, beside, j):
+    """Row j, counted from the first of `own`; of those beside, the ones above are the last."""
+    if j < 0:
+        return beside[beside.shape[0] + j]
+    return own[j] if j < own.shape[0] else beside[j - own.shape[0]]
+
+
+@loop
+def add_up(points, beside, above, wide, tall, cells):
+    """The sums over cells."""
+    second = np.float32(tall - 1)
+    pairs = points.shape[1] // 2
+    for j in range(cells.shape[0]):
+        a, b = row_of(points, beside, tall * j - above), row_of(points, beside, tall * j - above + tall - 1)
+        out = cells[j]
+        if wide == 1:
+            for i in range(out.size):
+                out[i] = a[i] + second * b[i]
+            continue
+        for i in range(pairs):
+            out[i] = (a[2 * i] + second * b[2 * i]) + (a[2 * i + 1] + second * b[2 * i + 1])
+        for i in range(pairs, out.size):
+            out[i] = a[2 * i] + second * b[2 * i]
+
+
+@loop
+def add_up_back(cells, beside, above, wide, tall, points):
+    """Add the value of each cell to its points."""
+    pairs = points.shape[1] // 2
+    for j in range(points.shape[0]):
+        cell, out = row_of(cells, beside, (j + above) // tall), points[j]
+        if wide == 1:
+            for i in range(out.size):
+                out[i] += cell[i]
+            continue
+        for i in range(pairs):
+            out[2 * i] += cell[i]
+            out[2 * i + 1] += cell[i]
+        for i in range(2 * pairs, out.size):
+            out[i] += cell[i // 2]
+
+
+@loop
+def interpolate(cells, beside, above, wide, tall, known, points):
+    """Add `1 - known` times what is interpolated between cells."""
+    pairs, columns = points.shape[1] // 2, cells.shape[1]
+    line = np.empty(columns + 2, cells.dtype)
+    own, others = (np.float32(0.75), np.float32(0.25)) if tall == 2 else (np.float32(1.0), np.float32(0.0))
+    for j in range(points.shape[0]):
+        near = (j + above) // tall
+        other = near if tall == 1 else near + 1 if (j + above) % 2 else near - 1
+        a, b = row_of(cells, beside, near), row_of(cells, beside, other)
+        for i in range(columns):
+            line[i + 1] = own * a[i] + others * b[i]
+        out, weight = points[j], known[j]
+        if wide == 1:
+            for i in range(columns):
+                out[i] += (1.0 - weight[i]) * line[i + 1]
+            continue
+        line[0], line[columns + 1] = line[columns], line[1]
+        for i in range(pairs):
+            middle = np.float32(0.75) * line[i + 1]
+            out[2 * i] += (1.0 - weight[2 * i]) * (middle + np.float32(0.25) * line[i])
+            out[2 * i + 1] += (1.0 - weight[2 * i + 1]) * (middle + np.float32(0.25) * line[i + 2])
+        for i in range(2 * pairs, out.size):
+            out[i] += (1.0 - weight[i]) * (np.float32(0.75) * line[i // 2 + 1] + np.float32(0.25) * line[i // 2])
+
+
+@loop
+def interpolate_back(known, known_beside, points, beside, above, wide, tall, cells):
+    """Put points into cells: `1 - known` times their values, by the weights of the interpolation."""
+    count, columns = points.shape[1], cells.shape[1]
+    line = np.zeros(wide * columns + 2, cells.dtype)
+    for j in range(cells.shape[0]):
+        first = tall * j - above
+        a, w_a = row_of(points, beside, first), row_of(known, known_beside, first)
+        if tall == 1:
+            for i in range(count):
+                line[i + 1] = (1.0 - w_a[i]) * a[i]
+        else:
+            b, w_b = row_of(points, beside, first + 1), row_of(known, known_beside, first + 1)
+            over, w_over = row_of(points, beside, first - 1), row_of(known, known_beside, first - 1)
+            under, w_under = row_of(points, beside, first + 2), row_of(known, known_beside, first + 2)
+            for i in range(count):
+                outer = (1.0 - w_over[i]) * over[i] + (1.0 - w_under[i]) * under[i]
+                inner = (1.0 - w_a[i]) * a[i] + (1.0 - w_b[i]) * b[i]
+                line[i + 1] = 0.25 * outer + 0.75 * inner
+        out = cells[j]
+        if wide == 1:
+            for i in range(columns):
+                out[i] = line[i + 1]
+            continue
+        line[0], line[2 * columns + 1] = line[2 * columns], line[1]
+        for i in range(columns):
+            outer, inner = line[2 * i] + line[2 * i + 3], line[2 * i + 1] + line[2 * i + 2]
+            out[i] = np.float32(0.25) * outer + np.float32(0.75) * inner
