@@ -14,6 +14,7 @@ from . import style, units
 BINS = 60
 RESOLVED = 8  # cells that a wave needs to be resolved in a contact
 COARSEST = 800  # points of a map along a side: a finer one is drawn from every second, third, ... point
+ROUNDING = 1e-20  # rounding: powers below this share of the largest are not drawn
 LEGEND = 8  # size of letters [points]
 
 
@@ -41,9 +42,9 @@ def _draw_map(axes: Axes, sketch: Sketch) -> None:
     step = max(1, -(-max(sketch.heights.shape) // COARSEST))
     lx, ly = sketch.size
     heights, place = sketch.heights[::step, ::step], (0.0, lx, 0.0, ly)
-    image = axes.imshow(heights, origin="lower", extent=place, cmap="cividis", aspect="auto")
+    image = axes.imshow(heights, origin="lower", extent=place, cmap="cividis", aspect="equal")
     axes.grid(False)
-    units.label(axes.figure.colorbar(image, ax=axes).ax.yaxis, "height", "m")
+    units.label(axes.figure.colorbar(image, ax=axes, shrink=min(1.0, ly / lx)).ax.yaxis, "height", "m")
     units.label(axes.xaxis, "x", "m")
     units.label(axes.yaxis, "y", "m")
 
@@ -64,7 +65,8 @@ def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
 def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], name: str) -> None:
     """Draw spectra, each with its name, wavenumbers, powers and number, beside the limits of the grid."""
     for label, q, power, number in spectra:
-        axes.loglog(q[power > 0.0], power[power > 0.0], label=label, **style.line(number))
+        drawn = power > ROUNDING * power.max()
+        axes.loglog(q[drawn], power[drawn], label=label, **style.line(number))
     cell = max(length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True))
     axes.axvline(2 * np.pi / (RESOLVED * cell), color=style.GREY, ls=":", label=f"{RESOLVED} cells")
     axes.axvline(np.pi / cell, color=style.GREY, ls="--", label="2 cells")

@@ -1,10 +1,12 @@
-"""Measured maps from files: .npy, .txt and .xyz, and all other formats by SurfaceTopography where that is installed.
+"""Read measured maps and line scans: .npy, tables of text, .gsf; all other formats by SurfaceTopography, if installed.
 
-Heights point up, out of the road: what sticks out touches first.
+Heights point up, out of the road: the highest points touch first.
 """
 
+import re
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +19,13 @@ from ..job import Topography
 from ..parallel.slab import Array
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
-TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may say the others too
-PLAIN = (".npy", ".txt", ".xyz")  # formats without units
+UNITS |= {"km": 1e3, "cm": 1e-2, "Å": 1e-10, "A": 1e-10, "pm": 1e-12, "in": 0.0254}
+TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may have the others
+TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
 OF_NUMPY = ("npy", "npz")  # which SurfaceTopography reads with the first direction along x
 LARGEST_FILE = 4_000_000_000  # tuning: bytes
-IRREGULAR = 1e-3  # accuracy: of a step: positions of a .xyz file further from a grid than this are on none
+LONGEST_HEAD = 200  # tuning: lines before the first number of a text
+IRREGULAR = 0.1  # accuracy: of a step: positions further from a grid than this are on none; others are rounded
 FEWEST = 4  # tuning: points along a direction
 MOST_POSITIONS = 10**6  # tuning: along a direction
 MOST_MISSING = 2  # tuning: times as many points of the grid as of the file
@@ -36,23 +40,33 @@ class Map:
     size: tuple[float, float]
 
 
-def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel: str | None) -> Map:
-    """Read a map. `unit` of the heights (of a .xyz file: of all lengths) and the `size` [m] must be given for formats
-    that have none, and only for those. Raises InputError, in one sentence."""
+@dataclass(frozen=True)
+class Contents:
+    """Numbers of a file, shape (ny, nx), and what it says: their unit [m], the size of the map, and its unit [m]."""
+
+    values: Array
+    unit: float | None = None
+    size: tuple[float, float] | None = None
+    unit_xy: float | None = None
+
+
+def read(part: Topography) -> Map:
+    """Read a map. The job must give units and size for files that do not have them, and only for those. Raises
+    InputError, in one sentence."""
+    path = part.path
     try:
         if not path.is_file():
             raise InputError(f"{path} is not a file; a map of heights was expected")
         if path.stat().st_size > LARGEST_FILE:
             raise InputError(f"{path} has more than {LARGEST_FILE / 1e9:g} GB; crop the map first")
-        headed = path.suffix == ".txt" and unit is None and size is None  # its header may say both
-        plain = path.suffix in PLAIN and not headed
-        found = _plain(path, unit, size) if plain else _of_instrument(path, unit, size, channel)
+        ending = path.suffix.lower()
+        readers = {".npy": _array, ".gsf": _simple_field, **dict.fromkeys(TEXTS, _text)}
+        found = _in_metres(part, readers.get(ending, _instrument)(part))
     except InputError:
         raise
     except Exception as error:  # readers of damaged files raise anything
         said = str(error).partition("\n")[0] or type(error).__name__
-        raise InputError(f"{path} cannot be read: {datafiles.foreign_numbers(path) or said}") from error
-    _refuse_odd_numbers(path, found)
+        raise InputError(f"{path} cannot be read: {said}") from error
     if min(found.heights.shape) < FEWEST:
         raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} each way were expected")
     if np.isfinite(found.heights).sum() < found.heights.size / 2:
@@ -60,41 +74,73 @@ def read(path: Path, unit: str | None, size: tuple[float, float] | None, channel
     return found
 
 
-def _refuse_odd_numbers(path: Path, found: Map) -> None:
-    if not all(0.0 < length < np.inf for length in found.size):
-        raise InputError(f"{path}: its map would be {found.size[0]:g} x {found.size[1]:g} m, which is no size")
-    largest = float(np.abs(found.heights, where=np.isfinite(found.heights), out=np.zeros_like(found.heights)).max())
+def _in_metres(part: Topography, found: Contents) -> Map:
+    """Return the map in m, with missing points as NaN."""
+    path, given = part.path, UNITS.get(part.unit_of_heights or "")
+    if found.unit is not None and given not in (None, found.unit):
+        raise InputError(f"{path} has a unit of its own: give no unit")
+    if (unit := found.unit or given) is None:
+        raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
+    if found.values.ndim != 2:
+        raise InputError(f"{path} has {found.values.ndim} dimensions; a map of two was expected")
+    if found.size is not None:
+        if part.size or part.pixel:
+            raise InputError(f"{path} has a size of its own: give no {'size' if part.size else 'pixel'}")
+        unit_xy = found.unit_xy or (UNITS[part.units.xy] if part.units else unit)
+        lx, ly = (float(length * unit_xy) for length in found.size)
+    elif given_size := part.size_of(found.values.shape[::-1]):
+        lx, ly = given_size
+    else:
+        raise InputError(f"{path} does not say how large its map is: give size: [lx, ly], or pixel [m]")
+    if not (0.0 < lx < np.inf and 0.0 < ly < np.inf):
+        raise InputError(f"{path}: its map would be {lx:g} x {ly:g} m, which is no size")
+    values = np.ma.masked_invalid(np.asarray(found.values, dtype=np.float64)).filled(np.nan)
+    heights = np.where(values == part.nodata, np.nan, values) * unit
+    largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max(initial=0.0))
     if largest and not LOWEST <= largest <= HIGHEST:
         raise InputError(f"{path}: its largest height is {largest:.3g} m, which cannot be computed with")
+    return Map(np.ascontiguousarray(heights), (lx, ly))
 
 
-def _plain(path: Path, unit: str | None, size: tuple[float, float] | None) -> Map:
-    if unit is None:
-        raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
-    if path.suffix == ".xyz":
-        if size is not None:
-            raise InputError(f"{path} has positions of its own: give no size")
-        return _positions(path, np.loadtxt(path, ndmin=2, dtype=np.float64), UNITS[unit])
-    if size is None:
-        raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
-    values = datafiles.open_numbers(path) if path.suffix == ".npy" else _text(path)
-    masked = np.ma.masked_invalid(np.asarray(values, dtype=np.float64))
-    if masked.ndim != 2:
-        raise InputError(f"{path} has {masked.ndim} dimensions; a map of two was expected")
-    return Map(masked.filled(np.nan) * UNITS[unit], size)
+def _array(part: Topography) -> Contents:
+    return Contents(datafiles.open_numbers(part.path))
 
 
-def _text(path: Path) -> Array:
-    if foreign := datafiles.foreign_numbers(path):
-        raise InputError(f"{path} cannot be read: {foreign}")
+def _text(part: Topography) -> Contents:
+    """Read a matrix of heights, rows of x, y and z, or an ESRI grid; those with another header are of instruments."""
+    with part.path.open(encoding="latin-1") as file:
+        start = [*islice(file, LONGEST_HEAD)]
+    first = next((number for number, line in enumerate(start) if _numbers(line)), None)
+    if first is None:
+        return _instrument(part)
+    if datafiles.has_decimal_commas(start[first]):
+        raise InputError(f"{part.path} cannot be read: its numbers have decimal commas; write them with points")
+    head, columns = [line.strip() for line in start[:first] if line.strip()], len(_numbers(start[first]))
+    said = {line.split()[0].lower(): _numbers(line.partition(" ")[2]) for line in head}
+    known = all(line.startswith("#") for line in head) and part.unit_of_heights and (part.size or part.pixel)
+    if head and columns > 3 and "cellsize" not in said and not known:
+        return _instrument(part)
+    mark = next((mark for mark in ";," if mark in start[first]), None)
+    table = np.loadtxt(part.path, delimiter=mark, skiprows=first, ndmin=2, usecols=range(columns), encoding="latin-1")
+    if "cellsize" in said:  # of ESRI, whose first row is the northernmost
+        missing, (cell,) = said.get("nodata_value") or [np.nan], said["cellsize"]
+        return Contents(np.where(table == missing, np.nan, table)[::-1], None, (cell * columns, cell * len(table)))
+    if columns > 3:
+        return Contents(table)
+    units = [UNITS[word] for word in re.findall(r"[\[(]\s*([mnuµμ]?m)\s*[\])]", head[-1] if head else "")]
+    return _positions(part.path, table, *((units[0], units[2]) if len(units) == 3 else (None, None)))
+
+
+def _numbers(line: str) -> list[float]:
+    """Return the numbers of a line, none of one that holds anything else."""
     try:
-        return np.genfromtxt(path, dtype=np.float64)
-    except ValueError as error:
-        raise InputError(f"{path} cannot be read: its lines do not have as many numbers each") from error
+        return [float(word) for word in re.split(r"[,;\s]+", line.strip(" ,;\t\r\n"))]
+    except ValueError:
+        return []
 
 
-def _positions(path: Path, table: Array, unit: float) -> Map:
-    """A map from rows of x, y and z in any order; points that are not there are missing."""
+def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> Contents:
+    """Return a map from rows of x, y and z in any order; points that are not there are missing."""
     if table.shape[1] != 3:
         raise InputError(f"{path} has {table.shape[1]} columns; x, y and z were expected")
     if (wrong := np.flatnonzero(~np.isfinite(table[:, :2]).all(axis=1))).size:
@@ -109,28 +155,41 @@ def _positions(path: Path, table: Array, unit: float) -> Map:
         )
     heights = np.full((ny, nx), np.nan)
     heights[y, x] = table[:, 2]
-    return Map(heights * unit, (nx * dx * unit, ny * dy * unit))
+    return Contents(heights, unit, (nx * dx, ny * dy), unit_xy)
 
 
 def _steps(path: Path, name: str, values: Array) -> tuple[NDArray[np.intp], int, float]:
-    """Indices, their number, and the step of positions on a regular grid."""
+    """Return indices, their number, and the step of positions on a regular grid, rounded as a file has them."""
     distinct = np.unique(values)
     if distinct.size < FEWEST:
         raise InputError(f"{path} has {distinct.size} positions along {name}; at least {FEWEST} were expected")
-    step = float(np.median(np.diff(distinct)))
-    index = (values - distinct[0]) / step
-    if not index.max() < MOST_POSITIONS:
+    gaps = np.diff(distinct)
+    steps = np.round(gaps / np.median(gaps))  # columns may be missing altogether
+    if not steps.sum() < MOST_POSITIONS:
         raise InputError(
-            f"{path}: its positions along {name} reach from {distinct[0]:g} to {distinct[-1]:g} in steps of {step:g}, "
-            f"which is more than {MOST_POSITIONS:.0e} of them"
+            f"{path}: its positions along {name} reach from {distinct[0]:g} to {distinct[-1]:g} in steps of "
+            f"{np.median(gaps):g}, which is more than {MOST_POSITIONS:.0e} of them"
         )
+    step = float((distinct[-1] - distinct[0]) / steps.sum())
+    index = (values - distinct[0]) / step
     if np.abs(index - np.round(index)).max() > IRREGULAR:
         raise InputError(f"{path}: its positions along {name} are not equally spaced")
-    whole = np.round(index).astype(np.intp)
-    return whole, int(whole.max()) + 1, step
+    return np.round(index).astype(np.intp), int(steps.sum()) + 1, step
 
 
-def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | None, channel: str | None) -> Map:
+def _simple_field(part: Topography) -> Contents:
+    """Read a Gwyddion simple field: a head of `key = value`, one to four zero bytes, and rows of single precision."""
+    data = part.path.read_bytes()
+    head = data.partition(b"\0")[0]
+    said = dict(re.findall(r"^(\w+) *= *(.*?)\s*$", head.decode("utf-8"), re.MULTILINE))
+    nx, ny = int(said["XRes"]), int(said["YRes"])
+    units = [_scale(part.path, said[key]) if said.get(key) else None for key in ("ZUnits", "XYUnits")]
+    values = np.frombuffer(data, "<f4", nx * ny, 4 * (len(head) // 4 + 1)).reshape(ny, nx)
+    return Contents(values, units[0], (float(said.get("XReal", 1.0)), float(said.get("YReal", 1.0))), units[1])
+
+
+def _instrument(part: Topography) -> Contents:
+    path = part.path
     try:
         import SurfaceTopography
         from SurfaceTopography.Exceptions import CannotDetectFileFormat, CorruptFile, UnknownFileFormat
@@ -142,48 +201,37 @@ def _of_instrument(path: Path, unit: str | None, size: tuple[float, float] | Non
     try:
         reader = SurfaceTopography.open_topography(str(path))
     except (CannotDetectFileFormat, CorruptFile, UnknownFileFormat) as error:
-        why = datafiles.foreign_numbers(path) or "it is damaged, or of no format that SurfaceTopography knows"
-        raise InputError(f"{path} cannot be read: {why}") from error
+        raise InputError(
+            f"{path} cannot be read: it is damaged, or of no format that SurfaceTopography knows"
+        ) from error
     if reader.format() in OF_NUMPY:
         raise InputError(f"{path} may have x or y first; save its array by numpy.save as .npy, whose rows are along x")
     names = [found.name for found in reader.channels]
-    if channel is not None and channel not in names:
-        raise InputError(f"{path} has no channel {channel!r}; it has {', '.join(map(str, names))}")
-    chosen = reader.channels[names.index(channel)] if channel is not None else reader.default_channel
-    own_unit, own_size = chosen.unit, chosen.physical_sizes
-    _refuse_twice(path, unit is not None and own_unit is not None, "a unit", "unit")
-    _refuse_twice(path, size is not None and own_size is not None, "a size", "size")
-    if own_unit is None and unit is None:
-        raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
-    topography = chosen.topography(**({"physical_sizes": size} if own_size is None and size is not None else {}))
+    if not names or (reader.format() == "hgt" and path.suffix.lower() != ".hgt"):  # which reads any file as heights
+        raise InputError(f"{path} has no channel of heights")
+    if part.channel is not None and part.channel not in names:
+        raise InputError(f"{path} has no channel {part.channel!r}; it has {', '.join(map(str, names))}")
+    chosen = reader.channels[names.index(part.channel)] if part.channel is not None else reader.default_channel
+    size = chosen.physical_sizes
+    topography = chosen.topography(**({"physical_sizes": chosen.nb_grid_pts} if size is None else {}))
     if len(topography.nb_grid_pts) != 2:
         raise InputError(f"{path} is a line scan; a map was expected")
-    scale = UNITS[unit] if unit is not None else _scale(path, own_unit)
-    if topography.physical_sizes is None:
-        raise InputError(f"{path} does not say how large its map is: give size: [lx, ly] [m]")
-    lengths = size if own_size is None and size is not None else tuple(s * scale for s in topography.physical_sizes)
-    heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan)
-    return Map(np.ascontiguousarray(np.asarray(heights, dtype=np.float64).T) * scale, (lengths[0], lengths[1]))
+    unit = _scale(path, chosen.unit) if chosen.unit is not None else None
+    heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan).T
+    return Contents(heights, unit, None if size is None else tuple(topography.physical_sizes), unit)
 
 
-def _refuse_twice(path: Path, both: bool, what: str, key: str) -> None:
-    if both:
-        raise InputError(f"{path} has {what} of its own: give no {key}")
-
-
-def _scale(path: Path, unit: object) -> float:
-    from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
-
-    factor = get_unit_conversion_factor(str(unit), "m")
-    if factor is None:
-        raise InputError(f"{path}: its unit {unit} is no length")
-    return float(factor)
+def _scale(path: Path, unit: Any) -> float:
+    """Return a unit in m."""
+    if unit not in UNITS:
+        raise InputError(f"{path}: its unit {unit} is no length that is known")
+    return UNITS[unit]
 
 
 def extent_of(part: Topography, box: Any = None) -> tuple[tuple[int, int], tuple[float, float]]:
     """Points along x and y and size (lx, ly) [m] of a map, or of the part of it that is as large as a `box` [m]; a
     mirrored map is twice as long. Raises InputError."""
-    points, size = _extent(part.path, part.path.stat().st_mtime_ns, part.unit, part.size, part.channel)
+    points, size = _extent(part, part.path.stat().st_mtime_ns)
     copies = 2 if part.periodic == "mirror" else 1
     size = copies * size[0], copies * size[1]
     lengths = box if isinstance(box, list | tuple) and len(box) == 2 else (box, box)
@@ -195,9 +243,7 @@ def extent_of(part: Topography, box: Any = None) -> tuple[tuple[int, int], tuple
 
 
 @lru_cache(maxsize=4)  # the cases of a sweep have the same map
-def _extent(
-    path: Path, _: int, unit: str | None, size: tuple[float, float] | None, channel: str | None
-) -> tuple[tuple[int, int], tuple[float, float]]:
-    found = read(path, unit, size, channel)
+def _extent(part: Topography, _: int) -> tuple[tuple[int, int], tuple[float, float]]:
+    found = read(part)
     ny, nx = found.heights.shape
     return (nx, ny), found.size

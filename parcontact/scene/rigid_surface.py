@@ -25,15 +25,17 @@ FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by th
 
 
 class Told(NamedTuple):
-    """What a user is told of measured maps: root has notes on how they were prepared, and every rank has doubts."""
+    """Sentences on measured maps: root has notes on how they were prepared, and every rank has doubts and the names of
+    maps with points that stick out."""
 
     notes: list[str]
     doubts: list[str]
+    spiky: list[str]
 
 
 def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
     """Return the rigid surface of a job, and what to say of its measured maps; collective. Raises InputError."""
-    grid, told = job.grid, Told([], [])
+    grid, told = job.grid, Told([], [], [])
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
     waves = reduce(add, (_waves(part, grid, fft, told) for part in spectral)) if spectral else None
     shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
@@ -108,9 +110,10 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     if isinstance(part, jobs.Topography):
         from ..road import prepared_map as road  # with much of scipy, which is slow to import
 
-        rows, done, doubt = road.rows_of(part, grid, fft.slab)
+        rows, done, doubts, spiky = road.rows_of(part, grid, fft.slab)
         told.notes.extend(done)
-        told.doubts.extend([doubt] if doubt else [])
+        told.doubts.extend(doubts)
+        told.spiky.extend([part.path.name] if spiky else [])
         return _transform(rows, fft)
     if isinstance(part, jobs.HeightFile):
         return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)

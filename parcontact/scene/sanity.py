@@ -74,7 +74,7 @@ def _check_heights(setup: Setup) -> Iterator[str]:
     if law and setup.roughness and not setup.surface.shapes and (text := beyond_heights(law, span)):
         yield text
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
-        asked, spiky = setup.choices.numerics.asked, bool(setup.told.doubts)
+        asked, spiky = setup.choices.numerics.asked, bool(setup.told.spiky)
         yield from advice.measured(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
 
 

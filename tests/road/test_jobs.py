@@ -150,6 +150,53 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
     assert err.startswith("parcontact: --out must end in .png, .pdf, .svg")
 
 
+# -- what is taken out of a map, and what is doubted ------------------------------------------------------------------
+
+
+def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
+    """By 50 um of a road with waves down to 40 um: a ring of its spectrum is missing, and the report says so."""
+    (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
+    setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
+    assert setup.told.notes[-1] == "road: waves shorter than 50 um were taken out (ideal low-pass)"
+    found = heights_of(road, MPI.COMM_SELF, more=", short_wavelength: 50.0e-6")
+    q = 2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)
+    power = np.abs(np.fft.fft2(found)) ** 2
+    beyond = np.hypot(q, q[:, None]) > 2 * np.pi / 49.9e-6
+    assert power[beyond].sum() < 1e-20 * power.sum()
+    assert setup.shortest == pytest.approx(50e-6, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("more", "doubt"),
+    [
+        ("size: [1.5, 1.5]", "the map is 1.5 x 1.5 m; are lengths in m?"),
+        ("pixel: 0.01", "the map is 1.92 x 1.92 m; are lengths in m?"),
+        ("pixel: [1.3e-5, 3.0e-5]", "points of the map are 13 um apart along x and 30 um along y"),
+        ("unit: nm, size: [1.0e-2, 1.0e-2]", "the map is 10 mm x 10 mm, and its heights differ by 3"),
+        ("pixel: [1.3e-5, 1.4e-5]", ""),
+    ],
+)
+def test_sizes_that_are_doubted(road: Path, more: str, doubt: str) -> None:
+    """A map of more than a metre, heights of less than 1e-5 of its side, and pixels that are no squares."""
+    text = JOB.replace("unit: um, size: [1.0e-3, 1.0e-3]", more if "unit" in more else f"unit: um, {more}").replace(
+        "size: {size}", "size: from surface"
+    )
+    (road / "job.yaml").write_text(text.format(points=POINTS, more=", outliers: clip"))
+    found = scene.set_up(mesh.load(road / "job.yaml"), Slab.alone(POINTS, POINTS)).told.doubts
+    assert bool(found) == bool(doubt)
+    assert not doubt or any(doubt in text and text.startswith("surface: road.npy: ") for text in found)
+
+
+def test_clipped_outliers_are_no_doubt(road: Path) -> None:
+    heights = truth.rough(POINTS, LENGTH, 2.5e-4, 4e-5, SLOPE)
+    heights[60, 70] += 20e-6
+    np.save(road / "road.npy", heights * 1e6)
+    (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", outliers: clip"))
+    setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
+    assert setup.told.doubts == []
+    assert "road: 1 points that stuck out were set to the median of their neighbours" in setup.told.notes
+
+
 # -- the grid of the map, and a map without a job ---------------------------------------------------------------------
 
 

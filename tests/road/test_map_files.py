@@ -4,6 +4,7 @@ import math
 import re
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +12,24 @@ import SurfaceTopography
 from numpy.testing import assert_allclose
 
 from parcontact.errors import InputError
+from parcontact.job import Topography
+from parcontact.job.sections.geometry import MapUnits
 from parcontact.road import map_files
 
 SIZE = (6e-5, 4e-5)
 HEIGHTS = 1e-6 * np.random.default_rng(5).standard_normal((16, 24))  # (ny, nx) [m]
+
+
+def read(
+    path: Path,
+    unit: str | None = None,
+    size: tuple[float, float] | None = None,
+    channel: str | None = None,
+    **more: Any,
+) -> map_files.Map:
+    given = {"unit": unit, "size": size, "channel": channel, **more}
+    part = Topography.model_construct(path=path, **{key: value for key, value in given.items() if value is not None})
+    return map_files.read(part)
 
 
 def write(folder: Path) -> dict[str, tuple[Path, str | None, tuple[float, float] | None]]:
@@ -37,10 +52,82 @@ def write(folder: Path) -> dict[str, tuple[Path, str | None, tuple[float, float]
 @pytest.mark.parametrize("name", ["road.nc", "road.x3p", "road.gwy", "headed.txt", "road.npy", "road.txt", "road.xyz"])
 def test_all_formats_give_the_same_map(tmp_path: Path, name: str) -> None:
     """To 1e-12 of its height; headed.txt is written with fewer digits by SurfaceTopography."""
-    found = map_files.read(*write(tmp_path)[name], None)
+    found = read(*write(tmp_path)[name], None)
     assert found.heights.shape == HEIGHTS.shape
     assert_allclose(found.heights, HEIGHTS, rtol=0.0, atol=1e-12 * np.ptp(HEIGHTS))
     assert_allclose(found.size, SIZE, rtol=1e-12)
+
+
+def rows(mark: str = " ", cell: float = 2.5, digits: int = 6) -> str:
+    """Positions and heights of the map in um; positions in units of 1 um at a cell of 2.5."""
+    y, x = np.indices(HEIGHTS.shape)
+    columns = zip(x.ravel() * cell, y.ravel() * cell, HEIGHTS.ravel() * 1e6, strict=True)
+    return "".join(mark.join((f"{a:.{digits}f}", f"{b:.{digits}f}", repr(float(z)))) + "\n" for a, b, z in columns)
+
+
+UM = {"unit": "um"}
+TABLES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "three columns in .txt": ("road.txt", rows(), UM),
+    "a header": ("road.xyz", "X Y Z\n" + rows(), UM),
+    "names with units": ("road.csv", "x (um),y (um),z (um)\n" + rows(","), {}),
+    "a file of a laboratory": ("road.dat", "Surface of 3 \xb5m\n\nx[um]; y[um]; z[um]\n" + rows(";"), {}),
+    "positions in mm": ("road.xyz", rows(cell=2.5e-3), {"units": MapUnits(xy="mm", z="um")}),
+    "names with two units": ("road.xyz", "x [mm] y [mm] z [um]\n" + rows(cell=2.5e-3), {}),
+}
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_tables_of_positions(tmp_path: Path, case: str) -> None:
+    """The same map to rounding, whatever separates numbers and stands above them; Latin-1 is read."""
+    name, text, given = TABLES[case]
+    (tmp_path / name).write_bytes(text.encode("latin-1"))
+    found = read(tmp_path / name, **given)
+    assert_allclose(found.heights, HEIGHTS, rtol=1e-12)
+    assert_allclose(found.size, SIZE, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("cell", "digits"), [(1.6504, 3), (0.33333, 2), (2.5, 6)])
+def test_positions_that_are_rounded(tmp_path: Path, cell: float, digits: int) -> None:
+    """To fixed digits: the step is known to a digit over the length of the map."""
+    (tmp_path / "road.xyz").write_text(rows(cell=cell, digits=digits))
+    found = read(tmp_path / "road.xyz", "um")
+    assert_allclose(found.heights, HEIGHTS, rtol=1e-12)
+    for length, count in zip(found.size, (24, 16), strict=True):
+        assert length / count == pytest.approx(cell * 1e-6, abs=10.0**-digits / (count - 1) * 1e-6)
+
+
+def test_a_grid_of_esri(tmp_path: Path) -> None:
+    """Its first row is the northernmost, with the largest y; its cells and its mark of missing points are read."""
+    holed = HEIGHTS * 1e6
+    holed[3, 5] = -9999.0
+    head = "ncols 24\nnrows 16\nxllcorner 0.0\nyllcorner 0.0\ncellsize 2.5\nNODATA_value -9999\n"
+    (tmp_path / "road.asc").write_text(head + "\n".join(" ".join(map(repr, row)) for row in holed[::-1].tolist()))
+    found = read(tmp_path / "road.asc", "um")
+    assert_allclose(found.size, SIZE, rtol=1e-12)
+    assert np.argwhere(np.isnan(found.heights)).tolist() == [[3, 5]]
+    assert_allclose(np.nan_to_num(found.heights), np.where(holed == -9999.0, 0.0, HEIGHTS), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "more", ["ZUnits = m\n", "ZUnits = m\nA = 1\n", "A = 12\nZUnits = m\n", "ZUnits = m\nA = 123\n"]
+)
+def test_a_simple_field_of_gwyddion(tmp_path: Path, more: str) -> None:
+    """In single precision; its head ends with one to four zero bytes, at a multiple of four."""
+    head = GSF.format(more).rstrip("\0").encode()
+    head += b"\0" * (4 - len(head) % 4)
+    (tmp_path / "road.gsf").write_bytes(head + HEIGHTS.astype("<f4").tobytes())
+    found = read(tmp_path / "road.gsf")
+    assert_allclose(found.heights, HEIGHTS, rtol=1e-7)
+    assert_allclose(found.size, SIZE, rtol=1e-12)
+
+
+def test_size_by_pixels_and_a_mark_of_missing_points(tmp_path: Path) -> None:
+    marked = HEIGHTS * 1e6
+    marked[0, 1] = -9999.0
+    np.save(tmp_path / "road.npy", marked)
+    found = read(tmp_path / "road.npy", "um", pixel=(2.5e-6, 2.5e-6), nodata=-9999.0)
+    assert_allclose(found.size, SIZE, rtol=1e-12)
+    assert np.argwhere(np.isnan(found.heights)).tolist() == [[0, 1]]
 
 
 def test_missing_points(tmp_path: Path) -> None:
@@ -53,7 +140,7 @@ def test_missing_points(tmp_path: Path) -> None:
     table = np.stack([x.ravel(), y.ravel(), holed.ravel()], axis=1)
     np.savetxt(tmp_path / "road.xyz", table[np.isfinite(table[:, 2])])
     for name, size in (("road.npy", SIZE), ("road.txt", SIZE), ("road.xyz", None)):
-        found = map_files.read(tmp_path / name, "m", size, None)
+        found = read(tmp_path / name, "m", size, None)
         assert np.array_equal(np.isnan(found.heights), np.isnan(holed))
 
 
@@ -62,6 +149,7 @@ def save(path: Path, values: object) -> None:
         np.save(file, np.asarray(values), allow_pickle=True)
 
 
+GSF = "Gwyddion Simple Field 1.0\nXRes = 24\nYRes = 16\nXReal = 6e-5\nYReal = 4e-5\nXYUnits = m\n{}\0\0"
 SQUARE = "".join(f"{x} {y} 0\n" for x in range(6) for y in range(6))
 BAD = {
     "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "does not say the unit of its heights"),
@@ -89,7 +177,14 @@ BAD = {
     "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
     "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
-    "commas": ("road.txt", "1,2,3,4\n" * 4, ("m", SIZE, None), "separated by commas; save them separated by blanks"),
+    "a phase": (
+        "road.gsf",
+        GSF.format("ZUnits = deg\n") + 4 * 384 * "\0",
+        (None, None, None),
+        "its unit deg is no length",
+    ),
+    "no heights": ("road.nms", "\0" * 3468, (None, None, None), "of no format that SurfaceTopography knows"),
+    "bytes": ("road.bin", bytes(range(200)) * 25, ("m", SIZE, None), "has no channel of heights"),
     "decimal commas": (
         "road.txt",
         "1,25 3,4 0 -2,1\n" * 4,
@@ -106,10 +201,10 @@ BAD = {
         "positions along x are not equally spaced",
     ),
     "few positions": ("road.xyz", "0 0 1\n1 1 1\n2 2 1\n", ("m", None, None), "has 3 positions along x"),
-    "a size twice": ("road.xyz", "0 0 1\n", ("m", SIZE, None), "give no size"),
+    "a size twice": ("road.xyz", SQUARE, ("m", SIZE, None), "give no size"),
     "an unknown format": ("road.abc", "what is this", (None, None, None), "of no format that SurfaceTopography knows"),
     "an array in a file of another name": ("road.npz", HEIGHTS, ("m", SIZE, None), "may have x or y first; save its"),
-    "a unit twice": ("road.nc", None, ("um", None, None), "give no unit"),
+    "a unit twice": ("road.nc", None, ("mm", None, None), "give no unit"),
     "its size twice": ("road.nc", None, (None, SIZE, None), "give no size"),
     "an unknown channel": ("road.nc", None, (None, None, "Gloss"), "has no channel 'Gloss'; it has Default"),
 }
@@ -123,10 +218,12 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
         write(tmp_path)
     elif isinstance(content, str):
         path.write_text(content)
+    elif isinstance(content, bytes):
+        path.write_bytes(content)
     else:
         save(path, content)
     with pytest.raises(InputError) as failure:
-        map_files.read(path, *given)
+        read(path, *given)
     assert sentence in str(failure.value)
     assert "\n" not in str(failure.value)
 
@@ -137,7 +234,7 @@ def test_a_header_of_gigabytes(tmp_path: Path) -> None:
         file.write(b"\x93NUMPY\x02\x00\xff\xff\xff\xe0")
         file.truncate(3_900_000_000)
     with pytest.raises(InputError, match="its header claims to be larger than 1 MB"):
-        map_files.read(tmp_path / "road.npy", "m", SIZE, None)
+        read(tmp_path / "road.npy", "m", SIZE, None)
 
 
 @pytest.mark.parametrize("ending", ["x3p", "gwy", "nc"])
@@ -146,7 +243,7 @@ def test_half_a_file(tmp_path: Path, ending: str) -> None:
     path = write(tmp_path)[f"road.{ending}"][0]
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(InputError, match=r"road\.\w+ (cannot be read|is damaged)"):
-        map_files.read(path, None, None, None)
+        read(path, None, None, None)
 
 
 def test_an_increment_that_is_no_number(tmp_path: Path) -> None:
@@ -160,7 +257,7 @@ def test_an_increment_that_is_no_number(tmp_path: Path) -> None:
         for name, data in parts.items():
             new.writestr(name, data)
     with pytest.raises(InputError, match=r"its map would be nan x nan m, which is no size"):
-        map_files.read(path, None, None, None)
+        read(path, None, None, None)
 
 
 def test_a_header_that_claims_too_much(tmp_path: Path) -> None:
@@ -169,7 +266,7 @@ def test_a_header_that_claims_too_much(tmp_path: Path) -> None:
     with path.open("wb") as file:
         np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)})
     with pytest.raises(InputError, match="cannot be read: "):
-        map_files.read(path, "m", SIZE, None)
+        read(path, "m", SIZE, None)
 
 
 def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,5 +275,5 @@ def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     write(tmp_path)
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     with pytest.raises(InputError, match="pip install 'parcontact"):
-        map_files.read(tmp_path / "road.x3p", None, None, None)
-    assert map_files.read(tmp_path / "road.npy", "um", SIZE, None).heights.shape == (16, 24)
+        read(tmp_path / "road.x3p", None, None, None)
+    assert read(tmp_path / "road.npy", "um", SIZE, None).heights.shape == (16, 24)

@@ -63,7 +63,7 @@ def table(head: str, q: Array, values: Array) -> str:
 
 def heights_of(job: jobs.Job, comm: MPI.Intracomm = MPI.COMM_SELF) -> tuple[Array, Slab, list[str]]:
     slab = Slab(comm, *job.grid.points)
-    made, (told, _) = rigid_surface.make_surface(job, FFT(slab))
+    made, (told, *_) = rigid_surface.make_surface(job, FFT(slab))
     return made.heights((0.0, 0.0), slab.empty()), slab, told
 
 

@@ -21,7 +21,7 @@ X, Y = np.meshgrid(np.linspace(-1.0, 1.0, 128), np.linspace(-1.0, 1.0, 128))
         ("curvature", [3e-6, 2e-5, -1e-5, 4e-6, 5e-6, -6e-6]),
     ],
 )
-def test_a_trend_is_found_and_taken_off(detrend: treatment.Detrend, trend: list[float]) -> None:
+def test_a_trend_is_found_and_taken_off(detrend: str, trend: list[float]) -> None:
     """Exactly, where nothing else is there and a tenth of the points is missing."""
     terms = [np.ones_like(X), X, Y, X * X, X * Y, Y * Y]
     heights = np.sum([c * term for c, term in zip(trend, terms, strict=False)], axis=0)
@@ -61,13 +61,13 @@ def test_a_periodic_map_is_left_alone() -> None:
 
 
 def test_windows_keep_the_mean_square_and_mirrors_everything() -> None:
-    tapered = treatment.taper(ROAD)
+    tapered, _ = treatment.taper(ROAD)
     assert np.abs(tapered[0]).max() < 0.01 * np.ptp(ROAD)
     assert np.std(tapered) == pytest.approx(np.std(ROAD), rel=0.1)
     assert np.diff(tapered[64, 20:108]) == pytest.approx(8.0 / 7.0 * np.diff(ROAD[64, 20:108]), rel=2e-3)
     assert treatment.treat(ROAD, "none", "window").enlarged == pytest.approx(8.0 / 7.0, rel=2e-3)  # 12.8 cells
     assert treatment.treat(ROAD, "none", "smooth").enlarged == 1.0
-    mirrored = treatment.mirror(ROAD)
+    mirrored = treatment.treat(ROAD, "none", "mirror").heights
     assert mirrored.shape == (256, 256)
     assert np.array_equal(mirrored[:128, :128], ROAD)
     assert np.array_equal(mirrored[128:, :128], ROAD[::-1])
@@ -90,10 +90,31 @@ def test_resampling_by_fourier_series(shape: tuple[int, int]) -> None:
     assert_allclose(found, waves(shape, *kept, *(lost if fits else [])), atol=1e-12)
 
 
+@pytest.mark.parametrize("shape", [(128, 128), (60, 64), (150, 128)])
+def test_an_ideal_low_pass(shape: tuple[int, int]) -> None:
+    """Waves within the ellipse stay exactly, also those on it; others are gone, on any grid."""
+
+    def waves(shape: tuple[int, int], *numbers: tuple[int, int]) -> np.ndarray:
+        y, x = (2 * np.pi * np.arange(n) / n for n in shape)
+        return np.sum([np.cos(a * x + b * y[:, None] + a + 0.3) for a, b in numbers], axis=0)
+
+    kept, lost = [(3, 4), (0, 20), (10, 0), (6, -16)], [(0, 21), (11, 0), (9, 12)]
+    found = treatment.resample(waves((128, 128), *kept, *lost), shape, most=(20.0 * (1 + 1e-9), 10.0 * (1 + 1e-9)))
+    assert_allclose(found, waves(shape, *kept), atol=1e-12)
+
+
+def test_a_low_pass_of_a_map_with_open_edges() -> None:
+    """A slope keeps its height, as its harmonic part is not filtered; a short wave on it is gone inside."""
+    slope = np.tile(np.linspace(0.0, 1.0, 128, endpoint=False), (128, 1))
+    wave = 0.1 * np.cos(2 * np.pi * 32 * np.arange(128) / 128)
+    found = treatment.resample(slope + wave[:, None], (128, 128), joined=False, most=(16.0, 16.0))
+    assert np.abs(found - slope)[8:-8, 8:-8].max() < 0.02
+
+
 def test_resampling_without_periodic_edges() -> None:
     """A slope stays one up to the edges: to 2 % of its height, where a Fourier series alone would swing by 10 %."""
     slope = np.tile(np.linspace(0.0, 1.0, 100, endpoint=False), (100, 1))
-    found = treatment.resample_open(slope, (250, 250))
+    found = treatment.resample(slope, (250, 250), joined=False)
     expected = np.tile(np.minimum(np.linspace(0.0, 1.0, 250, endpoint=False), 0.99), (250, 1))
     assert np.abs(found - expected).max() < 0.02
 
@@ -103,8 +124,22 @@ def test_outliers_are_found() -> None:
     spiked[10, 20] += 50e-6
     spiked[90, 3] -= 50e-6
     spiked[0, 0] += 50e-6
-    assert not treatment.find_outliers(ROAD).any()
-    assert np.argwhere(treatment.find_outliers(spiked)).tolist() == [[0, 0], [10, 20], [90, 3]]
+    assert not treatment.find_outliers(ROAD)[0].any()
+    assert np.argwhere(treatment.find_outliers(spiked)[0]).tolist() == [[0, 0], [10, 20], [90, 3]]
+
+
+def test_outliers_are_clipped() -> None:
+    """They get the median of their neighbours, and the plane is that without them; other points stay."""
+    spiked = ROAD.copy()
+    spiked[10, 20] += 5e-3
+    done = treatment.treat(spiked, "tilt", "none", clip=True)
+    plain = treatment.treat(ROAD, "tilt", "none").heights
+    rest = np.ones(ROAD.shape, dtype=bool)
+    rest[10, 20] = False
+    step = np.abs(np.diff(ROAD, axis=0)).max()
+    assert np.argwhere(done.outliers).tolist() == [[10, 20]]
+    assert abs(done.heights[10, 20] - plain[10, 20]) < step
+    assert np.abs(done.heights - plain)[rest].max() < 1e-3 * step  # one point of 16384 has moved by less than a step
 
 
 def test_a_number_that_stands_for_missing_points() -> None:

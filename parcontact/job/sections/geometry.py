@@ -6,17 +6,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, ValidationInfo
 
 from ..text.fault import Fault, refuse
 from .height_arrays import HeightArray
 from .part import Part, Rule, chosen, existing_file
-from .quantities import Flag, Number, Positive, Real, Seed, Whole
+from .quantities import Flag, Number, Positive, Real, Seed, Whole, both
 
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
 Radius = Annotated[Positive, Field(description="a positive length [m]")]
 Wavelength = Annotated[Positive, Field(description="a positive wavelength [m]")]
+
+MapUnit = Literal["m", "mm", "um", "nm"]
 
 FILE_KINDS = (".npy", ".h5", ".txt")
 
@@ -116,8 +118,15 @@ class HeightFile(Part):
     dataset: str = Field(default="heights", description="the name of a dataset (text)")
 
 
+class MapUnits(Part):
+    """Units of the numbers in a file of a measured map, along the map and of its heights."""
+
+    xy: MapUnit
+    z: MapUnit
+
+
 class Topography(Part):
-    """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .txt and .xyz.
+    """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .gsf and text.
 
     The part of the map around `centre` that is as large as the box is levelled, filled, made periodic and resampled to
     the grid.
@@ -125,10 +134,17 @@ class Topography(Part):
 
     shape: Literal["topography"] = "topography"
     path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a measured map")]
-    unit: Literal["m", "mm", "um", "nm"] | None = None  # of heights; only for formats that have none
+    unit: MapUnit | None = None  # of heights and positions; only for formats that have none
+    units: MapUnits | None = Field(default=None, description="a mapping {xy: UNIT, z: UNIT}")
     size: Annotated[
         tuple[Positive, Positive] | None, Field(description="two positive lengths [m], only for formats that have none")
     ] = None
+    pixel: Annotated[
+        tuple[Positive, Positive] | None, BeforeValidator(both), Field(description="one or two positive lengths [m]")
+    ] = None
+    nodata: Number | None = Field(default=None, description="the number that a file has for missing points")
+    outliers: Literal["keep", "clip"] = "keep"
+    short_wavelength: Wavelength | None = Field(default=None, description="a positive wavelength [m]")
     channel: str | None = Field(default=None, description="the name of a channel of the file (text)")
     centre: Annotated[
         tuple[Positive, Positive] | None, Field(description="two positive lengths [m] from the corner of the map")
@@ -136,6 +152,18 @@ class Topography(Part):
     detrend: Literal["none", "mean", "tilt", "curvature"] = "tilt"
     fill: Flag = Field(default=True, description="true or false: whether missing points are filled")
     periodic: Literal["smooth", "window", "mirror", "none"] | None = None  # smooth; none in a free scene
+
+    at_most_one = (("unit", "units"), ("size", "pixel"))
+
+    @property
+    def unit_of_heights(self) -> MapUnit | None:
+        return self.units.z if self.units else self.unit
+
+    def size_of(self, points: tuple[int, ...]) -> tuple[float, float] | None:
+        """Return the size [m] that the job gives to a map of points along x and y, if it does."""
+        if self.pixel is None:
+            return self.size
+        return self.pixel[0] * points[0], self.pixel[1] * points[1]
 
 
 class Flat(Part):

@@ -1,0 +1,19 @@
+"""The picture of a rigid surface."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from parcontact.plotting import surface
+from parcontact.road import statistics
+
+
+def test_a_map_has_the_proportions_of_its_box() -> None:
+    """6 mm x 4 mm are drawn 1.5 times as wide as high, in a panel of any shape."""
+    heights, size = np.random.default_rng(1).standard_normal((20, 60)), (6e-3, 4e-3)
+    figure = Figure(figsize=(5.0, 5.0))
+    axes = figure.subplots()
+    surface.PANELS["map of the heights"](axes, surface.Sketch(heights, size, statistics.describe(heights, size)))
+    figure.draw_without_rendering()
+    box = axes.get_window_extent()
+    assert box.width / box.height == pytest.approx(1.5, rel=1e-6)
