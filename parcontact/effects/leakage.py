@@ -11,7 +11,8 @@ from pydantic import Field
 
 from ..job.sections.part import Part
 from ..job.sections.quantities import Count
-from ..leakage.flow import leak_on_ranks
+from ..leakage.flow import leak
+from ..parallel.root import on_root
 from .effect import Decision, Effect, Instant
 
 NOTHING = (math.nan, math.nan, math.nan)
@@ -27,7 +28,7 @@ class Leakage(Part):
 class LeakageColumns(Effect):
     """The conductivity K [m^3] of the gap along x and along y, and its critical constriction [m].
 
-    The gap is gathered on root, which looks for paths; all ranks solve for the flow.
+    The gap is gathered on root, which solves for the flow.
     """
 
     section: ClassVar[type[Part]] = Leakage
@@ -53,8 +54,13 @@ class LeakageColumns(Effect):
         approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
         gap = scene.gap(instant.displacement, instant.step.position, approach)
         whole = scene.slab.to_root(np.where(instant.touching, 0.0, np.maximum(gap, 0.0)))
-        found = leak_on_ranks(whole, setup.grid.size, setup.grid.boundary == "periodic", scene.slab.comm)
-        self._values = found.flow_x, found.flow_y, found.constriction
+
+        def act() -> tuple[float, float, float]:
+            assert whole is not None
+            found = leak(whole, setup.grid.size, setup.grid.boundary == "periodic")
+            return found.flow_x, found.flow_y, found.constriction
+
+        self._values = on_root(scene.slab.comm, act)
 
     def values(self) -> Sequence[float]:
         return self._values

@@ -11,22 +11,16 @@ directly, since g^3 spans many decades and iterations stall. The flow follows fr
 `sum c (p - p_neighbour)^2`, which is least for the exact pressures: their errors enter with their squares.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from . import slabs
+from .elimination import Balance
 from .paths import connected_from_end_to_end, critical_constriction
-
-if TYPE_CHECKING:
-    from ..parallel.mpi import MPI
 
 Map = NDArray[np.float64]
 LEAST_GAP = 1e-3  # accuracy: of the largest gap; cells of a smaller one are closed, which costs some 1e-5 of the flow
@@ -54,34 +48,23 @@ class Flow:
         return self.constriction > 0.0
 
 
-def solve_flow(
-    gap: Any,
-    size: tuple[float, float],
-    axis: str = "x",
-    periodic_sides: bool = True,
-    comm: MPI.Intracomm | None = None,
-) -> Flow:
-    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`.
-
-    The ranks of `comm`, if given, share the work: root has the map, the others pass None, and root alone gets the map
-    of the pressure. Collective.
-    """
+def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
+    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`."""
     if axis == "x":
-        turned = solve_flow(None if gap is None else gap.T, size[::-1], "y", periodic_sides, comm)
+        turned = solve_flow(gap.T, size[::-1], "y", periodic_sides)
         place = None if turned.position is None else (turned.position[1], turned.position[0])
         return replace(turned, position=place, pressure=turned.pressure.T)
-    root = comm is None or comm.rank == 0
-    found = critical_constriction(gap, periodic_sides) if root else (0.0, None)
-    constriction, position = found if comm is None else comm.bcast(found)
-    pressure = np.full(gap.shape if root else (0, 0), np.nan)
+    constriction, position = critical_constriction(gap, periodic_sides)
     if position is None:
-        return Flow(0.0, 0.0, None, 0.0, pressure)
-    resistances = _resistances(gap, constriction, periodic_sides) if root else None
-    solved, power, leaving = slabs.solve(resistances, size[0] / size[1], periodic_sides, comm)
-    if resistances is not None and solved is not None:
-        pressure = np.where(np.isfinite(resistances), solved, np.nan)
+        return Flow(0.0, 0.0, None, 0.0, np.full(gap.shape, np.nan))
+    resistances, (ny, nx) = _resistances(gap, constriction, periodic_sides), gap.shape
+    balance, given = Balance(resistances, size[0] / size[1] * ny / nx, periodic_sides), np.zeros(gap.shape)
+    given[0] = balance.first
+    pressure = balance.solve(given)
+    power, leaving = balance.power(pressure), float(balance.last @ pressure[-1])
     conductivity = constriction**3 * power * size[1] / size[0]
-    return Flow(conductivity, constriction, position, abs(leaving / power - 1.0), pressure)
+    wet = np.where(np.isfinite(resistances), pressure, np.nan)
+    return Flow(conductivity, constriction, position, abs(leaving / power - 1.0), wet)
 
 
 def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
@@ -93,17 +76,9 @@ def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
     return found
 
 
-def mesh_error(
-    gap: Any,
-    flow: Flow,
-    size: tuple[float, float],
-    axis: str = "x",
-    periodic_sides: bool = True,
-    comm: MPI.Intracomm | None = None,
-) -> float:
+def mesh_error(gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> float:
     """Return by what share K of a flow differs if only every second point of its gap is known, beginning with the first
-    or with the second, whichever differs more; NaN where contact closes. Collective like `solve_flow`, with the same
-    arguments.
+    or with the second, whichever differs more; NaN where contact closes. The other arguments are those of `solve_flow`.
 
     K of a contact on twice the points differs by a third of that, in the median of three turned surfaces on 128 and 256
     points under loads up to closure.
@@ -112,8 +87,8 @@ def mesh_error(
         return math.nan
     found = []
     for start in (0, 1):
-        half = None if gap is None else gap[tuple(slice(start, None, 2) if n > 1 else slice(None) for n in gap.shape)]
-        found.append(abs(solve_flow(half, size, axis, periodic_sides, comm).conductivity / flow.conductivity - 1.0))
+        half = gap[tuple(slice(start, None, 2) if n > 1 else slice(None) for n in gap.shape)]
+        found.append(abs(solve_flow(half, size, axis, periodic_sides).conductivity / flow.conductivity - 1.0))
     return max(found)
 
 
@@ -156,12 +131,8 @@ def leak(gap: ArrayLike, size: Sequence[float], periodic: bool = True) -> Leak:
         raise InputError(f"gap must be a map [m] of shape (ny, nx), got one of shape {gaps.shape}")
     if missing := int(np.count_nonzero(~np.isfinite(gaps))):
         raise InputError(f"gap must be finite, {missing} of {gaps.size} points are not: fill or close (0) them")
-    return leak_on_ranks(np.maximum(gaps, 0.0), _lengths(size), periodic, None)
-
-
-def leak_on_ranks(gap: Map | None, size: tuple[float, float], periodic: bool, comm: MPI.Intracomm | None) -> Leak:
-    """Return the same for a map that is known to be one, by all ranks of `comm` (`solve_flow`); collective."""
-    return Leak(*(solve_flow(gap, size, axis, periodic, comm) for axis in ("x", "y")))
+    lengths = _lengths(size)
+    return Leak(*(solve_flow(np.maximum(gaps, 0.0), lengths, axis, periodic) for axis in ("x", "y")))
 
 
 def _lengths(size: Sequence[float]) -> tuple[float, float]:

@@ -15,9 +15,7 @@ from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
 from ..leakage.flow import Flow, Leak, Map, leak, mesh_error, solve_flow
-from ..parallel.groups import Groups
 from ..parallel.mpi import MPI
-from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plotting import conductivity, leakage
 from ..plotting.run import Fields, Run
@@ -25,7 +23,7 @@ from ..printed import per_cent, quantity
 from ..storage import files, hdf5, tables
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
-MOST_CELLS = 4e6  # tuning: of a map for one rank, as long as there are more ranks; 2048 x 2048 takes 1.4 GB
+MOST_CELLS = 4e6  # tuning: of a map for each rank to take one; of larger ones fewer ranks do. 2048 x 2048 takes 1.4 GB
 
 
 class Instant(NamedTuple):
@@ -104,17 +102,14 @@ class Gaps:
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
-    def solve(self, index: int, comm: MPI.Intracomm) -> tuple[Solved, list[Map]]:
-        """Return the flow at a saved instant, and on root for both directions where it is; collective."""
-        gaps, flows, errors, shown = list[Map](), list[Flow](), list[float](), list[Map]()
-        on_root(comm, lambda: gaps.append(self.read(index)))
-        gap = gaps[0] if gaps else None
+    def solve(self, index: int) -> tuple[Solved, list[Map]]:
+        """Return the flow at a saved instant, and for both directions where it is."""
+        gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
         for axis in ("x", "y"):
-            flow = solve_flow(gap, self.size, axis, self.periodic, comm)
-            if gap is not None:
-                shown.append(leakage.flux(gap, flow.pressure, self.size))
+            flow = solve_flow(gap, self.size, axis, self.periodic)
+            shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
-            errors.append(mesh_error(gap, flow, self.size, axis, self.periodic, comm))
+            errors.append(mesh_error(gap, flow, self.size, axis, self.periodic))
         return Solved(Leak(*flows), (errors[0], errors[1])), shown
 
     def row(self, index: int, solved: Solved, bare: Leak | None) -> Instant:
@@ -140,7 +135,7 @@ class Gaps:
 
 def write(directory: Path, at: str, over: str, comm: MPI.Intracomm) -> Iterator[str]:
     """Solve for the flow of the saved instants and write leak.csv and leak.png; of one instant leak.STEP.csv and
-    leak.STEP.png, with K `over` pressure or time, "" for a choice. Collective: groups of ranks take an instant each.
+    leak.STEP.png, with K `over` pressure or time, "" for a choice. Collective: ranks take an instant each.
 
     Yields, on root, what to say. Raises InputError for a directory without gaps.
     """
@@ -170,10 +165,10 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Solved], int,
     """Return, on root, the flow at all instants, the one to draw and its maps: the last that has a flow in both
     directions, or else in one; collective."""
     mine, drawn, maps, problem = dict[int, Solved](), (-1, -1), list[Map](), ""
-    groups = Groups(comm, min(len(gaps.shown), int(comm.size * min(1.0, MOST_CELLS / gaps.cells))))
+    working = max(1, int(comm.size * min(1.0, MOST_CELLS / gaps.cells)))
     try:
-        for index in gaps.shown[groups.number :: groups.count]:
-            mine[index], found = gaps.solve(index, groups.comm)
+        for index in gaps.shown[comm.rank :: working] if comm.rank < working else []:
+            mine[index], found = gaps.solve(index)
             directions = mine[index].leak.along_x.percolates + mine[index].leak.along_y.percolates
             if (directions, index) > drawn:
                 drawn, maps = (directions, index), found
@@ -182,7 +177,7 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Solved], int,
     if problems := [text for text in comm.allgather(problem) if text]:
         raise InputError(problems[0])
     chosen = max(comm.allgather(drawn))
-    parts = comm.gather((mine, maps if drawn == chosen else [])) or []  # maps are on the roots of groups
+    parts = comm.gather((mine, maps if drawn == chosen else [])) or []
     leaks = {index: one for part, _ in parts for index, one in part.items()}
     return leaks, chosen[1], next((found for _, found in parts if found), [])
 

@@ -83,8 +83,8 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
 
 @pytest.mark.mpi
 def test_one_instant(comm: MPI.Intracomm, shared_path: Path) -> None:
-    """It has files of its own, after its step, and leaves those of the whole run as they are. All ranks share its map,
-    which has the same flow to 1e-10 as by one rank."""
+    """It has files of its own, after its step, and leaves those of the whole run as they are. The flow is
+    that of its map, to 1e-10."""
     out = run(comm, shared_path, leakage=None)
     assert __main__.main(["leak", str(out)]) == 0
     comm.Barrier()
