@@ -49,7 +49,7 @@ class AdhesionLaw:
 
     def johnson(self, modulus: float, length: float, amplitude: float) -> float:
         """Return Johnson's parameter for E* [Pa], the length of a wave [m] and its amplitude [m]."""
-        return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / amplitude
+        return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / abs(amplitude)
 
 
 def ramp_of(law: AdhesionLaw, modulus: float, cell: float) -> float:

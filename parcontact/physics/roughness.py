@@ -144,7 +144,7 @@ def shortest_wave(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> fl
     q, power = _powers(spectrum, fft, size)
     low = 2 * np.pi / max(size)
     highest = np.pi * np.hypot(fft.mx / size[0], fft.my / size[1])
-    count = int(np.log(highest / low) / BIN) + 2
+    count = max(int(np.log(highest / low) / BIN), 0) + 2  # a single point has waves shorter than the box only
     place = (np.log(np.maximum(q / low, 1.0)) / BIN).astype(np.intp)
     slopes = np.array(fft.slab.sum(*np.bincount(place.ravel(), (power * q**2).ravel(), count).tolist()))
     shorter = np.cumsum(slopes[::-1])[::-1]

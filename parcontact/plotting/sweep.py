@@ -2,8 +2,8 @@
 
 Those of a sweep of friction curves are over velocity, or what else has several values in each curve.
 
-Points are cases, lines their means over seeds and other keys that do not tell lines apart. A colour is a value of the
-second key, in all panels; what is drawn of it has its own marks and dashes.
+Points are cases, lines their means over seeds alone: each value of another key has a line of its own. A colour is such
+a value, in all panels; what is drawn of it has its own marks and dashes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,16 +25,20 @@ TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
-MAX_LINES = 3  # of a second key
 MARKERS, DASHES = ("o", "s"), ("--", ":")  # of means and theories of the first and the second column of a panel
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
-PANELS = (  # measures and their columns by the names of lines
-    ("friction", "friction coefficient", {"highest": "mu_max", "dynamic": "mu_dyn"}),
-    ("area", FRACTION, {"simulation": CORRECTED}),
+Panels = tuple[tuple[str, Axis, dict[str, str]], ...]
+FRICTION, AREA = Axis("friction coefficient"), Axis(FRACTION)
+PANELS: Panels = (  # measures and their columns by the names of lines
+    ("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
+    ("area", AREA, {"simulation": CORRECTED}),
+    ("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),
+    ("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
+    ("leakage", Axis("conductivity", "m³"), {"along x": "flow_x", "along y": "flow_y"}),
 )
-CURVE_PANELS = (
-    ("friction", "friction coefficient", {"steady sliding": "friction"}),
-    ("area", FRACTION, {"steady sliding": CORRECTED}),
+CURVE_PANELS: Panels = (
+    ("friction", FRICTION, {"steady sliding": "friction"}),
+    ("area", AREA, {"steady sliding": CORRECTED}),
 )
 
 Rows = Sequence[dict[str, Any]]
@@ -51,22 +55,21 @@ def charts(directory: Path) -> list[Chart]:
         keys = [name for name, values in places.items() if len(values) > 1] + keys
     if not keys:
         return []
-    key, *others = keys
+    key = keys[0]
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
-    for panel, title, columns in panels:
-        split = _split_curves(rows, key) if panels is CURVE_PANELS else _split(rows, others)
-        series, lines = list[Series](), list(split)
+    for panel, y, columns in panels:
+        series, lines = list[Series](), list(_split(rows, key))
         for j, (part, own) in enumerate(lines):
             for k, (name, column) in enumerate(columns.items()):
                 look = {"color": style.line(j if len(lines) > 1 else k)["color"]}
                 theory = f"theory, {name}" if len(columns) > 1 else "theory"
                 series += _make_lines((name + part, theory), own, column, key, look, k)
-        if series:
+        if any(one.y.any() for one in series):  # surfaces that come off have no friction and no area in the end
             series = list(_name_once(series))
             values = np.concatenate([one.x for one in series])
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
-            found.append(Chart(panel, x, Axis(title), series, log_x=wide))
+            found.append(Chart(panel, x, y, series, log_x=wide))
     return found
 
 
@@ -78,39 +81,36 @@ def title(directory: Path) -> str:
 
 def _find_keys(rows: Rows) -> list[str]:
     """Return the keys that have several numbers and choose no sample, the first of those that move together."""
+    keys = _tell_apart(rows, _swept(rows))
+    return [name for name in keys if all(isinstance(row[name], float) for row in rows)]
+
+
+def _swept(rows: Rows) -> list[str]:
+    """Return the keys of a sweep that choose no sample."""
     names = list(rows[0]) if rows else ["case", "state"]
-    keys: dict[tuple[int, ...], str] = {}  # by which rows have the same value
-    for name in names[names.index("case") + 1 : names.index("state")]:
-        values = [row[name] for row in rows]
-        order = tuple(values.index(value) for value in values)
-        if name.split(".")[-1] not in SAMPLES and any(order):
-            keys.setdefault(order, name)
-    return [name for name in keys.values() if all(isinstance(row[name], float) for row in rows)]
+    keys = names[names.index("case") + 1 : names.index("state")]
+    return [name for name in keys if name.split(".")[-1] not in SAMPLES]
 
 
-def _split(rows: Rows, others: Sequence[str]) -> Iterator[tuple[str, Rows]]:
-    """Yield the rows of each line, and its name: those that agree in the second key, if it has few values."""
-    values = sorted({row[others[0]] for row in rows}) if others else []
-    if not 1 < len(values) <= MAX_LINES:
-        yield "", rows
-        return
-    unit = UNITS.get(others[0].split(".")[-1], "")
-    for value in values:
-        yield f", {units.text(value, unit)}", [row for row in rows if row[others[0]] == value]
+def _tell_apart(rows: Rows, names: Sequence[str]) -> list[str]:
+    """Return the names with several values, the first of those that move together."""
+    found: dict[tuple[int, ...], str] = {}
+    for name in names:
+        first: dict[str, int] = {}
+        order = tuple(first.setdefault(repr(row[name]), number) for number, row in enumerate(rows))
+        if any(order):
+            found.setdefault(order, name)
+    return list(found.values())
 
 
-def _split_curves(rows: Rows, key: str) -> Iterator[tuple[str, Rows]]:
-    """Yield the points of each line and its name: those that agree in all but `key` and what chooses a sample."""
-    names = list(rows[0])
-    keys = [
-        name for name in names[names.index("case") + 1 : names.index("state")] if name.split(".")[-1] not in SAMPLES
-    ]
-    apart = [
-        name for name in (*sweep_table.PLACES, *keys) if name != key and len({repr(row[name]) for row in rows}) > 1
-    ]
+def _split(rows: Rows, key: str) -> Iterator[tuple[str, Rows]]:
+    """Yield the rows of each line and its name: those that agree in all but `key`, what moves together with it, and
+    what chooses a sample."""
+    places = [name for name in sweep_table.PLACES if name in rows[0]]
+    others = [name for name in _tell_apart(rows, [key, *places, *_swept(rows)]) if name != key]
     lines: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
-        lines.setdefault("".join(f", {_named(name, row[name])}" for name in apart), []).append(row)
+        lines.setdefault("".join(f", {_named(name, row[name])}" for name in others), []).append(row)
     yield from lines.items()
 
 

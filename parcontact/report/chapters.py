@@ -1,6 +1,7 @@
 """One chapter for each output directory: of a run, a friction curve, a sweep or a study, or of several of these."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from .. import job as jobs
@@ -9,6 +10,7 @@ from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
 from ..plotting import plots
+from ..summary import sweep_table
 from . import log, material, origin, results, road
 from .parts import Chapter, Section, Table, draw_chart, embed_file
 
@@ -32,12 +34,14 @@ def describe_directory(directory: Path) -> Chapter:
     if not there:
         raise InputError(f"{directory} holds no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
-    found, title, cited = log.read(directory), "", origin.list_citations(None)
+    found, title, cited, places = log.read(directory), "", origin.list_citations(None), [f"{directory.absolute()}/"]
     jobs_there = [*(directory / name for name in JOBS), *sorted(directory.glob(f"cases/*/{RESOLVED}"))]
     if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
         job, warnings = _read_job(resolved)
-        title = job.title
+        title, places = job.title, [*_places(job), *places]
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
+        if there == ["sweep.csv"]:
+            asked = replace(asked, title="What was asked of the first case", sentences=[_describe_swept(directory)])
         sections += [asked, material.section(job), road.section(job)]
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job)
@@ -47,7 +51,10 @@ def describe_directory(directory: Path) -> Chapter:
     said = "The tables, in SI units and with all digits, are inside this file:"
     sections += [origin.section(directory, found), cited, Section("Data", [said], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
-    return Chapter(title or directory.absolute().name, directory, kinds, [one for one in sections if one])
+    shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
+    here, there_is = Path.cwd(), directory.absolute()
+    named = there_is.relative_to(here) if there_is.is_relative_to(here) else Path(there_is.name)
+    return Chapter(title or there_is.name, named, kinds, shown)
 
 
 def compare(directories: Sequence[Path]) -> Iterator[Chapter]:
@@ -66,6 +73,21 @@ def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
         return job, job.warnings
     except InputError:
         return shown_job(resolved), ()
+
+
+def _places(job: Job) -> list[str]:
+    """Return the directories of this machine that a job names: who reads a report has others."""
+    parts = [value for part in (*job.surface, job.material) for _, value in listing.items(part)]
+    return [f"{path.parent}/" for path in (job.path, *parts) if isinstance(path, Path) and path.is_absolute()]
+
+
+def _describe_swept(directory: Path) -> str:
+    """Return what differs between the cases of a sweep."""
+    rows = sweep_table.read(directory / "sweep.csv")
+    names = list(rows[0]) if rows else ["case", "state"]
+    swept = {name: dict.fromkeys(str(row[name]) for row in rows) for name in names[1 : names.index("state")]}
+    values = "; ".join(f"{name} ({', '.join(found)})" for name, found in swept.items())
+    return f"There are {len(rows)} cases. They differ in {values}."
 
 
 def _describe_job(job: Job, given: Path) -> Section:

@@ -10,7 +10,7 @@ from ..storage.curve_points import LOG
 
 LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
-MACHINE = re.compile(r"parcontact |in |machine: |batch job: |\d+ ranks?, ")  # how lines about it begin
+MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # how lines about it begin
 ESTIMATE = re.compile(r"estimated error of ([^:]*): (?:up to )?(\S+) % \(([^)]*)\)")
 PART = re.compile(r"([a-z ]+) (\S+) %")
 

@@ -3,7 +3,7 @@
 import base64
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -43,6 +43,17 @@ class Section:
     def __bool__(self) -> bool:
         """Whether there is anything to show."""
         return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
+
+    def without(self, places: Sequence[str]) -> "Section":
+        """Return the section without these directories in its sentences and tables: files are named alone."""
+
+        def shorten(text: str) -> str:
+            for place in places:
+                text = text.replace(place, "")
+            return text
+
+        tables = [replace(one, rows=[[shorten(cell) for cell in row] for row in one.rows]) for one in self.tables]
+        return replace(self, sentences=[shorten(text) for text in self.sentences], tables=tables)
 
 
 @dataclass(frozen=True)

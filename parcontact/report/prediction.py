@@ -221,8 +221,6 @@ def _continuum(job: Job, slide: float) -> Rings:
         return rings_of_measured(job, part, slide)
     longest = min(part.long_wavelength, max(job.grid.size))
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
-    if k_long >= EDGE * k_short:
-        raise InputError("surface: the theory needs a short_wavelength below long_wavelength, got equal ones")
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
     limits = (k_long, k_short, slide, (k_rolloff,))
     unit = persson_rings.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)

@@ -108,13 +108,26 @@ class Sweep:
                 print_line(f"{case} (of {len(self.cases)})")
             ended = self._attempt(case, slab, alone=not side_by_side and len(own) == 1)
             if slab.root:
-                sweep_table.write(_directory(self.cases), self.cases)
+                code = max(code, self._collect())
             if speaks and side_by_side:
                 print_line(f"case {case.number}: {ENDS[ended]}")
             if ended == STOPPED_EARLY:
                 return self._stop_others(slab)
             code = max(code, ended)
         return code
+
+    def _collect(self) -> int:
+        """Write the tables of the sweep; returns the exit code, FAILED where that cannot be. Root only."""
+        directory = _directory(self.cases)
+        try:
+            sweep_table.write(directory, self.cases)
+        except OSError as error:
+            reason = error.strerror or error
+            print_line(
+                f"parcontact: cannot write the tables of {directory}: {reason}; run again to write them", sys.stderr
+            )
+            return FAILED
+        return DONE
 
     def _reason_to_stop(self, slab: Slab, signals: Signals) -> str:
         """Return why no further case is begun, or ''; any rank may have been sent a signal; collective."""

@@ -26,11 +26,14 @@ PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area", slide.CORRECTED)
-PULL_OFFS = ("pull_off", "pull_off_approach")
+PULL_OFFS = ("pull_off", "pull_off_error", "pull_off_approach")
+FLOWS = ("flow_x", "flow_y", "constriction")  # with leakage
+DISSIPATED = "dissipated"  # where energies are counted
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(f"theory_{name}" for name in RESULTS if name != slide.CORRECTED)
 COLUMNS = ("state", *RESULTS, *FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
-NUMBERS = {"case", *COLUMNS, *PULL_OFFS, *CURVE_COLUMNS} - {"state"}
+OF_SOME = (*PULL_OFFS, DISSIPATED, *FLOWS)  # columns of jobs with sections of their own
+NUMBERS = {"case", *COLUMNS, *OF_SOME, *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
@@ -47,14 +50,25 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
     with _alone(directory):
         keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
         rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
-        pulls = PULL_OFFS if any(case.job.section("adhesion") for case in cases) else ()
-        save(directory / TABLE, ["case", *keys, *COLUMNS, *pulls], rows)
+        more = list(_columns_of_some(cases))
+        save(directory / TABLE, ["case", *keys, *COLUMNS, *more], rows)
         if points:
             save(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
-            save(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *pulls, *THEORY]))
+            save(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *more, *THEORY]))
         if seeded and points:
             save(directory / "sweep_curves_mean.csv", *_means(points, [*keys, *PLACES], CURVE_RESULTS))
+
+
+def _columns_of_some(cases: Sequence[Case]) -> Iterator[str]:
+    """Yield the columns of what the cases are about beside friction and area."""
+    jobs = [case.job for case in cases]
+    if any(job.section("adhesion") for job in jobs):
+        yield from PULL_OFFS
+    if any(job.output.energy for job in jobs):
+        yield DISSIPATED
+    if any(job.section("leakage") for job in jobs):
+        yield from FLOWS
 
 
 def results(directory: Path) -> Path:
@@ -132,6 +146,9 @@ def _results(case: Case) -> dict[str, Any]:
             row |= {f"{prefix}{key}": value for key, value in known.items()}
         if not prefix:
             row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
+            row |= {
+                name: _last(columns[name]) for name in (DISSIPATED, *FLOWS) if name in columns and _is_asked(case, name)
+            }
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
             row |= slide.mean_errors(case.job.history, columns)
@@ -140,13 +157,24 @@ def _results(case: Case) -> dict[str, Any]:
     return row
 
 
+def _is_asked(case: Case, name: str) -> bool:
+    return case.job.output.energy if name == DISSIPATED else case.job.section("leakage") is not None
+
+
+def _last(values: Sequence[float]) -> float:
+    """Return the last value that is known; NaN without one."""
+    return next((value for value in reversed(values) if value == value), math.nan)
+
+
 def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the last pull-off of a case [N], and its approach [m]; nothing where contact holds."""
+    """Return the last pull-off of a case [N], by how much the loads of the steps beside it differ [N], and its approach
+    [m]; nothing where contact holds."""
     lost = [each for each in pull_off.find(columns, bool(marker.detached(case.job.output.directory))) if each.lost]
     if not lost:
         return {}
-    force, approach = (columns[name][lost[-1].row] for name in ("pressure", "approach"))
-    return dict(zip(PULL_OFFS, (-force * case.job.grid.lx * case.job.grid.ly, approach), strict=True))
+    pressure, approach = (columns[name][lost[-1].row] for name in ("pressure", "approach"))
+    area = case.job.grid.lx * case.job.grid.ly
+    return dict(zip(PULL_OFFS, (-pressure * area, lost[-1].beside * area, approach), strict=True))
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:

@@ -156,7 +156,7 @@ COLUMNS = {
     "bands.csv": road_sliding.COLUMNS,
     "theory.csv": prediction.Instant._fields,
     "steady_theory.csv": prediction.SteadyInstant._fields,
-    "sweep.csv": ["case", *sweep_table.COLUMNS, *sweep_table.PULL_OFFS],
+    "sweep.csv": ["case", *sweep_table.COLUMNS, *sweep_table.OF_SOME],
     "study.csv": outcome.COLUMNS,
     "fields.h5": [*fields.UNITS, "t", "y", "x", "step"],
 }

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.roughness import Roughness, moments
+from parcontact.physics.roughness import Roughness, moments, shortest_wave
 from parcontact.physics.surface import single_wave
 
 from .maps import gathered
@@ -184,3 +184,9 @@ def test_moments_of_a_wave(comm: MPI.Intracomm) -> None:
     assert found.m4 == pytest.approx(3 / 8 * A**2 * q**4 / 2, rel=1e-12)
     assert found.nayak == pytest.approx(1.5, rel=1e-12)
     assert np.isnan(moments(0 * waves, fft, BOX).nayak)
+
+
+def test_a_single_point_has_no_wave() -> None:
+    """On a grid of one point the only wave is the mean, whatever the shape of the box."""
+    fft = FFT(Slab.alone(1, 1))
+    assert shortest_wave(fft.forward(np.full((1, 1), 2.0)), fft, (1e-3, 2e-5)) == np.inf

@@ -54,10 +54,44 @@ def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
     friction, _ = sweep.charts(saved(tmp_path, *rows))
     lines = [one for one in friction.series if one.name.startswith("highest")]
     assert [(one.name, one.y.tolist()) for one in lines] == [
-        ("highest, 1 mm", [10.001, 20.001]),
-        ("highest, 2 mm", [10.002, 20.002]),
+        ("highest, size 1 mm", [10.001, 20.001]),
+        ("highest, size 2 mm", [10.002, 20.002]),
     ]
     assert not friction.log_x
+
+
+def test_every_value_of_every_other_key_has_a_line(tmp_path: Path) -> None:
+    """Texts, too, and more than three of them: two compounds and two sizes are four lines, each the mean over seeds."""
+    head = ("case", "history.0.velocity", "material.include", "surface.0.seed", "grid.size", "state", *RESULTS)
+    rows = [
+        (0, v, compound, seed, size, "done", 10 * v + seed + friction + 1e3 * size, 0.1, 0.2)
+        for v in (1.0, 2.0)
+        for compound, friction in (("soft", 0.1), ("hard", 0.2))
+        for seed in (1, 3)
+        for size in SIZES[:2]
+    ]
+    friction, _ = sweep.charts(saved(tmp_path, *rows, head=head))
+    found = {one.name: one.y.tolist() for one in friction.series if one.name.startswith("highest")}
+    assert found == {
+        f"highest, include {compound}, size {size:.0f} mm": pytest.approx([12.0 + own + size, 22.0 + own + size])
+        for compound, own in (("soft", 0.1), ("hard", 0.2))
+        for size in (1, 2)
+    }
+
+
+def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:
+    """Friction and area that are 0 throughout are not drawn; pull-off, energies and leakage are."""
+    head = (*HEAD[:2], "state", *RESULTS, "pull_off", "dissipated", "flow_x", "flow_y")
+    rows = [(0, v, "done", "", "", 0.0, 1e-3 * v, 2e-9 * v, 3e-18, 4e-18) for v in (1.0, 2.0)]
+    found = {
+        chart.key: [(one.name, one.y.tolist()) for one in chart.series]
+        for chart in sweep.charts(saved(tmp_path, *rows, head=head))
+    }
+    assert found == {
+        "pull-off": [("pull-off", [1e-3, 2e-3])],
+        "energy": [("dissipated", [2e-9, 4e-9])],
+        "leakage": [("along x", [3e-18, 3e-18]), ("along y", [4e-18, 4e-18])],
+    }
 
 
 @pytest.mark.parametrize("rows", [[], [case(1.0, 1, 3.0), case(1.0, 2, 3.0)], [case(1.0, 1, ""), case(2.0, 1, "")]])

@@ -210,6 +210,21 @@ def test_sweep_and_study(tmp_path: Path) -> None:
     assert named == [*head, *head, "mesh", "integrator", "mu_max"]
 
 
+def test_a_sweep_shows_its_first_case_and_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No directory of this machine is in the page: who gets it has others."""
+    monkeypatch.chdir(tmp_path)
+    np.save(tmp_path / "road.npy", 1e-7 * np.random.default_rng(1).normal(size=(16, 16)))
+    text = "grid: {points: 16, size: 1.0e-3}\nsurface: {shape: file, path: road.npy}\n"
+    text += f"{ELASTIC}history: [{{pressure: 1.0e+4}}]\nsweep: [{{surface.scale: [1.0, 2.0]}}]\n"
+    (tmp_path / "job.yaml").write_text(text)
+    assert __main__.main(["job.yaml", "--quiet"]) == 0
+    found = Page(page.write([tmp_path / "out" / "job", tmp_path / "out" / "job" / "cases" / "000"]).read_text())
+    assert found.headings.count("What was asked of the first case") == found.headings.count("What was asked") == 1
+    assert "There are 2 cases. They differ in surface.scale (1.0, 2.0)." in found.text
+    assert "road.npy" in found.text
+    assert str(tmp_path) not in found.text
+
+
 def test_heights_that_are_gone(tmp_path: Path) -> None:
     """A report tells what there is: the surface cannot be made anew, all else is there."""
     np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(32, 32)))

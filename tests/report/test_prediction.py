@@ -135,7 +135,6 @@ def test_steady_friction_of_the_continuum() -> None:
         ({"history": [{"approach": 1e-6}]}, "history.0.approach"),
         ({"surface": [WAVE]}, "one rough surface"),
         ({"surface": [ROUGH, ROUGH]}, "one rough surface"),
-        ({"surface": [{**ROUGH, "short_wavelength": 2.5e-4}]}, "got equal ones"),
         ({"grid": {"points": 16, "size": 1e-3, "boundary": "free"}}, "grid.boundary"),
     ],
 )

@@ -1,5 +1,6 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
+import errno
 import math
 import re
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import sweep, watch
+from parcontact.storage import files
 from parcontact.summary import info, slide, sweep_table
 
 
@@ -52,6 +54,19 @@ def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, lis
         return code
 
     return go(cases, act), begun
+
+
+def test_a_full_disk_ends_no_case(
+    cases: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Tables of the sweep that cannot be written are said in a sentence, and the code is 1; all cases are done."""
+
+    def full(path: Path, text: str) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "write", full)
+    assert seeds_done(cases, {}) == (1, [1, 2, 3, 1, 2, 3])
+    assert "cannot write the tables of out/job: No space left on device; run again" in capsys.readouterr().err
 
 
 def test_a_case_that_fails_does_not_stop_the_others(

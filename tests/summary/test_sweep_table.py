@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sweeping import JOB, table
 
@@ -193,7 +194,7 @@ def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         "surface: {shape: sphere, radius: 2.0e-3}",
         "material: {model: elastic, shear_modulus: 0.3e6}",
         f"adhesion: {{work: 0.05, range: 2.0e-6}}\nhistory: [{{force: 0.0, duration: 1.0}}, {pull}]",
-        "sweep: {adhesion.work: [0.05, 0.1]}\nnumerics: {accuracy: 0.1}\n",
+        "sweep: {adhesion.work: [0.05, 0.1]}\nnumerics: {accuracy: 0.1}\noutput: {energy: true}\nleakage: {}\n",
     )
     Path("pulls.yaml").write_text("\n".join(lines))
     assert main(["pulls.yaml", "--quiet"]) == 0
@@ -203,3 +204,14 @@ def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert came_off["pull_off"] == pytest.approx(-min(rows["pressure"]) * 4e-4**2, rel=1e-15)
     assert came_off["pull_off_approach"] == rows["approach"][-1]
     assert math.isnan(holds["pull_off"])
+    k = int(np.argmin(rows["pressure"]))
+    apart = max(
+        abs(rows["pressure"][k] - rows["pressure"][beside])
+        for beside in (k - 1, k + 1)
+        if beside < len(rows["pressure"])
+    )
+    assert came_off["pull_off_error"] == pytest.approx(apart * 4e-4**2, rel=1e-12)
+    for case, number in ((came_off, 0), (holds, 1)):
+        rows = tables.read(Path(f"out/pulls/cases/00{number}/measures.csv"))
+        assert case["dissipated"] == rows["dissipated"][-1]
+        assert case["flow_x"] == rows["flow_x"][-1] > 0.0
