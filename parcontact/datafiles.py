@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 HEADER_BYTES = 1_000_000
+TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
+OWN_FORMATS = (".npy", ".gsf", *TEXTS)  # of maps; others are read by SurfaceTopography
+LOWEST, HIGHEST = 1e-70, 1e70  # accuracy: of the largest height [m], whose fourth power is still a number
 LARGEST_TEXT = 50_000_000  # bytes
 
 
@@ -22,6 +25,8 @@ def open_numbers(path: Path) -> NDArray[Any]:
 
     with path.open("rb") as file:
         start = file.read(12)
+    if not start:
+        raise InputError(f"{path} cannot be read: it is empty")
     if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:  # numpy would read them
         raise InputError(f"{path} cannot be read: its header claims to be larger than {HEADER_BYTES / 1e6:g} MB")
     try:
@@ -31,7 +36,15 @@ def open_numbers(path: Path) -> NDArray[Any]:
             raise
         raise InputError(f"{path} cannot be read: it ends before the last of its values") from error
     refuse_no_numbers(path, values.dtype)
+    if not values.size:
+        raise InputError(f"{path} holds an array of shape {values.shape}, without values")
     return values
+
+
+def refuse_extreme(what: Path | str, largest: float) -> None:
+    """Raise InputError for maps whose largest height or gap [m] overflows, or vanishes, in what follows from it."""
+    if largest and not LOWEST <= largest <= HIGHEST:
+        raise InputError(f"{what}: its largest value is {largest:.3g} m, which cannot be computed with")
 
 
 def refuse_no_numbers(path: Path, kind: np.dtype[Any]) -> None:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import datafiles
 from ..errors import InputError
 from .elimination import Balance
 from .paths import connected_from_end_to_end, critical_constriction
@@ -124,15 +125,23 @@ def leak(gap: ArrayLike, size: Sequence[float], periodic: bool = True) -> Leak:
     that are no such map, or not finite, and for other sizes.
     """
     try:
-        gaps = np.asarray(gap, dtype=float)
-    except (TypeError, ValueError):
+        given = np.asanyarray(gap)
+    except ValueError:
         raise InputError("gap must be a map of numbers [m], shape (ny, nx)") from None
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"gap must be a map of real numbers [m], shape (ny, nx), got values of type {given.dtype}")
+    if masked := int(np.count_nonzero(np.ma.getmaskarray(given))):
+        raise InputError(
+            f"gap must be known everywhere, {masked} of {given.size} points are masked: fill or close (0) them"
+        )
+    gaps = np.asarray(given, dtype=float)
     if gaps.ndim != 2 or not gaps.size:
         raise InputError(f"gap must be a map [m] of shape (ny, nx), got one of shape {gaps.shape}")
     if missing := int(np.count_nonzero(~np.isfinite(gaps))):
         raise InputError(f"gap must be finite, {missing} of {gaps.size} points are not: fill or close (0) them")
-    lengths = _lengths(size)
-    return Leak(*(solve_flow(np.maximum(gaps, 0.0), lengths, axis, periodic) for axis in ("x", "y")))
+    gaps, lengths = np.maximum(gaps, 0.0), _lengths(size)
+    datafiles.refuse_extreme("gap", float(gaps.max()))
+    return Leak(*(solve_flow(gaps, lengths, axis, periodic) for axis in ("x", "y")))
 
 
 def _lengths(size: Sequence[float]) -> tuple[float, float]:

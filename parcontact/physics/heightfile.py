@@ -13,7 +13,6 @@ from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
 Values = NDArray[Any]  # as they stand in the file
-LOWEST, HIGHEST = 1e-70, 1e70  # accuracy: of the largest height, whose fourth power is a number of double precision
 
 
 def read(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
@@ -29,11 +28,9 @@ def read(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
             [float(np.count_nonzero(~np.isfinite(rows)))], [float(np.abs(rows, dtype=np.float64).max(initial=0.0))]
         )
         problem = f"{path}: {wrong:.0f} of its {slab.points} heights are not finite numbers" if wrong else ""
-        largest *= abs(scale)
-        if not problem and largest and not LOWEST <= largest <= HIGHEST:
-            problem = f"{path}: its largest height is {largest:.3g} m, which cannot be computed with"
     if problem:
         raise InputError(problem)
+    datafiles.refuse_extreme(path, largest * abs(scale))
     heights = rows.astype(np.float64)
     heights *= scale
     return heights

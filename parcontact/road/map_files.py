@@ -21,7 +21,6 @@ from ..parallel.slab import Array
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 UNITS |= {"km": 1e3, "cm": 1e-2, "Å": 1e-10, "A": 1e-10, "pm": 1e-12, "in": 0.0254}
 TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may have the others
-TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
 OF_NUMPY = ("npy", "npz")  # which SurfaceTopography reads with the first direction along x
 LARGEST_FILE = 4_000_000_000  # tuning: bytes
 LONGEST_HEAD = 200  # tuning: lines before the first number of a text
@@ -29,7 +28,6 @@ IRREGULAR = 0.1  # accuracy: of a step: positions further from a grid than this 
 FEWEST = 4  # tuning: points along a direction
 MOST_POSITIONS = 10**6  # tuning: along a direction
 MOST_MISSING = 2  # tuning: times as many points of the grid as of the file
-LOWEST, HIGHEST = 1e-70, 1e70  # accuracy: of the largest height: its fourth power is a number of double precision
 
 
 @dataclass(frozen=True)
@@ -57,10 +55,12 @@ def read(part: Topography) -> Map:
     try:
         if not path.is_file():
             raise InputError(f"{path} is not a file; a map of heights was expected")
+        if not path.stat().st_size:
+            raise InputError(f"{path} cannot be read: it is empty")
         if path.stat().st_size > LARGEST_FILE:
             raise InputError(f"{path} has more than {LARGEST_FILE / 1e9:g} GB; crop the map first")
         ending = path.suffix.lower()
-        readers = {".npy": _array, ".gsf": _simple_field, **dict.fromkeys(TEXTS, _text)}
+        readers = {".npy": _array, ".gsf": _simple_field, **dict.fromkeys(datafiles.TEXTS, _text)}
         found = _in_metres(part, readers.get(ending, _instrument)(part))
     except InputError:
         raise
@@ -97,8 +97,7 @@ def _in_metres(part: Topography, found: Contents) -> Map:
     values = np.ma.masked_invalid(np.asarray(found.values, dtype=np.float64)).filled(np.nan)
     heights = np.where(values == part.nodata, np.nan, values) * unit
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max(initial=0.0))
-    if largest and not LOWEST <= largest <= HIGHEST:
-        raise InputError(f"{path}: its largest height is {largest:.3g} m, which cannot be computed with")
+    datafiles.refuse_extreme(path, largest)
     return Map(np.ascontiguousarray(heights), (lx, ly))
 
 
@@ -182,6 +181,8 @@ def _simple_field(part: Topography) -> Contents:
     data = part.path.read_bytes()
     head = data.partition(b"\0")[0]
     said = dict(re.findall(r"^(\w+) *= *(.*?)\s*$", head.decode("utf-8"), re.MULTILINE))
+    if not said.keys() >= {"XRes", "YRes"}:
+        raise InputError(f"{part.path} cannot be read: it is no simple field of Gwyddion")
     nx, ny = int(said["XRes"]), int(said["YRes"])
     units = [_scale(part.path, said[key]) if said.get(key) else None for key in ("ZUnits", "XYUnits")]
     values = np.frombuffer(data, "<f4", nx * ny, 4 * (len(head) // 4 + 1)).reshape(ny, nx)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..datafiles import OWN_FORMATS
 
 PROGRAM = f"parcontact {__version__}"
 LIBRARIES = ("numpy", "pyfftw", "mpi4py", "h5py", "numba")
@@ -129,7 +130,11 @@ def cite(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str,
         f"kernel {numerics['kernel']}",
         f"boundary {job.get('grid', {}).get('boundary', 'periodic')}",
         f"shift {shift['law'] if isinstance(shift, dict) else shift}",
-        *(f"shape {shape['shape']}" for shape in job["surface"]),
+        *(
+            f"shape {shape['shape']}"
+            for shape in job["surface"]
+            if Path(shape.get("path", "")).suffix not in OWN_FORMATS
+        ),
         *(f"interface {key}" for key in job.get("interface") or {}),
     }
     if material["model"] != "elastic":

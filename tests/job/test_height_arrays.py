@@ -137,6 +137,9 @@ MISTAKES = [
     (HEIGHTS.T, "has shape (16, 12), but the grid has (ny, nx) = (12, 16)"),
     (HEIGHTS[0], "must be a numpy array of heights [m], real and finite, of shape (ny, nx), got"),
     (HEIGHTS + 0j, "got an array of shape (12, 16) of complex128"),
+    (HEIGHTS.astype("M8[s]"), "got an array of shape (12, 16) of datetime64[s]"),
+    (HEIGHTS > 0, "got an array of shape (12, 16) of bool"),
+    (np.empty((0, 0)), "got an array of shape (0, 0)"),
     (np.where(HEIGHTS > 0, HEIGHTS, np.nan), "got 96 of 192 that are not finite"),
     (np.ma.masked_less(HEIGHTS, 0), "got 96 of 192 that are not finite"),
     (1e-300 * HEIGHTS, "e-3"),  # 1e-305 m, say

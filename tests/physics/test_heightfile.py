@@ -203,12 +203,12 @@ def test_types_that_are_no_numbers(comm: MPI.Intracomm, shared_path: Path) -> No
 @pytest.mark.parametrize("value", [1e300, -1e100, 5e-324])
 def test_heights_beyond_computing(comm: MPI.Intracomm, shared_path: Path, value: float) -> None:
     path = made(comm, shared_path / "map.npy", lambda path: write(path, np.full((NY, NX), value)))
-    assert f"its largest height is {abs(value):.3g} m, which cannot be computed with" in complaint(comm, path)
+    assert f"its largest value is {abs(value):.3g} m, which cannot be computed with" in complaint(comm, path)
 
 
 def test_heights_times_their_scale(comm: MPI.Intracomm, shared_path: Path) -> None:
     """Either may be a number to compute with, and their product not."""
     path = made(comm, shared_path / "map.npy", lambda path: write(path, np.full((NY, NX), 1e-60)))
-    with pytest.raises(InputError, match=r"its largest height is 1e-120 m, which cannot be computed with"):
+    with pytest.raises(InputError, match=r"its largest value is 1e-120 m, which cannot be computed with"):
         heightfile.read(path, "heights", Slab(comm, NX, NY), 1e-60)
     assert heightfile.read(path, "heights", Slab(comm, NX, NY), 1e54).max(initial=1e-6) == pytest.approx(1e-6)

@@ -177,6 +177,10 @@ BAD = {
     "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
     "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
+    "no bytes": ("road.npy", b"", ("m", SIZE, None), "it is empty"),
+    "no lines": ("road.xyz", "", ("m", None, None), "it is empty"),
+    "no values": ("road.npy", np.empty((0, 8)), ("m", SIZE, None), "an array of shape (0, 8), without values"),
+    "no field": ("road.gsf", "GIF89a", (None, None, None), "it is no simple field of Gwyddion"),
     "a phase": (
         "road.gsf",
         GSF.format("ZUnits = deg\n") + 4 * 384 * "\0",

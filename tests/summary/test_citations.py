@@ -36,3 +36,12 @@ def test_what_to_cite(tmp_path: Path) -> None:
     assert "Bugnicourt" in rubber
     assert "Persson" in rubber
     assert "Taylor" in rubber
+
+
+@pytest.mark.parametrize(("name", "credited"), [("road.npy", False), ("road.txt", False), ("road.nc", True)])
+def test_surface_topography_is_credited_for_what_it_reads(tmp_path: Path, name: str, credited: bool) -> None:
+    (tmp_path / name).touch()
+    part = {"shape": "topography", "path": name, "unit": "um", "pixel": 1e-6}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**JOB, "surface": part}))
+    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    assert ("SurfaceTopography" in citations.describe(tmp_path)) == credited

@@ -37,7 +37,7 @@ class Heights:
             given = given.transpose("y", "x").sortby([axis for axis in ("x", "y") if axis in given.coords])
             self.cell = _distance(given, "x"), _distance(given, "y")
         found = np.asanyarray(given)
-        if found.ndim != 2 or not np.can_cast(found.dtype, np.float64, "same_kind"):
+        if found.ndim != 2 or not found.size or found.dtype.kind not in "iuf":
             raise TypeError(f"an array of shape {found.shape} of {found.dtype}")
         values = np.ma.array(found, dtype=np.float64, copy=True, order="C").filled(np.nan)
         if wrong := int(np.count_nonzero(~np.isfinite(values))):
