@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,17 +78,39 @@ def has_decimal_commas(line: str) -> bool:
 
 
 def read_lines(path: Path, expected: str) -> list[tuple[int, str]]:
-    """The lines of a text file that say something, with their numbers. Raises InputError, also where there are none."""
+    """Return the lines of a text file that hold more than a comment, with their numbers.
+
+    Texts are UTF-8, UTF-16 with its mark, or Latin-1, as instruments write them. Raises InputError, also where no such
+    line is.
+    """
     try:
         if not path.is_file():
             raise InputError(f"{path} is not a file; {expected} was expected")
         if path.stat().st_size > LARGEST_TEXT:
             raise InputError(f"{path} has more than {LARGEST_TEXT / 1e6:g} MB; {expected} was expected")
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        data = path.read_bytes()
+    except OSError as error:
         raise InputError(f"{path} cannot be read as text: {error}") from error
+    encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    if "\0" in text:
+        raise InputError(f"{path} cannot be read as text: it holds bytes of 0; {expected} was expected")
     lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(f"{path} is empty; {expected} was expected")
     return lines
+
+
+def split_cells(line: str) -> list[str]:
+    """Return the cells of a line, between semicolons, tabs or commas, whichever comes first in this list, or blanks.
+
+    A cell may be quoted; a quote inside a cell, as in G", belongs to it.
+    """
+    mark = next((mark for mark in (";", "\t", ",") if mark in line), None)
+    if mark is None:
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True))]

@@ -87,10 +87,15 @@ def _fit(add: Add) -> None:
     add("--reference", metavar="T", type=float, help=text)
     text = (
         "how times depend on temperature: wlf (default) or arrhenius with fitted constants, free factors, or given "
-        "ones: wlf:C1,C2 or arrhenius:J/mol or a file with the columns T[C] and log_aT"
+        "ones: wlf:C1,C2 or arrhenius:J/mol or a file with the columns T[C] and log_aT, and perhaps log_bT"
     )
     add("--shift", metavar="LAW", default="wlf", help=text)
-    text = "rms error of the logarithms of the moduli that is allowed beside the scatter of the data (default: 0.02)"
+    text = (
+        "how moduli depend on temperature: density (times temperature), free factors, none, or auto (default): the "
+        "density law, unless the sweeps fit better without"
+    )
+    add("--vertical", choices=("auto", "density", "free", "none"), default="auto", help=text)
+    text = "largest relative error of both moduli that a small number of branches may add (default: 0.02)"
     add("--error", metavar="E", type=values.positive, default=0.02, help=text)
     text = "which moduli the fit meets, where storage and loss contradict each other (default: both)"
     add("--weight", choices=("both", "storage", "loss"), default="both", help=text)

@@ -162,7 +162,8 @@ def fit(options: argparse.Namespace) -> int:
     files.refuse_foreign(target)
     band = excited_band(mesh.load(options.job)) if options.job else None
     law = given(options.shift, options.reference)
-    made = compound.fitted(options.table, options.poisson, options.reference, law, options.error, options.weight)
+    of_fit = (options.error, options.weight, options.vertical)
+    made = compound.fitted(options.table, options.poisson, options.reference, law, *of_fit)
     for line in files.write(made, target, band):
         print(line)
     return DONE

@@ -23,7 +23,8 @@ def relaxation_of(material: Material) -> Prony:
     prony = zener_to_prony(series, kelvin, viscosity, body.modulus_inf)
     moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
     all_times = [body.time_factor * time for time in (*prony.relaxation_times, *times)]
-    return normal_form(prony.modulus_inf, [*prony.moduli, *moduli], all_times)
+    all_moduli = [body.modulus_factor * modulus for modulus in (*prony.moduli, *moduli)]
+    return normal_form(body.modulus_factor * prony.modulus_inf, all_moduli, all_times)
 
 
 def time_factor_of(material: Material) -> float:

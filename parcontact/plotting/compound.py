@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from ..errors import InputError, RunError
 from ..parallel.slab import Array
-from ..physics.prony import complex_modulus, relaxation
 from ..rubber.compound import TITLE, Compound
-from ..rubber.tables import Set
+from ..rubber.series import reduce_sets
+from ..rubber.superposition import log_factors
 from ..storage import files
 from . import style
 
@@ -44,8 +44,6 @@ def write(compound: Compound, target: Path, job_band: tuple[float, float] | None
     except OSError as error:
         raise RunError(f"{target} cannot be written: {error}") from error
     yield from (line.removeprefix("# ") for line in text.splitlines() if line.startswith("#"))
-    if compound.shift is not None:
-        yield f"shift: {compound.shift}"
     yield f"material file: {target}, picture: {picture}"
     yield from (f"warning: {text}" for text in compound.doubts())
     if job_band:
@@ -72,23 +70,14 @@ def draw(compound: Compound, path: Path, job_band: tuple[float, float] | None = 
         style.save(figure, path, dpi=150)
 
 
-def _reduced(compound: Compound) -> Iterator[tuple[Set, Array]]:
-    """Yield the sets, and where they lie at the reference: frequencies [Hz], or times [s]."""
+def _reduced(compound: Compound) -> Iterator[tuple[Array, list[Array]]]:
+    """Yield of each set frequencies [rad/s] or times [s], and moduli [Pa], as they are at the reference."""
+    kind = compound.measured.kind
     for each in compound.measured.sets:
-        shift, log = compound.shift, 0.0
-        if shift is not None and each.temperature is not None:  # else measured at the reference
-            log = shift.log_factor(each.temperature)
-        frequency = compound.measured.kind == "frequency"
-        yield each, each.at * 10.0**log / (2 * np.pi) if frequency else each.at / 10.0**log
-
-
-def _fit(compound: Compound, at: Array) -> list[Array]:
-    """Return fitted moduli [Pa]: storage and loss at frequencies [Hz], or of relaxation at times [s]."""
-    series = compound.series.modulus_inf, compound.series.moduli, compound.series.times
-    if compound.measured.kind == "time":
-        return [np.asarray(relaxation(at, *series))]
-    found = np.asarray(complex_modulus(2 * np.pi * at, *series))
-    return [found.real, found.imag]
+        shift, temperature = compound.shift, each.temperature
+        logs = None if shift is None or temperature is None else log_factors(shift, [temperature])
+        data = reduce_sets([each], kind, logs)
+        yield data.at, np.split(data.moduli, 2) if kind == "frequency" else [data.moduli]
 
 
 def _draw_moduli(top: Axes, bottom: Axes, compound: Compound) -> None:
@@ -97,17 +86,23 @@ def _draw_moduli(top: Axes, bottom: Axes, compound: Compound) -> None:
     letter, kind, size = ("E", "Young's", 2.0 * (1.0 + compound.poisson)) if measured.tension else ("G", "shear", 1.0)
     frequency = measured.kind == "frequency"
     names = (f"{letter}'", f"{letter}''") if frequency else (f"{letter}(t)",)
+    if measured.kind == "creep":
+        names = ("1/D(t)" if measured.tension else "1/J(t)",)
     from_tangent = {"stor": (f" = {names[-1]} / tan δ", ""), "loss": ("", f" = {names[0]} tan δ")}
     notes = from_tangent.get(measured.derived, ("", ""))
-    every = np.concatenate([at for _, at in sets])
-    line = np.geomspace(every.min(), every.max(), POINTS)
-    for k, (name, fitted) in enumerate(zip(names, _fit(compound, line), strict=True)):
-        for number, (each, at) in enumerate(sets):
-            values, look = (each.storage, each.loss)[k], {"ms": 3, "mfc": "none", "color": COLORS[k]}
+    every = np.concatenate([at for at, _ in sets])
+    line, unit = np.geomspace(every.min(), every.max(), POINTS), 2 * np.pi if frequency else 1.0
+
+    def fitted(at: Array, k: int) -> Array:
+        return np.asarray(compound.series.response(measured.kind, at)).reshape(len(names), -1)[k]
+
+    for k, name in enumerate(names):
+        for number, (at, moduli) in enumerate(sets):
+            look = {"ms": 3, "mfc": "none", "color": COLORS[k]}
             label = None if number else f"{name}{notes[k]} measured"
-            top.loglog(at, size * values, "os"[k], label=label, **look)
-            bottom.semilogx(at, 100 * (_fit(compound, at)[k] / values - 1.0), "os"[k], **look)
-        top.plot(line, size * fitted, color=COLORS[k], label=f"{name} fitted")
+            top.loglog(at / unit, size * moduli[k], "os"[k], label=label, **look)
+            bottom.semilogx(at / unit, 100 * (fitted(at, k) / moduli[k] - 1.0), "os"[k], **look)
+        top.plot(line / unit, size * fitted(line, k), color=COLORS[k], label=f"{name} fitted")
     top.set_ylabel(f"{kind} modulus [Pa]")
     bottom.sharex(top)
     bottom.axhline(0.0, color="black", lw=0.8)

@@ -54,6 +54,8 @@ def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
         temperature = reference if found.temperature is None else found.temperature
         yield "temperature", f"{temperature:g} °C (reference {reference:g} °C)"
         yield "shift factor a_T", f"{found.time_factor:.4g}"
+        if found.shift.vertical is not None:
+            yield "vertical shift factor b_T", f"{found.modulus_factor:.4g}"
     if found.band is not None:
         yield "measured at, as at the reference", _write_band(found.band)
     if found.temperatures is not None:

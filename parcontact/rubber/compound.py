@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..printed import per_cent
-from .shift import WLF, Arrhenius, Factors, Shift
+from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
 
 if TYPE_CHECKING:
     from .series import Weigh
+    from .superposition import Superposition, Vertical
 
 TITLE = "# Fitted by parcontact fit to"  # with which material files of fits begin
 POOR, HOPELESS = 0.2, 1.0  # accuracy: rms errors of fits that are warned of, and refused
@@ -20,21 +21,26 @@ CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # accuracy: misfits of more than so many t
 SWAPPED = 0.5  # accuracy: of the misfit: that of exchanged moduli, if they were
 WIDE_GAP = 1.0  # accuracy: decades between sweeps as shifted, beyond which they say nothing of the shift
 DIGITS = 7  # accuracy: of the numbers in a material file
-LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors"}
+LEAST_SHOWN = 1e-5  # accuracy: of misfits: less is rounding
+LIQUID = 1e-4  # accuracy: long-term modulus over the storage modulus at the lowest frequency: nothing is left of it
+UNKNOWN = 1.0  # accuracy: error from which on nothing is known
+VAGUE = 0.1  # accuracy: error of the loss modulus inside the band that is warned of
+LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors", Density: "density"}
 
 
 @dataclass(frozen=True)
 class Compound:
     """The measurement (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
     `shift` (None for a table of one temperature); `poisson` is the ratio with which Young's moduli were divided; both
-    moduli count in the fit, or only the one to `weigh`; whether the shift was fitted to the sweeps that it `joined`."""
+    moduli count in the fit, or only the one to `weigh`; `found` is what the sweeps themselves say of the shift, None
+    where it is given."""
 
     measured: Any
     series: Any
     shift: Shift | None
     poisson: float
     weigh: "Weigh" = "both"
-    joined: bool = False
+    found: "Superposition | None" = None
 
     def material(self) -> dict[str, Any]:
         """The material section of a job."""
@@ -58,7 +64,7 @@ class Compound:
         """Return warnings of a fit that misses the table by more than it scatters, and of tables of no rubber."""
         from .sane import odd_moduli  # with numpy, which is slow to import
 
-        series, found = self.series, []
+        series, found = self.series, list(self.measured.doubts)
         if series.error > POOR:
             found.append(
                 f"the fit misses the {self._weighed} by {per_cent(series.error)} (rms), more than {per_cent(POOR)}"
@@ -73,11 +79,38 @@ class Compound:
                 f"{per_cent(storage)} and {per_cent(loss)}, and neighbouring points of a sweep scatter by "
                 f"{per_cent(noise)}. Check the table, or fit one of them: --weight storage, or --weight loss"
             )
-        return [*found, *self._gaps(), *odd_moduli(self.measured.sets)]
+        return [*found, *self._describe_loss(), *self._describe_free(), *self._gaps(), *odd_moduli(self.measured.sets)]
+
+    def _describe_loss(self) -> Iterator[str]:
+        """Yield warnings about a loss modulus that the table hardly shows, and about a body without a spring."""
+        series = self.series
+        counts = self.measured.kind == "frequency" and self.weigh != "storage"
+        low, high = (frequency / (2 * math.pi) for frequency in series.band)
+        if (inside := series.loss_errors[0]) > VAGUE and not counts:
+            known = f"known to {per_cent(inside)} only" if inside < UNKNOWN else "hardly known"
+            yield (
+                f"the loss modulus that follows from the table is {known} between {low:.3g} and {high:.3g} Hz, and "
+                "friction goes with it: measure it, or more points per decade"
+            )
+        if series.modulus_inf < LIQUID * series.storage_at(series.band[0]):
+            yield (
+                f"modulus_inf is {series.modulus_inf:.3g} Pa: the body flows like a liquid under loads that last "
+                f"longer than {1.0 / series.band[0]:.2g} s; measure at lower frequencies or longer times"
+            )
+
+    def _describe_free(self) -> Iterator[str]:
+        """Yield a warning where factors b_T of their own join the sweeps much better than the law does."""
+        free = self.found.free if self.found else None
+        if self.found and free:
+            yield (
+                f"free vertical factors b_T would join the sweeps with a misfit of {per_cent(free.misfit)}, not "
+                f"{per_cent(self.found.misfit)}, and the shift would be {free.shift}: moduli do not go with density "
+                "times temperature, or the law of the shift is wrong; compare --vertical free and --shift free"
+            )
 
     def _gaps(self) -> Iterator[str]:
         """Tell neighbouring sweeps that are far from overlapping, where the shift was fitted to them."""
-        if self.shift is None or not self.joined:
+        if self.shift is None or not self.found:
             return
         sign = 1.0 if self.measured.kind == "frequency" else -1.0
         logs = [sign * self.shift.log_factor(t) for t in self.measured.temperatures]
@@ -94,11 +127,26 @@ class Compound:
                     "--shift FILE"
                 )
 
+    def _describe_shift(self) -> Iterator[str]:
+        """Yield comments about both factors at the lowest and the highest measured temperature."""
+        if self.shift is None:
+            return
+        how = "fitted" if self.found else "given"
+        yield f"# Horizontal shift, {how}: {self.shift}."
+        degrees = self.measured.temperatures
+        ends = [(t, self.shift.log_factor(t), log_vertical(self.shift, t)) for t in {*degrees[:1], *degrees[-1:]}]
+        factors = ", ".join(f"a_T = {10.0**a:.3g} and b_T = {10.0**b:.3g} at {t:.4g} C" for t, a, b in sorted(ends))
+        vertical = self.shift.vertical or "none, b_T = 1"
+        yield f"# Vertical shift: {vertical}{'; ' if factors else ''}{factors}."
+
     def text(self) -> str:
         """The material file: what it is and how good, then the material."""
         series, shift, section = self.series, self.shift, self.material()
         to = f", shifted to {shift.reference:g} C" if shift is not None else ""
         kind = "Young's moduli, divided by 2 (1 + poisson)," if self.measured.tension else "shear moduli"
+        if self.measured.kind == "creep":
+            kind = "tensile compliances, times 2 (1 + poisson)," if self.measured.tension else "shear compliances"
+        over = "frequency" if self.measured.kind == "frequency" else "time"
         temperatures = self.measured.temperatures
         noise = (
             ""
@@ -106,11 +154,13 @@ class Compound:
             else f"; neighbouring points of a sweep scatter by {per_cent(series.scatter)}"
         )
         lines = [
-            f"{TITLE} {self.measured.path.name}: {kind} over {self.measured.kind}.",
+            f"{TITLE} {self.measured.path.name}: {kind} over {over}.",
             f"# {len(series.moduli)} branches. The fit misses the {self._weighed} by {per_cent(series.error)} (rms), "
-            f"the best one of any number of branches by {per_cent(series.best)}{noise}.",
+            f"the best one of any number of branches by {per_cent(max(series.best, LEAST_SHOWN))}{noise}.",
             f"# Measured frequencies{to}: {section['band'][0]:.3g} to {section['band'][1]:.3g} Hz.",
+            f"# Estimated error of the loss modulus: {_percents(series.loss_errors)} at its upper end.",
             *([f"# Measured at {', '.join(f'{t:.4g}' for t in temperatures)} C."] if temperatures else []),
+            *self._describe_shift(),
             "# Moduli are shear moduli [Pa], times are in s"
             + (
                 f" at {shift.reference:g} C, where a job is that has no `temperature: T`." if shift is not None else "."
@@ -123,28 +173,46 @@ class Compound:
 
 
 def fitted(
-    path: Path, poisson: float, reference: float | None, law: str | Shift, error: float, weigh: "Weigh" = "both"
+    path: Path,
+    poisson: float,
+    reference: float | None,
+    law: str | Shift,
+    error: float,
+    weigh: "Weigh" = "both",
+    vertical: "Vertical" = "auto",
 ) -> Compound:
     """Read a table and fit it. `law` is wlf, arrhenius or free (constants are fitted too), or a shift that is known;
-    `reference` [deg C] defaults to the middle one of the measured temperatures. Raises InputError, also for a table
-    that no fit meets."""
+    `vertical` is the law of b_T, unless the known shift has one; `reference` [deg C] defaults to the middle one of the
+    measured temperatures. Raises InputError, also for a table that no fit meets."""
     from . import series, tables  # scipy is for fits only
+    from .superposition import log_factors, superpose
 
     measured = tables.read(path, poisson)
+    if isinstance(law, str):
+        measured = measured.without_short_sets()
     temperatures = measured.temperatures
-    shift: Shift | None = None
-    if not isinstance(law, str):
-        shift = law
-    elif len(temperatures) > 1:
-        middle = temperatures[len(temperatures) // 2]
-        shift = series.find_shift(measured, middle if reference is None else reference, law, weigh)
-    logs = [shift.log_factor(t) for t in temperatures] if shift is not None and temperatures else None
-    joined = isinstance(law, str) and shift is not None
-    best = series.fit(measured.sets, measured.kind, error, logs, weigh)
-    found = Compound(measured, best, shift, poisson, weigh, joined)
-    missed = found.series.error
-    exchanged = missed if missed <= POOR or measured.kind == "time" else series.swapped(measured.sets, logs)
-    if exchanged < SWAPPED * missed:
+    shift: Shift | None = None if isinstance(law, str) else law
+    found: Superposition | None = None
+    try:
+        if len(temperatures) > 1 and (shift is None or shift.vertical is None):
+            middle = temperatures[len(temperatures) // 2] if reference is None else reference
+            found = superpose(measured, middle if shift is None else shift.reference, law, vertical, weigh)
+            shift = found.shift
+        logs = log_factors(shift, temperatures) if shift is not None and temperatures else None
+    except InputError as failure:
+        raise failure if str(failure).startswith(str(path)) else InputError(f"{path}: {failure}") from failure
+    data = series.reduce_sets(measured.sets, measured.kind, logs, weigh)
+    sweeps = [(each.at, moduli) for each in measured.sets for moduli in (each.storage, each.loss) if moduli.size]
+    best = series.fit(data, error, sweeps)
+    _refuse_misfit(path, best, data)
+    return Compound(measured, best, shift, poisson, weigh, found if isinstance(law, str) else None)
+
+
+def _refuse_misfit(path: Path, best: Any, data: Any) -> None:
+    """Raise InputError for moduli that no series meets."""
+    missed = best.error
+    exchanged = missed if missed <= POOR or data.kind != "frequency" else data.exchanged_misfit()
+    if exchanged < min(SWAPPED * missed, POOR):
         raise InputError(
             f"{path}: storage and loss moduli seem to be exchanged: the fit misses them by {per_cent(missed)}, and by "
             f"{per_cent(exchanged)} if each is taken for the other"
@@ -155,12 +223,23 @@ def fitted(
             "are not those of one linear viscoelastic body, or the sweeps do not shift onto one another; check units "
             "and temperatures"
         )
-    return found
+
+
+def _percents(errors: tuple[float, float, float]) -> str:
+    inside, low, high = (per_cent(error) if error < UNKNOWN else "unknown" for error in errors)
+    return f"{inside} inside this band, {low} at its lower end and {high}"
 
 
 def _shift_section(shift: Any) -> dict[str, Any]:
-    numbers = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(shift).items()}
-    return {"law": LAWS[type(shift)], **_rounded(numbers)}
+    """Return a shift as a job has it; its vertical law has the same reference."""
+    numbers = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(shift).items()}
+    vertical = numbers.pop("vertical", None)
+    section = {"law": LAWS[type(shift)], **_rounded(numbers)}
+    if vertical is None:
+        return section
+    inner = _shift_section(vertical)
+    del inner["reference"]
+    return {**section, "vertical": inner}
 
 
 def _rounded(value: Any) -> Any:

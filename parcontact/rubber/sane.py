@@ -43,14 +43,17 @@ def odd_moduli(sets: Sequence[Any]) -> Iterator[str]:
         yield f"its largest shear modulus is {largest:.3g} Pa, softer than any rubber: is the unit right?"
 
 
-def refuse_rising(path: Path, sets: Sequence[Array]) -> None:
-    """Raise InputError where relaxation moduli of a set, by rising times, grow."""
+def refuse_rising(path: Path, kind: str, sets: Sequence[Array]) -> None:
+    """Raise InputError where relaxation moduli of a set, by rising times, grow; or, of creep, inverse compliances."""
     for moduli in sets:
-        if moduli[-1] > (1.0 + RISE) * moduli[0]:
-            raise InputError(
-                f"{path}: a relaxation modulus rises with time, from {moduli[0]:.3g} to {moduli[-1]:.3g} Pa, and every "
-                "one falls; are these creep compliances, or storage moduli over frequency?"
-            )
+        if moduli[-1] <= (1.0 + RISE) * moduli[0]:
+            continue
+        if kind == "creep":
+            raise InputError(f"{path}: a compliance falls with time, and every one rises; is it a relaxation modulus?")
+        raise InputError(
+            f"{path}: a relaxation modulus rises with time, from {moduli[0]:.3g} to {moduli[-1]:.3g} Pa, and every "
+            "one falls; are these creep compliances, or storage moduli over frequency?"
+        )
 
 
 def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:

@@ -1,139 +1,330 @@
-"""A Prony series from measured moduli: non-negative least squares on a logarithmic grid of relaxation times.
+"""A Prony series from measured moduli, with as many branches as the loss modulus needs.
 
-    G'(w) = G_inf + sum_k G_k (w tau_k)^2/(1 + (w tau_k)^2),    G''(w) = sum_k G_k w tau_k/(1 + (w tau_k)^2),
-    G(t)  = G_inf + sum_k G_k exp(-t/tau_k),                    all G_k >= 0, G_inf >= 0.
+    G*(w) = G_inf + sum_k G_k i w tau_k/(1 + i w tau_k),     G(t) = G_inf + sum_k G_k exp(-t/tau_k),     all G_k >= 0
+    J(t)  = J_0 + sum_k J_k (1 - exp(-t/lambda_k)) + t/eta,  J*(w) = J_0 + sum_k J_k/(1 + i w lambda_k) + 1/(i w eta)
 
-Errors are relative, so that the plateau of the glass does not hide that of the rubber. As few times as meet the error
-asked for are kept. (M. Baumgaertel, H. H. Winter, Rheol. Acta 28 (1989) 511; C. L. Lawson, R. J. Hanson, Solving Least
-Squares Problems (1974), chapter 23.)
+A relaxation modulus and a storage modulus hardly show the loss modulus, on which friction depends. Therefore the data
+are met twice. First by a dense spectrum (`Spectrum`), by non-negative least squares of the relative errors with a
+penalty on its roughness. The penalty is the prior of a Gaussian process, so that the spectrum has a covariance, and the
+loss modulus that follows an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp, J. Weese, Rheol. Acta
+32 (1993) 65). Then the shortest series is taken which meets both moduli of this spectrum, everywhere in the band.
+Creep is 1/J*(w) of its spectrum (J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter 3).
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize, nnls
+from scipy.optimize import nnls
 
 from .. import progress
-from ..errors import InputError
 from .sane import scatter
-from .shift import WLF, Arrhenius, Factors, Shift
-from .tables import Measurement, Set
+from .tables import Kind, Set
 
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 Weigh = Literal["both", "storage", "loss"]
-DENSE = 3  # accuracy: times per decade of the best series that is looked for
 MOST = 48  # tuning: branches
+DENSE = 6  # accuracy: times per decade of the dense spectrum
+SPARE = 1.0  # accuracy: decades of times beyond the data, to either side, of the dense spectrum
+ROUGH = 3.0  # fitted: prior of second differences of the spectrum over its mean; errors are as stated on eight bodies
+BEYOND = 0.7  # fitted: prior of the spectrum beyond the data over that in the last decade, likewise
+LEAST_NOISE = 1e-4  # accuracy: relative, below which no table is trusted
+PER_DECADE = 10  # accuracy: frequencies at which a short series is held to the dense spectrum
+ENDS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # accuracy: decades beyond the data that are tried for a short series
+NEAR_END = 0.5  # accuracy: decades of the band that count as its ends
+EARLIEST = 20.0  # accuracy: a relaxation or creep from t on shows the loss up to a frequency of 1/(20 t)
 NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out
-SPARE = 0.5  # accuracy: decades of times beyond the data, to either side
-ENDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # accuracy: decades beyond the data that are tried for a short series
-WIDEST = 8.0  # tuning: decades: the largest shift between neighbouring temperatures that is looked for
-MOST_DECADES = 30.0  # tuning: of shift between the coldest and the warmest set
-Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
-WLF_CONSTANTS: Ranges = ((2.0, 60.0, 24), (20.0, 600.0, 24))  # physics: C1 [-], C2 [K]
-ENERGIES: Ranges = ((1e4, 1e6, 60),)  # physics: J/mol
-APART = 0.1  # accuracy: rms of the differences of the logarithms of two sets that do not overlap
-SHORTEST = 0.3  # accuracy: share of a sweep that must overlap with its neighbour's
+Errors = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Series:
     """`modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference temperature.
 
-    `error` is the rms of the logarithms of fitted over measured moduli, of those that count; `best` that of a dense
-    series, than which none is better; `alone` the same of storage and of loss without the other; `scatter` that of
-    neighbours of one sweep about a smooth curve, nan if sweeps are too short to tell; `band` [rad/s] holds the reduced
-    frequencies of the data (of relaxation: the inverse times).
+    `error` is the rms of the relative misfit of the data that count; `best` the smallest one of any series; `alone` the
+    same of storage and of loss without the other; `scatter` the relative scatter of neighbours in a sweep about a
+    smooth curve, nan if sweeps are too short. `band` [rad/s] holds the frequencies at which moduli are known, and
+    `loss_errors` the relative error (two standard deviations) of the loss modulus inside it, at its lower and its upper
+    end.
     """
 
     modulus_inf: float
     moduli: Array
     times: Array
     error: float
-    band: tuple[float, float] = (0.0, 0.0)
-    best: float = math.nan
-    alone: tuple[float, float] = (math.nan, math.nan)
-    scatter: float = math.nan
+    band: tuple[float, float]
+    best: float
+    alone: tuple[float, float]
+    scatter: float
+    loss_errors: Errors
+
+    def modulus(self, omega: Array) -> ComplexArray:
+        """Return G*(w) [Pa] at angular frequencies [rad/s], shape (n,)."""
+        return np.asarray(complex_kernel(omega, "frequency", self.times) @ np.append(self.moduli, self.modulus_inf))
+
+    def storage_at(self, omega: float) -> float:
+        """Return G'(w) [Pa] at an angular frequency [rad/s]."""
+        return float(self.modulus(np.array([omega]))[0].real)
+
+    def response(self, kind: Kind, at: Array) -> Array:
+        """Return what a measurement of a kind shows: storage before loss [Pa] at frequencies [rad/s], or G(t) or 1/J(t)
+        [Pa] at times [s]. Of n frequencies or times, the shape is (2 n,) or (n,)."""
+        if kind == "creep":
+            return 1.0 / self._creep(at)
+        return np.asarray(kernel(at, kind, self.times) @ np.append(self.moduli, self.modulus_inf))
+
+    def _creep(self, t: Array) -> Array:
+        """Return J(t) [1/Pa]: retardation rates are the eigenvalues of a diagonal and a dyad."""
+        instant, v = self.modulus_inf + self.moduli.sum(), np.sqrt(self.moduli / self.times)
+        rates, vectors = np.linalg.eigh(np.diag(1.0 / self.times) - np.outer(v, v) / instant)
+        rates = np.maximum(rates, np.finfo(float).tiny)
+        weights = (v @ vectors) ** 2 / instant**2
+        return np.asarray(1.0 / instant + (-np.expm1(-np.outer(t, rates)) / rates) @ weights)
 
 
-def fit(
-    sets: Sequence[Set], kind: str, error: float, shifts: Sequence[float] | None = None, weigh: Weigh = "both"
-) -> Series:
-    """The shortest series that meets an rms error of the logarithms; `shifts` are log10 a_T of the sets, and `weigh`
-    says which of the moduli counts.
+def kernel(at: Array, kind: Kind, times: Array) -> Array:
+    """Return what each unit weight of a spectrum adds to the data, shape (data, weights): those of the times, then the
+    spring, or of creep the instantaneous compliance and the fluidity."""
+    if kind == "frequency":
+        found = complex_kernel(at, kind, times)
+        return np.vstack([found.real, found.imag])
+    decay = np.exp(-at[:, None] / times)
+    one = np.ones((at.size, 1))
+    return np.hstack([decay, one] if kind == "time" else [1.0 - decay, one, at[:, None]])
 
-    What no series meets, as a dense one leaves it, is allowed besides, as a square.
+
+def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
+    """Return what each unit weight adds to G* at angular frequencies [rad/s], of creep to J*."""
+    z, one = 1j * omega[:, None] * times, np.ones((omega.size, 1))
+    if kind == "creep":
+        return np.hstack([1.0 / (1.0 + z), one, 1.0 / (1j * omega[:, None])])
+    return np.hstack([z / (1.0 + z), one])
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The data of all sets, reduced to one temperature: `at`, shape (n,), frequencies [rad/s] or times [s], and
+    `moduli` [Pa], shape (n,) of G(t) or 1/J(t), or (2 n,), storage before loss, of which those in `counts` are met."""
+
+    kind: Kind
+    at: Array
+    moduli: Array
+    counts: slice
+
+    @property
+    def counted(self) -> int:
+        """The number of data that count."""
+        return len(self.moduli[self.counts])
+
+    @property
+    def rates(self) -> tuple[float, float]:
+        """The lowest and the highest rate [1/s]."""
+        rates = self.at if self.kind == "frequency" else 1.0 / self.at
+        return float(rates.min()), float(rates.max())
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """The angular frequencies [rad/s] between which the data show the moduli."""
+        low, high = self.rates
+        return (low, high) if self.kind == "frequency" else (low, 2 * math.pi / EARLIEST * high)
+
+    def columns(self, times: Array) -> Array:
+        """Return what each unit weight adds to the data that count, relative to them; creep is J over 1/(1/J)."""
+        found, data = kernel(self.at, self.kind, times), self.moduli[:, None]
+        return np.asarray((found * data if self.kind == "creep" else found / data)[self.counts])
+
+    def misfit(self, response: Array) -> float:
+        """Return the rms of the logarithms of a response over the data that count."""
+        ratio = np.maximum(response, np.finfo(float).tiny)[self.counts] / self.moduli[self.counts]
+        return float(np.sqrt(np.mean(np.log(ratio) ** 2)))
+
+    def find_spring(self, storage: Array) -> float:
+        """Return by how much measured storage moduli exceed those of a spectrum without a spring [Pa], in the mean."""
+        measured = self.moduli[: self.at.size]
+        return max(0.0, float(np.mean(1.0 - storage / measured) / np.mean(1.0 / measured)))
+
+    def exchanged_misfit(self) -> float:
+        """Return the rms of the misfit of the best series, if storage and loss moduli are taken for each other."""
+        moduli = np.roll(self.moduli, self.at.size)
+        return _rms(best_residuals(replace(self, moduli=moduli, counts=slice(None))))
+
+
+def reduce_sets(
+    sets: Sequence[Set],
+    kind: Kind,
+    logs: tuple[Sequence[float], Sequence[float]] | None = None,
+    weigh: Weigh = "both",
+) -> Measured:
+    """Return the data of all sets at one temperature; `logs` are log10 of a_T and of b_T of each set."""
+    sign, (horizontal, vertical) = 1.0 if kind == "frequency" else -1.0, logs or [[0.0] * len(sets)] * 2
+    shifted = list(zip(sets, horizontal, vertical, strict=True))
+    at = np.concatenate([each.at * 10.0 ** (sign * a) for each, a, _ in shifted])
+    moduli = [np.concatenate([getattr(each, part) / 10.0**b for each, _, b in shifted]) for part in ("storage", "loss")]
+    counts = {"both": slice(None), "storage": slice(at.size), "loss": slice(at.size, None)}
+    return Measured(kind, at, np.concatenate(moduli), counts[weigh if kind == "frequency" else "both"])
+
+
+def best_residuals(data: Measured, per_decade: int = DENSE) -> Array:
+    """Return by how much the best series of any number of branches misses the data that count, relative to them."""
+    low, high = data.rates
+    first, last = (round(per_decade * (math.log10(1.0 / rate) + side)) for rate, side in ((high, -SPARE), (low, SPARE)))
+    columns = data.columns(np.power(10.0, np.arange(first, last + 1) / per_decade))
+    return np.asarray(columns @ _non_negative(columns) - 1.0)
+
+
+def _non_negative(columns: Array, goal: Array | None = None) -> Array:
+    goal = np.ones(len(columns)) if goal is None else goal
+    return np.asarray(nnls(columns, goal, maxiter=100 * sum(columns.shape))[0])
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A dense spectrum of relaxation times (of creep: of retardation times) [s] with its weights [Pa or 1/Pa], and the
+    matrix whose product with its transpose is the covariance of the weights."""
+
+    kind: Kind
+    times: Array
+    weights: Array
+    deviations: Array
+
+    @staticmethod
+    def of(data: Measured) -> "Spectrum":
+        """Return the smooth spectrum that meets the data within their noise."""
+        high, low = (-math.log10(rate) for rate in data.rates)
+        inside = max(2, math.ceil((high - low) * DENSE)) + 1
+        step, beyond = max(high - low, 0.1) / (inside - 1), round(SPARE * DENSE)
+        times = np.power(10.0, low + step * np.arange(-beyond, inside + beyond))
+        columns = data.columns(times)
+        weights = _non_negative(columns)
+        missed = columns @ weights - 1.0
+        free = max(len(missed) - int(np.count_nonzero(weights)), (len(missed) + 1) // 2)
+        noise = max(math.sqrt(float(missed @ missed) / free), LEAST_NOISE)
+        prior = noise * _prior(inside, beyond, columns.shape[1] - times.size)
+        goal = np.concatenate([np.ones(len(columns)), np.zeros(len(prior))])
+        for _ in range(3):  # the scale is that of the spectrum itself
+            scale = _scale(times, weights, slice(beyond, beyond + inside))
+            system = np.vstack([columns * scale, prior])
+            weights = scale * _non_negative(system, goal)
+        if not columns[:, times.size].any():
+            weights[times.size] = data.find_spring(kernel(data.at, data.kind, times)[: data.at.size] @ weights)
+        return Spectrum(data.kind, times, weights, noise * scale[:, None] * np.linalg.pinv(system))
+
+    def modulus(self, omega: Array) -> tuple[ComplexArray, Array]:
+        """Return G* [Pa] at angular frequencies [rad/s], shape (n,), and the relative standard deviation of its
+        imaginary part."""
+        found = complex_kernel(omega, self.kind, self.times)
+        modulus = found @ self.weights
+        if self.kind == "creep":
+            modulus = 1.0 / modulus
+            found = -(modulus[:, None] ** 2) * found
+        deviation = np.sqrt(np.sum((found.imag @ self.deviations) ** 2, axis=1))
+        return modulus, deviation / modulus.imag
+
+
+def _prior(inside: int, beyond: int, rest: int) -> Array:
+    """Return rows that are 0 for a spectrum that is smooth, and that goes on beyond the data as in the last decade."""
+    count, last = inside + 2 * beyond, min(DENSE, inside)
+    smooth = np.diff(np.eye(count), 2, axis=0) / ROUGH
+    tails = np.eye(count)[[*range(beyond), *range(beyond + inside, count)]]
+    tails[:beyond, beyond : beyond + last] -= 1.0 / last
+    tails[beyond:, beyond + inside - last : beyond + inside] -= 1.0 / last
+    return np.pad(np.vstack([smooth, tails / BEYOND]), ((0, 0), (0, rest)))
+
+
+def _scale(times: Array, weights: Array, inside: slice) -> Array:
+    """Return weights without features: a share of the loss at each time, as a power law beyond the data."""
+    z = times / times[:, None]
+    logs = np.log(np.maximum((z / (1.0 + z**2)) @ weights[: times.size], 1e-30 * weights.max()))
+    at = np.arange(times.size)
+    for end, out in ((at[inside][: DENSE + 1], at[: inside.start]), (at[inside][-DENSE - 1 :], at[inside.stop :])):
+        logs[out] = np.polyval(np.polyfit(end, logs[end], 1), out)
+    share = float(np.mean(weights[: times.size][inside] / np.exp(logs[inside])))
+    return np.concatenate([max(share, 1e-3) * np.exp(logs), np.ones(weights.size - times.size) * weights.max()])
+
+
+def fit(data: Measured, error: float, sweeps: Sequence[tuple[Array, Array]] = ()) -> Series:
+    """Return the shortest series that meets the data as closely as the smooth spectrum within them does.
+
+    At all rates of the data its moduli differ from those of the spectrum by `error` at most, beside the standard
+    deviation of the loss modulus. It has a branch per decade at least. `sweeps`, rates and moduli, are what the scatter
+    is found from.
     """
-    at, data = _reduced(sets, kind, shifts or [0.0] * len(sets))
-    rates = at if kind == "frequency" else 1.0 / at
-    band = float(rates.min()), float(rates.max())
-    weigh = weigh if kind == "frequency" else "both"
-    dense = _solve(at, data, kind, _dense(*band), weigh)
-    goal = math.hypot(error, dense.error)
-    for count in progress.with_bar(range(1, MOST + 1), "number of branches", "branch"):
-        tried = [_solve(at, data, kind, _grid(band, count, spare), weigh) for spare in ENDS]
-        found = min(tried, key=lambda series: series.error)
-        if found.error <= goal:
+    spectrum, (low, high), (slow, fast) = Spectrum.of(data), data.band, data.rates
+    decades = math.log10(fast / slow)
+    within = _frequencies(slow, fast)
+    omega = np.concatenate([within, _frequencies(slow / 10.0**NEAR_END, fast * 10.0**NEAR_END)])
+    goal, deviation = spectrum.modulus(omega)
+    least, judge = min(max(1, math.ceil(decades)), MOST), slice(within.size)
+    allowed = np.hypot(error, deviation[judge])
+    for count in progress.with_bar(range(least, MOST + 1), "number of branches", "branch"):
+        tried = [_short(omega, goal, _times(data.rates, count, spare)) for spare in ENDS]
+        judged = [_distance(omega[judge], goal[judge], allowed, *each) for each in tried]
+        found = tried[int(np.argmin(judged))]
+        if min(judged) <= 1.0:
             break
-    else:
-        found = dense
-    of_one: tuple[Weigh, Weigh] = ("storage", "loss")
-    known = kind == "frequency"
-    alone = [_solve(at, data, kind, _dense(*band), one).error for one in of_one] if known else [dense.error, math.nan]
-    sweeps = [(each.at, moduli) for each in sets for moduli in (each.storage, each.loss) if moduli.size]
-    return replace(found, band=band, best=dense.error, alone=(alone[0], alone[1]), scatter=scatter(sweeps))
+    times, weights = found
+    omega = _frequencies(low, high)
+    goal, deviation = spectrum.modulus(omega)
+    missed = (complex_kernel(omega, "frequency", times) @ weights).imag / goal.imag - 1.0
+    errors = 2.0 * np.hypot(deviation, missed)
+    inner = (omega >= low * 10.0**NEAR_END) & (omega <= high / 10.0**NEAR_END)
+    series = Series(
+        float(weights[-1]),
+        weights[:-1],
+        times,
+        error=math.nan,
+        band=(low, high),
+        best=_rms(best_residuals(data)),
+        alone=_alone(data),
+        scatter=scatter(sweeps),
+        loss_errors=(_rms(errors[inner if inner.any() else slice(None)]), float(errors[0]), float(errors[-1])),
+    )
+    return replace(series, error=data.misfit(series.response(data.kind, data.at)))
 
 
-def swapped(sets: Sequence[Set], shifts: Sequence[float] | None = None) -> float:
-    """Return the error of a dense series for which storage and loss moduli are taken for each other."""
-    other = [replace(each, storage=each.loss, loss=each.storage) for each in sets]
-    at, data = _reduced(other, "frequency", shifts or [0.0] * len(sets))
-    return _solve(at, data, "frequency", _dense(float(at.min()), float(at.max()))).error
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
-def _grid(band: tuple[float, float], count: int, spare: float = SPARE) -> Array:
-    """Relaxation times [s] over a band of rates and some decades beyond, in the middles of equal parts of it."""
-    low, high = math.log10(1.0 / band[1]) - spare, math.log10(1.0 / band[0]) + spare
+def _alone(data: Measured) -> tuple[float, float]:
+    """Return how closely storage and loss moduli could be met without the other."""
+    if data.kind != "frequency":
+        return math.nan, math.nan
+    parts = slice(data.at.size), slice(data.at.size, None)
+    storage, loss = (_rms(best_residuals(replace(data, counts=part))) for part in parts)
+    return storage, loss
+
+
+def _times(rates: tuple[float, float], count: int, spare: float) -> Array:
+    """Return relaxation times [s] of rates and some decades beyond, in the middles of equal parts of them."""
+    low, high = math.log10(1.0 / rates[1]) - spare, math.log10(1.0 / rates[0]) + spare
     step = (high - low) / count
     return np.asarray(10.0 ** (low + step * (0.5 + np.arange(count))))
 
 
-def _reduced(sets: Sequence[Set], kind: str, shifts: Sequence[float]) -> tuple[Array, Array]:
-    """Reduced rates or times of all sets, shape (n,), and their moduli, shape (n,) or (2 n,): storage before loss."""
-    sign = 1.0 if kind == "frequency" else -1.0
-    at = np.concatenate([each.at * 10.0 ** (sign * log) for each, log in zip(sets, shifts, strict=True)])
-    storage, loss = (np.concatenate([getattr(each, name) for each in sets]) for name in ("storage", "loss"))
-    return at, np.concatenate([storage, loss])
+def _short(omega: Array, goal: ComplexArray, times: Array) -> tuple[Array, Array]:
+    """Return times and weights of the series that meets moduli best; branches that nobody would see are left out."""
+    target = np.concatenate([goal.real, goal.imag])
+    weights = _non_negative(kernel(omega, "frequency", times) / target[:, None])
+    kept = weights[:-1] > _negligible(weights[:-1], times, float(weights[-1]))
+    return times[kept], weights[np.append(kept, True)]
 
 
-def _columns(at: Array, kind: str, times: Array) -> Array:
-    """Return the contributions to the data of a unit modulus of each time, and of none (the last column)."""
-    if kind == "time":
-        return np.hstack([np.exp(-at[:, None] / times), np.ones((at.size, 1))])
-    z = at[:, None] * times
-    storage = np.hstack([z**2 / (1.0 + z**2), np.ones((at.size, 1))])
-    return np.vstack([storage, np.hstack([z / (1.0 + z**2), np.zeros((at.size, 1))])])
+def _frequencies(low: float, high: float) -> Array:
+    """Return angular frequencies [rad/s] with equal ratios, both ends included."""
+    return np.geomspace(low, high, max(2, round(PER_DECADE * math.log10(high / low))) + 1)
 
 
-def _solve(at: Array, data: Array, kind: str, times: Array, weigh: Weigh = "both") -> Series:
-    """The best moduli >= 0 for given times; those that are 0 are left out."""
-    columns = _columns(at, kind, times)
-    counts = {"both": slice(None), "storage": slice(at.size), "loss": slice(at.size, None)}[weigh]
-    scaled = columns[counts] / data[counts, None]
-    found = nnls(scaled, np.ones(len(scaled)), maxiter=100 * times.size + 100)[0]
-    fitted = np.maximum(columns[counts] @ found, np.finfo(float).tiny)
-    error = float(np.sqrt(np.mean(np.log(fitted / data[counts]) ** 2)))
-    if weigh == "loss":  # which does not see the spring: that is what the storage modulus lacks in the mean
-        storage = data[: at.size]
-        found[-1] = max(0.0, float(np.mean(1.0 - columns[: at.size] @ found / storage) / np.mean(1.0 / storage)))
-    *moduli, spring = found
-    kept = np.asarray(moduli) > _negligible(np.asarray(moduli), times, float(spring))
-    return Series(float(spring), np.asarray(moduli)[kept], times[kept], error)
+def _distance(omega: Array, goal: ComplexArray, allowed: Array, times: Array, weights: Array) -> float:
+    """Return by how much the loss moduli of a series, or its storage moduli, differ from the goal at most, over what is
+    allowed of the loss moduli, or least allowed."""
+    found = complex_kernel(omega, "frequency", times) @ weights
+    loss, storage = np.abs(found.imag / goal.imag - 1.0), np.abs(found.real / goal.real - 1.0)
+    return float(max((loss / allowed).max(), storage.max() / allowed.min()))
 
 
 def _negligible(moduli: Array, times: Array, spring: float) -> Array:
@@ -141,94 +332,3 @@ def _negligible(moduli: Array, times: Array, spring: float) -> Array:
     modulus at its frequency."""
     z = times / times[:, None]  # of the row's frequency
     return NEGLIGIBLE * (spring + (z**2 / (1.0 + z**2)) @ moduli)
-
-
-# -- the shift of measured sets ----------------------------------------------------------------------------------------
-
-
-def find_shift(measured: Measurement, reference: float, law: str, weigh: Weigh = "both") -> Shift:
-    """A law (`wlf`, `arrhenius` or `free`, for factors at the measured temperatures) that joins the sets of a
-    measurement to one curve at a reference temperature [deg C].
-
-    The constants of a law are those for which one Prony series meets all sets best; free factors move each set until it
-    overlaps best with its neighbour. Raises InputError where the sets are too few or do not overlap.
-    """
-    known = measured.temperatures
-    if len(known) < 2:
-        raise InputError(f"{measured.path}: a shift needs sweeps at two temperatures at least")
-    if not known[0] <= reference <= known[-1]:
-        raise InputError(
-            f"{measured.path}: the reference temperature must lie within {known[0]:g} and {known[-1]:g} C, "
-            f"got {reference:g}"
-        )
-    if law == "free":
-        logs = _overlaps(measured)
-        there = float(np.interp(reference, known, logs))
-        return Factors(tuple(known), tuple(float(log - there) for log in logs), reference)
-    return _fitted(measured, WLF_CONSTANTS if law == "wlf" else ENERGIES, reference, weigh)
-
-
-def _overlaps(measured: Measurement) -> list[float]:
-    """log10 of the shift of each set against the first, one neighbour after the other."""
-    logs = [0.0]
-    for colder, warmer in pairwise(measured.sets):
-        steps = np.linspace(-WIDEST, WIDEST, 16 * int(WIDEST) + 1)
-        apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
-        if not min(apart) < APART**2:
-            raise InputError(
-                f"{measured.path}: the sweeps at {colder.temperature:g} and {warmer.temperature:g} C do not overlap at "
-                "any shift; measure at temperatures nearer to each other, or fit a law: --shift wlf"
-            )
-        near = float(steps[int(np.argmin(apart))])
-        fine = np.linspace(near - 0.15, near + 0.15, 61)
-        logs.append(logs[-1] + float(fine[int(np.argmin([_apart(colder, warmer, s, measured.kind) for s in fine]))]))
-    return logs
-
-
-def _apart(colder: Set, warmer: Set, log: float, kind: str) -> float:
-    """Mean square of the differences of the logarithms where two sets overlap; infinite where they do so too little."""
-    sign = 1.0 if kind == "frequency" else -1.0
-    own, other = np.log10(colder.at), np.log10(warmer.at) + sign * log
-    low, high = max(own[0], other[0]), min(own[-1], other[-1])
-    if high - low < SHORTEST * min(np.ptp(own), np.ptp(other)):
-        return math.inf
-    points = np.linspace(low, high, 40)
-    pairs = [(colder.storage, warmer.storage), *([(colder.loss, warmer.loss)] if colder.loss.size else [])]
-    squares = [
-        np.mean((np.interp(points, own, np.log(a)) - np.interp(points, other, np.log(b))) ** 2) for a, b in pairs
-    ]
-    return float(np.mean(squares))
-
-
-def _fitted(measured: Measurement, ranges: Ranges, reference: float, weigh: Weigh) -> Shift:
-    """The constants for which one dense series meets all sets best: of a grid, then near to the best of these."""
-
-    def law(constants: Array) -> WLF | Arrhenius:
-        values = [float(value) for value in np.exp(constants)]
-        return WLF(values[0], values[1], reference) if len(values) == 2 else Arrhenius(values[0], reference)
-
-    def error(constants: Array) -> float:
-        try:
-            shifts = [law(constants).log_factor(t) for t in measured.temperatures]
-        except InputError:
-            return math.inf
-        if max(shifts) - min(shifts) > MOST_DECADES:
-            return math.inf
-        at, data = _reduced(measured.sets, measured.kind, shifts)
-        rates = at if measured.kind == "frequency" else 1.0 / at
-        return _solve(at, data, measured.kind, _dense(float(rates.min()), float(rates.max())), weigh).error
-
-    grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
-    errors = [error(point) for point in progress.with_bar(grid, "shift with temperature", "law")]
-    start = grid[int(np.argmin(errors))]
-    if not math.isfinite(error(start)):
-        raise InputError(f"{measured.path}: no constants of this law join the sweeps to one curve at {reference:g} C")
-    simplex = np.vstack([start, start + 0.05 * np.eye(start.size)])
-    options = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-8, "maxfev": 200}
-    return law(minimize(error, start, method="Nelder-Mead", options=options).x)
-
-
-def _dense(low: float, high: float) -> Array:
-    """Relaxation times for rates from `low` to `high` [1/s], as many as tell one measured point from the next."""
-    decades = math.log10(high / low) + 2 * SPARE
-    return _grid((low, high), min(MOST, math.ceil(DENSE * decades) + 1))

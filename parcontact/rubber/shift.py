@@ -4,15 +4,21 @@ WLF         log10 a_T = -C1 (T - T_ref)/(C2 + T - T_ref)      (M. L. Williams, R
                                                                J. Am. Chem. Soc. 77 (1955) 3701)
 Arrhenius   log10 a_T = E/(R ln 10) (1/T - 1/T_ref)           temperatures in K
 table       log10 a_T given at some temperatures, linear between them and nowhere beyond
+
+Moduli are b_T times those at the reference:
+
+density     b_T = rho T/(rho_ref T_ref), temperatures in K     (J. D. Ferry, Viscoelastic Properties of Polymers (1980),
+            rho = rho_ref (1 - expansion (T - T_ref))           chapter 11: the entropy of a network)
+table       log10 b_T given at some temperatures, likewise
 """
 
 import math
+import re
 from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
-from ..datafiles import read_lines
+from ..datafiles import read_lines, split_cells
 from ..errors import InputError
 
 GAS = 8.314462618  # physics: J/(mol K)
@@ -21,13 +27,23 @@ CONSTANT = 1e-3, 1e4  # physics: C1 [-] and C2 [K] of WLF
 ZERO = 273.15  # physics: K at 0 deg C
 
 
-class Shift(Protocol):
-    """Dependence of relaxation times on temperature; `reference` [deg C] is where they are as given."""
+@dataclass(frozen=True)
+class Density:
+    """Moduli that go with density times temperature; `expansion` [1/K] is the loss of density per kelvin over the
+    density at the reference temperature [deg C]."""
 
-    @property
-    def reference(self) -> float: ...
+    expansion: float
+    reference: float
 
-    def log_factor(self, temperature: float) -> float: ...
+    def __str__(self) -> str:
+        return f"density times temperature, with an expansion of {self.expansion:.3g} 1/K"
+
+    def log_factor(self, temperature: float) -> float:
+        """log10 of b_T; raises InputError at or below absolute zero, and where no density is left."""
+        density = 1.0 - self.expansion * (temperature - self.reference)
+        if temperature <= -ZERO or density <= 0.0:
+            raise InputError(f"{temperature:g} C is beyond the density law of the moduli")
+        return math.log10(density * (temperature + ZERO) / (self.reference + ZERO))
 
 
 @dataclass(frozen=True)
@@ -37,6 +53,7 @@ class WLF:
     C1: float
     C2: float
     reference: float
+    vertical: "Density | Factors | None" = None
 
     def __str__(self) -> str:
         return f"WLF with C1 = {self.C1:.4g}, C2 = {self.C2:.4g} K, reference {self.reference:g} C"
@@ -56,6 +73,7 @@ class Arrhenius:
 
     energy: float
     reference: float
+    vertical: "Density | Factors | None" = None
 
     def __str__(self) -> str:
         return f"Arrhenius with {self.energy:.4g} J/mol, reference {self.reference:g} C"
@@ -75,10 +93,11 @@ class Factors:
     temperatures: tuple[float, ...]
     logs: tuple[float, ...]
     reference: float
+    vertical: "Density | Factors | None" = None
 
     def __str__(self) -> str:
         pairs = ", ".join(f"{log:.3g} at {t:g} C" for t, log in zip(self.temperatures, self.logs, strict=True))
-        return f"factors with log10 a_T = {pairs}, reference {self.reference:g} C"
+        return f"factors, log10: {pairs}, reference {self.reference:g} C"
 
     def log_factor(self, temperature: float) -> float:
         """log10 of a_T; raises InputError beyond the temperatures given."""
@@ -93,11 +112,19 @@ class Factors:
         return start + (end - start) * (temperature - low) / (high - low)
 
 
+Shift = WLF | Arrhenius | Factors  # of relaxation times; `reference` [deg C] is where they are as given
+
+
+def log_vertical(shift: Shift, temperature: float) -> float:
+    """Return log10 of b_T at a temperature [deg C], 0 without a vertical law; raises InputError where it ends."""
+    return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)
+
+
 def given(text: str, reference: float | None) -> str | Shift:
     """Return what a text of the command line means: the name of a law whose constants are to be fitted, or a law.
 
     `wlf:8.86,101.6` and `arrhenius:1.2e5` hold constants at the reference temperature, another text is the path of a
-    file with the columns T[C] and log_aT. Raises InputError.
+    file with the columns T[C] and log_aT, and perhaps log_bT. Raises InputError.
     """
     if text in ("wlf", "arrhenius", "free"):
         return text
@@ -122,23 +149,34 @@ def _within(text: str, value: float, low: float, high: float) -> float:
     return value
 
 
+NAMES = {"t": "T", "temperature": "T", "log_at": "a", "log at": "a", "log_bt": "b", "log bt": "b"}
+
+
 def _table(path: Path, reference: float | None) -> Factors:
     if not path.is_file():
         laws = "wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file"
         raise InputError(f"--shift must be {laws}: there is no file {path}")
-    lines = read_lines(path, "a table of T[C],log_aT")
-    rows = [[cell.strip() for cell in line.split(",")] for _, line in lines]
-    units = 2 if rows[0] == ["T", "log_aT"] and rows[1:2] in ([["C", "-"]], [["°C", "-"]]) else 1  # as pyvisco's
+    rows = [split_cells(line) for _, line in read_lines(path, "a table of T[C],log_aT")]
+    heads = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", cell) for cell in rows[0]]
+    names = [NAMES.get(head[1].lower(), head[1]) if head else "" for head in heads]
+    in_row = len(rows) > 1 and rows[1][:1] in (["C"], ["°C"])  # as in pyvisco's files
+    unit = rows[1][0] if in_row else next((head[2] for head in heads if head), None)
+    if names not in (["T", "a"], ["T", "a", "b"]) or unit not in ("C", "°C") or len(rows) < 3 + in_row:
+        raise InputError(f"{path}: a table of T[C],log_aT, or T[C],log_aT,log_bT, with at least two rows was expected")
     try:
-        pairs = sorted((float(temperature), float(log)) for temperature, log in rows[units:])
+        values = sorted(tuple(float(cell) for cell in row) for row in rows[1 + in_row :])
+        temperatures, *logs = zip(*values, strict=True)
     except ValueError:
-        raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of a_T") from None
-    if (units == 1 and rows[0] != ["T[C]", "log_aT"]) or len(pairs) < 2:
-        raise InputError(f"{path}: a table of T[C],log_aT with at least two rows was expected")
-    temperatures, logs = zip(*pairs, strict=True)
+        raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of each factor") from None
+    if len(logs) != len(names) - 1 or not all(math.isfinite(value) for row in values for value in row):
+        raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of each factor")
     if len(set(temperatures)) < len(temperatures):
         raise InputError(f"{path}: a temperature has two factors")
-    at = min(pairs, key=lambda pair: abs(pair[1]))[0] if reference is None else reference
+    at = (
+        min(zip(temperatures, logs[0], strict=True), key=lambda pair: abs(pair[1]))[0]
+        if reference is None
+        else reference
+    )
     if not temperatures[0] <= at <= temperatures[-1]:
         raise InputError(f"{path}: the reference temperature {at:g} C is outside its factors")
-    return Factors(temperatures, logs, at)
+    return Factors(temperatures, logs[0], at, Factors(temperatures, logs[1], at) if len(logs) > 1 else None)

@@ -1,58 +1,72 @@
 """Tables of measured moduli: what a text file says, in SI units, or one sentence with file and line why it will not do.
 
-Two forms are read. Both name what their columns are; nothing is guessed.
+Lines of a laboratory may stand above the names of the columns. These have one of two forms; nothing is guessed.
 
 * Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between them):
   `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K), `tan_del`.
-  E(t) and G(t) are relaxation moduli, too.
+  E(t) and G(t) are relaxation moduli, D(t) and J(t) creep compliances in tension and shear (1/MPa, ...), |E*| and |G*|
+  absolute values, and delta the phase angle (deg, rad).
 * One header row in which units stand in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, any white space or comma between; or
   words with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, a comma, semicolon or tab between.
-  A modulus without the word shear is Young's.
 
-A missing storage or loss modulus follows from tan delta. Lines that begin with # are comments. Rows of one temperature
-are one set; without T all rows are one set.
+A modulus named by words alone is Young's. Where rates are in rad/s, as of rheometers, and of compliances it is that of
+shear, with a warning. Moduli that are missing follow from tan delta or the phase angle. Lines that begin with # are
+comments, columns with other names are not read. Rows of one temperature are one set; without T all rows are one set,
+and rows of one frequency at many temperatures are a set each.
 """
 
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datafiles import has_decimal_commas, read_lines
+from ..datafiles import has_decimal_commas, read_lines, split_cells
 from ..errors import InputError
 from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
-Kind = Literal["frequency", "time"]
+Kind = Literal["frequency", "time", "creep"]
 LEAST_ROWS = 3  # accuracy: of a set: fewer say nothing about a spectrum
 NEAR = 1.5  # accuracy: degrees: measured temperatures of one set vary by less
+ONE_FREQUENCY = 1.01  # accuracy: highest over lowest frequency of a temperature sweep
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+COMPLIANCES = {form.format(unit): 1.0 / size for unit, size in PRESSURES.items() for form in ("1/{}", "{}^-1", "{}-1")}
 RATES_OF = {"f", "omega"}  # one of them is needed
-RATES = {"Hz": 2 * math.pi, "rad/s": 1.0}
-TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "K": -273.15}
-NAMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
-WORDS = {  # in small letters, as instruments write them
+RATES = {"Hz": 2 * math.pi, "rad/s": 1.0, "1/s": 1.0}
+TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "degrees": math.pi / 180, "rad": 1.0}
+TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "deg C": 0.0, "K": -273.15}
+PRIMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
+WORDS = {  # in small letters, as instruments write them; * is a letter that they do not say
     **{"frequency": "f", "f_set": "f", "angular frequency": "omega", "w": "omega", "ω": "omega", "time": "t"},
-    **{"temperature": "T", "temp": "T", "storage modulus": "E_stor", "loss modulus": "E_loss"},
-    **{"shear storage modulus": "G_stor", "shear loss modulus": "G_loss", "relaxation modulus": "E_relax"},
-    **{"e(t)": "E_relax", "g(t)": "G_relax"},
-    **{"shear relaxation modulus": "G_relax", "tan delta": "tan_del", "tan(delta)": "tan_del", "tan_delta": "tan_del"},
-    **{"tan d": "tan_del", "tan δ": "tan_del", "tanδ": "tan_del", "loss factor": "tan_del"},
+    **{"step time": "t", "temperature": "T", "temp": "T", "temp.": "T"},
+    **{"storage modulus": "*_stor", "loss modulus": "*_loss", "relaxation modulus": "*_relax"},
+    **{"complex modulus": "*_abs", "creep compliance": "*_creep", "compliance": "*_creep"},
+    **{f"shear {word} modulus": f"G_{short}" for word, short in (("storage", "stor"), ("loss", "loss"))},
+    **{f"shear {word} modulus": f"G_{short}" for word, short in (("relaxation", "relax"), ("complex", "abs"))},
+    **{"complex shear modulus": "G_abs", "shear creep compliance": "G_creep", "tensile creep compliance": "E_creep"},
+    **{"e(t)": "E_relax", "g(t)": "G_relax", "d(t)": "E_creep", "j(t)": "G_creep"},
+    **dict.fromkeys(("tan delta", "tan(delta)", "tan_delta", "tan d", "tan δ", "tanδ", "loss factor"), "tan_del"),
+    **dict.fromkeys(("tan(δ)", "damping factor"), "tan_del"),
+    **dict.fromkeys(("delta", "δ", "phase angle", "phase", "loss angle", "phase shift angle"), "delta"),
 }
-WITH_UNIT = re.compile(r"(.+?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))")  # Storage Modulus (MPa), E'[MPa]
+KNOWN = {f"{letter}_{part}" for letter in "EG*" for part in ("stor", "loss", "relax", "abs", "creep")}
+OTHERS = {*RATES_OF, "t", "T", "tan_del", "delta"}
+WITH_UNIT = re.compile(r"(.+?)\s*(?:\[([^\]]*)\]|\(([^()]*)\))")  # Storage Modulus (MPa), E'[MPa]
 
 
 @dataclass(frozen=True)
 class Set:
     """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
 
-    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of a relaxation. `storage` and `loss`,
-    shape (n,) [Pa]: of shear; of a relaxation `storage` is the relaxation modulus and `loss` is empty.
+    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of a relaxation or of creep. `storage`
+    and `loss`, shape (n,) [Pa]: of shear. Of a relaxation `storage` is the relaxation modulus, of creep the inverse of
+    the compliance, and `loss` is empty.
     """
 
     temperature: float | None
@@ -63,9 +77,10 @@ class Set:
 
 @dataclass(frozen=True)
 class Measurement:
-    """All sets of a file, by temperature; `tension` tells that moduli were Young's and have been divided.
+    """All sets of a file, by temperature; `tension`: moduli were Young's and have been divided.
 
     `derived` is the modulus that follows from the other one and tan delta, "stor" or "loss"; "" where both are given.
+    `doubts` are sentences about what was not clear or is left out.
     """
 
     path: Path
@@ -73,16 +88,33 @@ class Measurement:
     sets: tuple[Set, ...]
     tension: bool
     derived: str = ""
+    doubts: tuple[str, ...] = ()
 
     @property
     def temperatures(self) -> list[float]:
         """At which it was measured [deg C], rising; none if the file does not say."""
         return [each.temperature for each in self.sets if each.temperature is not None]
 
+    def without_short_sets(self) -> "Measurement":
+        """Leave out sets that are too short to tell a shift from; raises InputError where none is long enough."""
+        long = tuple(each for each in self.sets if each.at.size >= LEAST_ROWS)
+        short = [each for each in self.sets if each.at.size < LEAST_ROWS]
+        if not long:
+            raise InputError(
+                f"{self.path} has {len(short)} temperatures with less than {LEAST_ROWS} rows each: a temperature sweep "
+                "does not show how times shift with temperature; give the shift, parcontact fit --shift wlf:C1,C2 "
+                "--reference T, or --shift FILE with a table of T[C],log_aT"
+            )
+        lost = tuple(
+            f"the sweep at {each.temperature:g} C is left out: it has less than {LEAST_ROWS} rows ({each.at.size})"
+            for each in short
+        )
+        return replace(self, sets=long, doubts=self.doubts + lost)
+
 
 class _Column(NamedTuple):
     name: str
-    unit: str
+    unit: str | None  # None: of a one-row header that names none
 
 
 def read(path: Path, poisson: float = 0.5) -> Measurement:
@@ -93,58 +125,65 @@ def read(path: Path, poisson: float = 0.5) -> Measurement:
     if len(rows) < LEAST_ROWS:
         raise InputError(f"{path} has {len(rows)} rows of numbers; at least {LEAST_ROWS} were expected")
     names = [column.name for column in columns]
-    for name in names:
+    for name in KNOWN | OTHERS:
         if names.count(name) > 1 or (name in RATES_OF and len(RATES_OF & set(names)) > 1):
             raise InputError(f"{path}: two columns mean the same: {name} is given twice; remove one")
     values = {name: rows[:, k] for k, name in enumerate(names)}
-    units = {column.name: column.unit for column in columns}
+    units = {column.name: column.unit or "" for column in columns}
     return _Table(path, values, units, [number for number, _ in lines[first:]]).measurement(poisson)
 
 
-def _split(line: str) -> list[str]:
-    mark = next((mark for mark in (";", "\t", ",") if mark in line), None)
-    return [part.strip().strip('"').strip() for part in line.split(mark)] if mark else line.split()
-
-
 def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column], int]:
-    """The columns, and how many lines name them."""
-    number, head = lines[0]
-    cells = _split(re.sub(r"\s+(?=[\[(])", "", head))
-    with_units = [_with_unit(cell) for cell in cells]
-    if any(column and column.unit for column in with_units) and all(with_units):
-        return [column for column in with_units if column], 1
-    if "[" in head:
-        wrong = cells[with_units.index(None)]
-        raise InputError(f"{path}:{number}: {wrong!r} must be a name with its unit in brackets, such as f[Hz]")
-    names = [_name(name) for name in _split(head)]
-    units = _split(lines[1][1]) if len(lines) > 1 else []
-    units += [""] * (len(names) - len(units))
-    if not (math.isnan(_number(names[0])) and math.isnan(_number(units[0]))):
+    """Return the columns, and the number of lines down to the last that names them: the first that names a modulus
+    and a rate, time or temperature, else the first of all."""
+    heads = [_head(text) for _, text in lines]
+    named = (at for at, head in enumerate(heads) if (names := {each.name for each in head}) & KNOWN and names & OTHERS)
+    at = next(named, 0)
+    (number, text), head = lines[at], heads[at]
+    if any(each.unit for each in head):
+        for each in head:
+            if each.unit is None and each.name in (KNOWN | OTHERS) - {"tan_del"}:
+                cell = next(cell for cell in _cells(text) if _name(cell) == each.name)
+                raise InputError(f"{path}:{number}: {cell!r} must be a name with its unit in brackets, such as f[Hz]")
+        return head, at + 1
+    units = split_cells(lines[at + 1][1]) if len(lines) > at + 1 else []
+    units += [""] * (len(head) - len(units))
+    if not (math.isnan(_number(head[0].name)) and math.isnan(_number(units[0]))):
         raise InputError(
             f"{path}:{number}: names and units of the columns were expected, such as f[Hz] E'[MPa] E''[MPa], or two "
             "rows with names and units"
         )
-    return [_Column(*pair) for pair in zip(names, units, strict=False)], 2
+    return [_Column(each.name, unit) for each, unit in zip(head, units, strict=False)], at + 2
 
 
-def _with_unit(cell: str) -> _Column | None:
-    """The column of a cell that names its unit, which tan delta need not; None of another cell."""
-    if _name(cell) == "tan_del":
-        return _Column("tan_del", "")
+def _cells(text: str) -> list[str]:
+    return split_cells(re.sub(r"\s+(?=[\[(])", "", text))
+
+
+def _head(text: str) -> list[_Column]:
+    """Return what the cells of a line name, with the units in brackets."""
+    return [_with_unit(cell) for cell in _cells(text)]
+
+
+def _with_unit(cell: str) -> _Column:
     match = WITH_UNIT.fullmatch(cell)
-    return _Column(_name(match[1]), (match[2] or match[3] or "").strip()) if match else None
+    if match is None or _name(cell) in KNOWN | OTHERS:  # E(t), tan(delta)
+        return _Column(_name(cell), None)
+    return _Column(_name(match[1]), (match[2] or match[3] or "").strip())
 
 
 def _name(text: str) -> str:
-    """The name of a column as pyvisco spells it: E' is E_stor, f_set is f."""
-    text = text.strip().replace("″", "''").replace("′", "'")
+    """Return the name of a column as pyvisco spells it: E' is E_stor, f_set is f; |E*| is E_abs."""
+    text = text.strip().replace("″", "''").replace("′", "'").replace("’", "'")
     if match := re.fullmatch(r"([EG])('{1,2}|\")", text):
-        return f"{match[1]}_{NAMES[match[2]]}"
+        return f"{match[1]}_{PRIMES[match[2]]}"
+    if match := re.fullmatch(r"\|?([EG])\*\|?", text):
+        return f"{match[1]}_abs"
     return WORDS.get(re.sub(r"\s+", " ", text.lower()), text)
 
 
 def _number(text: str) -> float:
-    """The number that a text is; nan for another text."""
+    """Return the number that a text is; nan for another text."""
     try:
         return float(text)
     except ValueError:
@@ -152,15 +191,16 @@ def _number(text: str) -> float:
 
 
 def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> list[float]:
-    parts = _split(text)
-    if has_decimal_commas(text) and (";" in text or len(parts) != len(columns)):
+    """Return the numbers of a row; nan in columns that are not read."""
+    parts = split_cells(text)
+    if has_decimal_commas(text) and (";" in text or "\t" in text or len(parts) != len(columns)):
         raise InputError(f"{path}:{number}: its numbers have decimal commas; write them with points")
     if len(parts) != len(columns):
         raise InputError(f"{path}:{number}: {len(parts)} values where {len(columns)} columns are named")
     for part, column in zip(parts, columns, strict=True):
-        if not math.isfinite(_number(part)):
+        if column.name in KNOWN | OTHERS and not math.isfinite(_number(part)):
             raise InputError(f"{path}:{number}: {column.name} must be a finite number, got {part!r}")
-    return [float(part) for part in parts]
+    return [_number(part) for part in parts]
 
 
 @dataclass
@@ -174,44 +214,81 @@ class _Table:
 
     def measurement(self, poisson: float) -> Measurement:
         """Return the columns as sets in SI units."""
+        doubts = tuple(self._name_letter(2.0 * (1.0 + poisson)))
         derived = self._complete()
-        modulus = self._name_modulus()
-        kind: Kind = "time" if f"{modulus}_relax" in self.values else "frequency"
-        factor = 1.0 / (2.0 * (1.0 + poisson)) if modulus == "E" else 1.0
-        if kind == "time":
-            at, names = self._column("t", {"s": 1.0}), [f"{modulus}_relax"]
-        else:
+        letter, kind = self._find_moduli()
+        factor = 1.0 / (2.0 * (1.0 + poisson)) if letter == "E" else 1.0
+        if kind == "frequency":
             at = self._column("omega" if "omega" in self.values else "f", RATES)
-            names = [f"{modulus}_stor", f"{modulus}_loss"]
-        moduli = [self._column(name, PRESSURES) * factor for name in names]
+            moduli = [self._column(f"{letter}_{part}", PRESSURES) for part in ("stor", "loss")]
+        elif kind == "time":
+            at, moduli = self._column("t", TIMES), [self._column(f"{letter}_relax", PRESSURES)]
+        else:
+            at, moduli = self._column("t", TIMES), [1.0 / self._column(f"{letter}_creep", COMPLIANCES)]
+        moduli = [factor * each for each in moduli]
         degrees = self.values["T"] + self._unit("T", TEMPERATURES) if "T" in self.values else None
         refuse_odd(self.path, kind, at, moduli[0], degrees)
         sets = tuple(_sets(self.path, at, moduli, degrees))
-        if kind == "time":
-            refuse_rising(self.path, [each.storage for each in sets])
-        return Measurement(self.path, kind, sets, modulus == "E", derived)
+        if kind != "frequency":
+            refuse_rising(self.path, kind, [each.storage for each in sets])
+        return Measurement(self.path, kind, sets, letter == "E", derived, doubts)
+
+    def _name_letter(self, factor: float) -> Iterator[str]:
+        """Decide whether moduli named by words are of tension (E) or shear (G); yield a warning where it is shear."""
+        if not any(name.startswith("*") for name in self.values):
+            return
+        creep, named = (
+            "*_creep" in self.values,
+            [letter for letter in "EG" if any(f"{letter}_" in n for n in self.values)],
+        )
+        radians = "omega" in self.values and self.units["omega"] != "Hz"
+        letter = named[0] if named else "G" if creep or radians else "E"
+        for columns in (self.values, self.units):
+            for name in [name for name in columns if name.startswith("*")]:
+                columns[name.replace("*", letter)] = columns.pop(name)  # type: ignore[assignment]
+        if letter == "G" and not named:
+            factors = f"otherwise the body is {factor:g} times too stiff"
+            if creep:
+                yield (
+                    f"{self.path.name} does not say whether its compliance is of shear (J) or tension (D): it is taken "
+                    f"for J. If it is D, call the column D(t): {factors}"
+                )
+            else:
+                yield (
+                    f"{self.path.name} has angular frequencies, as rheometers write them, and does not say whether its "
+                    "moduli are of shear (G) or tension (E): they are taken for G. If they are E, call the columns E' "
+                    f"and E'': {factors}"
+                )
 
     def _complete(self) -> str:
-        """Add the storage or loss modulus that follows from the other one and tan delta; returns which, if one does."""
-        for modulus in ("E", "G") if "tan_del" in self.values else ():
-            storage, loss = f"{modulus}_stor", f"{modulus}_loss"
+        """Add the moduli that follow from tan delta or the phase angle; return which, if one follows from the other."""
+        if "delta" in self.values and "tan_del" not in self.values:
+            self.values["tan_del"], self.units["tan_del"] = np.tan(self._column("delta", ANGLES)), ""
+        for letter in "EG" if "tan_del" in self.values else "":
+            absolute, storage, loss = (f"{letter}_{part}" for part in ("abs", "stor", "loss"))
+            if absolute in self.values and not {storage, loss} & self.values.keys():
+                self.values[storage] = self._positive(absolute) / np.sqrt(1.0 + self._positive("tan_del") ** 2)
+                self.units[storage] = self.units[absolute]
             if (storage in self.values) != (loss in self.values):
                 known, missing = (storage, loss) if storage in self.values else (loss, storage)
                 tangent = self._positive("tan_del")
                 given = self.values[known]
                 self.values[missing] = given * tangent if missing == loss else given / tangent
                 self.units[missing] = self.units[known]
-                return missing.removeprefix(f"{modulus}_")
+                return "" if absolute in self.values else missing.removeprefix(f"{letter}_")
         return ""
 
-    def _name_modulus(self) -> str:
-        """E or G, whichever the columns name, and completely."""
-        for modulus in ("E", "G"):
-            if f"{modulus}_relax" in self.values or {f"{modulus}_stor", f"{modulus}_loss"} <= self.values.keys():
-                return modulus
+    def _find_moduli(self) -> tuple[str, Kind]:
+        """Return E or G, whichever the columns name completely, and what was measured."""
+        kinds: dict[Kind, tuple[str, ...]] = {"time": ("relax",), "creep": ("creep",), "frequency": ("stor", "loss")}
+        for letter in "EG":
+            for kind, parts in kinds.items():
+                if {f"{letter}_{part}" for part in parts} <= self.values.keys():
+                    return letter, kind
         raise InputError(
             f"{self.path} has the columns {', '.join(self.values)}; it needs f or omega with E_stor and E_loss (or "
-            "G_stor and G_loss), or t with E_relax, also spelt E(t) (or G_relax, G(t))"
+            "G_stor and G_loss), or one of them or |E*| with tan delta or the phase angle delta, or t with E_relax, "
+            "also spelt E(t) (or G_relax, G(t)), or t with a compliance J(t) or D(t)"
         )
 
     def _column(self, name: str, units: dict[str, float]) -> Array:
@@ -237,12 +314,10 @@ class _Table:
 
 
 def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:
-    """Rows of one temperature each, in the order of their rates."""
+    """Yield rows of one temperature each, in the order of their rates; of a temperature sweep one row each."""
     one = iter([np.arange(at.size)])
     for rows in one if temperatures is None else _of_one_temperature(path, at, temperatures):
         mean = None if temperatures is None else float(temperatures[rows].mean())
-        if rows.size < LEAST_ROWS:
-            raise InputError(f"{path}: {rows.size} rows at {mean:g} C; at least {LEAST_ROWS} were expected")
         rows = rows[np.argsort(at[rows], kind="stable")]
         empty = np.zeros(0)
         yield Set(mean, at[rows], moduli[0][rows], moduli[1][rows] if len(moduli) > 1 else empty)
@@ -251,6 +326,9 @@ def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None
 def _of_one_temperature(path: Path, at: Array, temperatures: Array) -> Iterator[NDArray[np.intp]]:
     """Rows of one temperature each, which may waver: of one sweep, in which no rate or time comes twice."""
     order = np.argsort(temperatures, kind="stable")
+    if at.max() < ONE_FREQUENCY * at.min() and np.ptp(temperatures) >= NEAR:
+        yield from order[:, None]
+        return
     for rows in np.split(order, np.flatnonzero(np.diff(temperatures[order]) >= NEAR) + 1):
         low, high = temperatures[rows[0]], temperatures[rows[-1]]
         numbers = np.split(rows, np.flatnonzero(np.diff(temperatures[rows]) > 0.0) + 1)

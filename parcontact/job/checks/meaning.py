@@ -146,7 +146,7 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
     for branch in material.branches:
         ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
         kept = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
-        modulus -= (branch.instant_modulus - branch.long_modulus) * (1.0 - kept)
+        modulus -= material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * (1.0 - kept)
     return 2.0 * max(modulus, material.long_modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
 
 

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, Validat
 
 from ...errors import InputError
 from ...rubber import compound
+from ...rubber.shift import log_vertical
 from ..text.fault import Fault, quote, refuse
 from .part import Instead, Part, Rule, chosen, existing_file
 from .quantities import NonNegative, Number, Positive
@@ -94,6 +95,7 @@ class Elastic(Part):
 
     branches: ClassVar[tuple[()]] = ()
     time_factor: ClassVar[float] = 1.0
+    modulus_factor: ClassVar[float] = 1.0
     foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("shear_modulus"), ("shear_modulus",)))
 
     @property
@@ -136,8 +138,9 @@ def _stiff(modulus_inf: float, branches: tuple[ZenerBranch | PronyBranch | None,
 class Zener(Part):
     """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
 
-    The long-term modulus may be zero: the body is then a fluid in the long run. With a `shift` all relaxation times are
-    those of its reference temperature; at another `temperature` they are a_T times as long.
+    The long-term modulus may be zero: the body is then a fluid in the long run. With a `shift` all relaxation times and
+    moduli are those of its reference temperature; at another `temperature` times are a_T times as long, and moduli b_T
+    times as large.
     """
 
     model: Literal["zener"] = "zener"
@@ -166,14 +169,21 @@ class Zener(Part):
         return float(10.0 ** self.shift.made.log_factor(self.temperature))
 
     @property
+    def modulus_factor(self) -> float:
+        """b_T: the moduli at the temperature over those at the reference [-]."""
+        if self.shift is None or self.temperature is None:
+            return 1.0
+        return float(10.0 ** log_vertical(self.shift.made, self.temperature))
+
+    @property
     def instant_modulus(self) -> float:
-        """Modulus at a sudden strain [Pa]."""
-        return self.modulus_inf + sum(branch.instant_modulus for branch in self.branches)
+        """Modulus at a sudden strain, at the temperature of the body [Pa]."""
+        return self.modulus_factor * (self.modulus_inf + sum(branch.instant_modulus for branch in self.branches))
 
     @property
     def long_modulus(self) -> float:
-        """Modulus after all relaxation [Pa]."""
-        return self.modulus_inf + sum(branch.long_modulus for branch in self.branches)
+        """Modulus after all relaxation, at the temperature of the body [Pa]."""
+        return self.modulus_factor * (self.modulus_inf + sum(branch.long_modulus for branch in self.branches))
 
 
 class Dma(Part):
@@ -185,8 +195,9 @@ class Dma(Part):
     reference: Celsius | None = None  # default: the middle one of the measured temperatures
     shift: Literal["wlf", "arrhenius", "free"] = "wlf"
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
-    error: Positive = Field(default=0.02, description="a positive rms error of the logarithms of the moduli [-]")
+    error: Positive = Field(default=0.02, description="a positive relative error of both moduli [-]")
     weight: Literal["both", "storage", "loss"] = "both"
+    vertical: Literal["auto", "density", "free", "none"] = "auto"
     hardness: Hardness = None
 
     _fitted: Zener = PrivateAttr()
@@ -194,7 +205,8 @@ class Dma(Part):
 
     def model_post_init(self, context: Any) -> None:
         try:
-            found = compound.fitted(self.path, self.poisson, self.reference, self.shift, self.error, self.weight)
+            of_fit = (self.error, self.weight, self.vertical)
+            found = compound.fitted(self.path, self.poisson, self.reference, self.shift, *of_fit)
         except InputError as error:
             refuse(Fault(f"cannot be fitted: {error}", ("path",)))
         made = Zener.model_validate(found.material())
@@ -222,7 +234,9 @@ def describe_temperature(material: Elastic | Zener | Dma) -> str:
     reference = body.shift.made.reference
     if body.temperature is None:
         return f"material: at {reference:g} C, the reference of its shift, as the job gives no material.temperature"
-    return f"material: at {body.temperature:g} C (a_T = {body.time_factor:.4g}, reference {reference:g} C)"
+    factors = f"a_T = {body.time_factor:.4g}"
+    factors += f", b_T = {body.modulus_factor:.4g}" if body.shift.vertical else ""
+    return f"material: at {body.temperature:g} C ({factors}, reference {reference:g} C)"
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:

@@ -1,0 +1,200 @@
+"""Time-temperature superposition of measured sets: horizontal factors a_T and vertical factors b_T, found together.
+
+    G*(w, T) = b_T G*(a_T w, T_ref)
+
+Rates are reduced by a_T and moduli divided by b_T, so that one series meets all sets as closely as any can: least
+squares of its misfit over the constants of both laws, of which the series is eliminated (variable projection: G. H.
+Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Without b_T, which rubber has by its entropy (J. D. Ferry,
+Viscoelastic Properties of Polymers (1980), chapter 11), constants of a_T come out wrong by a tenth and more.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from .. import progress
+from ..errors import InputError
+from .series import Measured, Weigh, best_residuals, reduce_sets
+from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
+from .tables import Measurement, Set
+
+Array = NDArray[np.float64]
+Vertical = Literal["auto", "density", "free", "none"]
+VERTICAL: tuple[Vertical, ...] = get_args(Vertical)
+WIDEST = 8.0  # tuning: decades: the largest shift between neighbouring temperatures that is looked for
+MOST_DECADES = 30.0  # tuning: of shift between the coldest and the warmest set
+Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
+WLF_CONSTANTS: Ranges = ((2.0, 60.0, 16), (20.0, 600.0, 16))  # physics: C1 [-], C2 [K]
+ENERGIES: Ranges = ((1e4, 1e6, 40),)  # physics: J/mol
+EXPANSION = 6e-4  # physics: 1/K: of rubbers, 5e-4 to 7e-4, which moduli hardly tell apart from the shift
+APART = 0.1  # accuracy: rms of the differences of the logarithms of two sets that do not overlap
+SHORTEST = 0.3  # accuracy: share of a sweep that must overlap with its neighbour's
+COARSE = 3  # accuracy: times per decade of the series by which the first constants are judged
+STEP = 1e-4  # accuracy: of finite differences, relative to constants and to factors
+BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, below which it is told
+
+
+@dataclass(frozen=True)
+class Superposition:
+    """The shift that was found, its `misfit` (rms, relative), and what `free` vertical factors would give instead,
+    where that is much better."""
+
+    shift: Shift
+    misfit: float
+    free: "Superposition | None" = None
+
+
+def superpose(
+    measured: Measurement, reference: float, law: str | Shift, vertical: Vertical, weigh: Weigh = "both"
+) -> Superposition:
+    """Return the shift that joins the sets of a measurement to one curve at a reference temperature [deg C].
+
+    `law` is wlf, arrhenius or free (factors at the measured temperatures), whose constants are found, or a shift that
+    is known. `vertical` says what b_T is: the density law, free factors, none (1), or (auto) the density law unless the
+    data prefer none. Raises InputError where the sets are too few or do not overlap.
+    """
+    known = measured.temperatures
+    if len(known) < 2:
+        raise InputError(f"{measured.path}: a shift needs sweeps at two temperatures at least")
+    if not known[0] <= reference <= known[-1] and isinstance(law, str):
+        raise InputError(
+            f"{measured.path}: the reference temperature must lie within {known[0]:g} and {known[-1]:g} C, "
+            f"got {reference:g}"
+        )
+    search = _Search(measured, law, reference, weigh)
+    start = search.start()
+    if vertical != "auto":
+        return search.refine(start, vertical)
+    kinds: tuple[Vertical, ...] = ("none", "density", "free")
+    none, density, free = (search.refine(start, kind) for kind in progress.with_bar(kinds, "vertical shift", "law"))
+    chosen = density if density.misfit <= none.misfit else none
+    return replace(chosen, free=free if free.misfit < BETTER * chosen.misfit else None)
+
+
+@dataclass(frozen=True)
+class _Search:
+    measured: Measurement
+    law: str | Shift
+    reference: float
+    weigh: Weigh
+
+    @property
+    def _known(self) -> list[float]:
+        return self.measured.temperatures
+
+    def start(self) -> Array:
+        """Return constants of the horizontal law to begin from: logarithms, or log10 of the factors of all sets but the
+        first."""
+        if not isinstance(self.law, str):
+            return np.zeros(0)
+        if self.law == "free":
+            return np.array(_overlaps(self.measured)[1:])
+        ranges = WLF_CONSTANTS if self.law == "wlf" else ENERGIES
+        grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
+        first = Density(EXPANSION, self.reference)
+        errors = [
+            self._misfit(self._horizontal(point), first)
+            for point in progress.with_bar(grid, "shift with temperature", "law")
+        ]
+        best = grid[int(np.argmin(errors))]
+        if not math.isfinite(min(errors)):
+            raise InputError(
+                f"{self.measured.path}: no constants of this law join the sweeps to one curve at {self.reference:g} C"
+            )
+        return best
+
+    def _horizontal(self, constants: Array) -> Shift:
+        if not isinstance(self.law, str):
+            return self.law
+        if self.law == "free":
+            return _factors(self._known, [0.0, *constants], self.reference)
+        values = [float(value) for value in np.exp(constants)]
+        return WLF(values[0], values[1], self.reference) if self.law == "wlf" else Arrhenius(values[0], self.reference)
+
+    def _vertical(self, kind: Vertical, constants: Array) -> Density | Factors | None:
+        if kind == "free":
+            return _factors(self._known, [0.0, *constants], self.reference)
+        return Density(EXPANSION, self.reference) if kind == "density" else None
+
+    def refine(self, start: Array, kind: Vertical) -> Superposition:
+        """Return the best shift near to constants, with a vertical law of a kind."""
+        begin = np.concatenate([start, np.zeros(len(self._known) - 1 if kind == "free" else 0)])
+
+        def shift(constants: Array) -> Shift:
+            return replace(
+                self._horizontal(constants[: start.size]), vertical=self._vertical(kind, constants[start.size :])
+            )
+
+        def missed(constants: Array) -> Array:
+            try:
+                return best_residuals(self._reduced(shift(constants)))
+            except InputError:  # where a law ends
+                return np.full(self._reduced(None).counted, 1e3)
+
+        if begin.size:
+            begin = least_squares(missed, begin, x_scale=0.1, diff_step=STEP, xtol=1e-6, ftol=1e-6).x
+        residuals = missed(begin)
+        return Superposition(shift(begin), float(np.sqrt(np.mean(residuals**2))))
+
+    def _reduced(self, shift: Shift | None) -> Measured:
+        sets, kind = self.measured.sets, self.measured.kind
+        if shift is None:
+            return reduce_sets(sets, kind, weigh=self.weigh)
+        return reduce_sets(sets, kind, log_factors(shift, self._known), self.weigh)
+
+    def _misfit(self, shift: Shift, vertical: Density) -> float:
+        try:
+            logs = [shift.log_factor(t) for t in self._known]
+        except InputError:
+            return math.inf
+        if max(logs) - min(logs) > MOST_DECADES:
+            return math.inf
+        data = self._reduced(replace(shift, vertical=vertical))
+        return float(np.mean(best_residuals(data, COARSE) ** 2))
+
+
+def log_factors(shift: Shift, temperatures: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return log10 of a_T and of b_T at temperatures [deg C]."""
+    return [shift.log_factor(t) for t in temperatures], [log_vertical(shift, t) for t in temperatures]
+
+
+def _factors(temperatures: Sequence[float], logs: Sequence[float], reference: float) -> Factors:
+    there = float(np.interp(reference, temperatures, logs))
+    return Factors(tuple(temperatures), tuple(float(log - there) for log in logs), reference)
+
+
+def _overlaps(measured: Measurement) -> list[float]:
+    """log10 of the shift of each set against the first, one neighbour after the other."""
+    logs = [0.0]
+    for colder, warmer in pairwise(measured.sets):
+        steps = np.linspace(-WIDEST, WIDEST, 16 * int(WIDEST) + 1)
+        apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
+        if not min(apart) < APART**2:
+            raise InputError(
+                f"{measured.path}: the sweeps at {colder.temperature:g} and {warmer.temperature:g} C do not overlap at "
+                "any shift; measure at temperatures nearer to each other, or fit a law: --shift wlf"
+            )
+        logs.append(logs[-1] + float(steps[int(np.argmin(apart))]))
+    return logs
+
+
+def _apart(colder: Set, warmer: Set, log: float, kind: str) -> float:
+    """Mean square of the differences of the logarithms where two sets overlap; infinite where they do so too little."""
+    sign = 1.0 if kind == "frequency" else -1.0
+    own, other = np.log10(colder.at), np.log10(warmer.at) + sign * log
+    low, high = max(own[0], other[0]), min(own[-1], other[-1])
+    if high - low < SHORTEST * min(np.ptp(own), np.ptp(other)):
+        return math.inf
+    points = np.linspace(low, high, 40)
+    pairs = [(colder.storage, warmer.storage), *([(colder.loss, warmer.loss)] if colder.loss.size else [])]
+    squares = [
+        np.mean((np.interp(points, own, np.log(a)) - np.interp(points, other, np.log(b))) ** 2) for a, b in pairs
+    ]
+    return float(np.mean(squares))
