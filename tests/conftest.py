@@ -76,8 +76,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def outside_mpi() -> dict[str, str]:
-    """The environment of a process outside MPI."""
-    return outside.environment()
+    """The environment of a process outside MPI, which ends at warnings of NumPy as the tests do."""
+    return outside.environment() | {"PYTHONWARNINGS": "error::RuntimeWarning"}
 
 
 @pytest.fixture

@@ -169,6 +169,26 @@ def test_a_march_becomes_steady() -> None:
     assert np.abs(found - found.mean() - steady).max() < 0.03 * np.abs(steady).max()
 
 
+def test_a_body_that_flows_becomes_warm() -> None:
+    """A liquid is as warm as a body with a millionth of its modulus in the end, to 1e-3: waves that stand make no
+    heat."""
+    rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1.3e-4, "rms_slope": 0.1}
+    slide = {"pressure": 1e4, "velocity": 1.0, "distance": 2.5e-4, "cells_per_step": 1}
+    more = {
+        "grid": {"points": 32, "size": 1e-3},
+        "surface": rough,
+        "history": [slide],
+        "thermal": {"conductivity": 0.2, "diffusivity": 1e-7},
+    }
+    branches = [{"modulus": 9e6, "relaxation_time": 1e-3}, {"modulus": 1e6, "relaxation_time": 1.0}]
+    found = []
+    for spring in (0, 1.0):
+        _, rows = marched(march_data(**more, material={"model": "zener", "modulus_inf": spring, "branches": branches}))
+        found.append(rows[-1].added[0])
+    assert found[1] > 1e-3
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
+
+
 def test_heat_in_is_heat_stored() -> None:
     """An elastic wave that is rubbed fast, slowly, and then rests: the mean temperature is that of a half space under
     so much constant heat, as measured forces have made, to 1e-6; and the heat in the body is their work, to 1e-9."""

@@ -15,6 +15,7 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.heat import Conductor, Depths, depths_of, sliding_heat
 from parcontact.physics.heat_unbounded import _reaching, sliding_heat_unbounded
 from parcontact.physics.prony import Prony
+from parcontact.physics.roughness import Roughness
 
 RUBBER = Conductor(0.2, 1e-7)
 LENGTH = 1e-3
@@ -188,3 +189,46 @@ def test_the_depth_of_a_wave() -> None:
     found = depths_of(spectrum, fft, HalfSpace((1.0, 1.0)), 1e-3, (0.1, 0.0), prony)
     assert found.wavenumbers[np.argmax(found.shares)] == pytest.approx(2 * math.pi * 3 / 1e-3, rel=1e-12)
     assert found.shares.max() == pytest.approx(1.0, abs=1e-12)
+
+
+def rough_pressure(fft: FFT, seed: int) -> np.ndarray:
+    """A tenth of a rough surface under pressure."""
+    waves = Roughness(0.8, 2.5e-4, 2.5e-4, 6e-5, seed, rms_slope=0.3).spectrum(fft, (LENGTH, LENGTH))
+    heights = np.asarray(fft.backward(waves, fft.slab.empty()))
+    return np.maximum(heights - np.quantile(heights, 0.9), 0.0)
+
+
+@pytest.mark.parametrize("speed", [0.01, 1.0, 10.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_each_wave_heats_its_own_depths(speed: float, seed: int) -> None:
+    """The flash temperature of rough contacts, against a sum over all waves of what each dissipates, to 2e-4."""
+    n, prony = 64, Prony(1e6, np.array([9e6, 1e6]), np.array([1e-3, 1e-5]))
+    fft = FFT(Slab.alone(n, n), measured=False)
+    pressure = rough_pressure(fft, seed)
+    kx, ky = (2 * math.pi * np.fft.fftfreq(n, LENGTH / n)[None], 2 * math.pi * np.fft.fftfreq(n, LENGTH / n)[:, None])
+    q, omega = np.hypot(kx, ky), np.abs(kx * speed) * np.ones((n, 1))
+    q[0, 0] = 1.0
+    phase = omega[..., None] * prony.relaxation_times
+    loss = omega * np.imag(-1.0 / (prony.modulus_inf + (1j * phase / (1 + 1j * phase)) @ prony.moduli))
+    power = np.abs(np.fft.fft2(pressure)) ** 2 / q * loss
+    power[np.abs(kx) * np.ones((n, 1)) == math.pi * n / LENGTH] = 0.0  # a wave of Nyquist stands
+    whole = Depths(q[power > 0.0], power[power > 0.0] / power.sum())
+    found = depths_of(fft.forward(pressure), fft, HalfSpace((LENGTH, LENGTH)), 1.0, (speed, 0.0), prony)
+    rises = []
+    for depths in (found, whole):
+        made = sliding_heat(fft, (LENGTH, LENGTH), RUBBER, (speed, 0.0), depths, True, LENGTH / speed)
+        rises.append(float((made.apply(pressure, fft.slab.empty()) * pressure).sum()))
+    assert rises[0] == pytest.approx(rises[1], rel=2e-4, abs=0.0)
+
+
+def test_waves_that_stand_heat_nothing() -> None:
+    """A body without long-term modulus flows under them; one with a millionth of it dissipates the same."""
+    fft = FFT(Slab.alone(32, 32), measured=False)
+    spectrum = fft.forward(rough_pressure(fft, 1))
+    depths = []
+    for spring in (0.0, 1.0):
+        prony = Prony(spring, np.array([9e6, 1e6]), np.array([1e-3, 1.0]))
+        depths.append(depths_of(spectrum, fft, HalfSpace((LENGTH, LENGTH)), 1.0, (1.0, 0.0), prony))
+    assert depths[0].shares.sum() == pytest.approx(1.0, rel=1e-12)
+    assert depths[0].wavenumbers == pytest.approx(depths[1].wavenumbers, rel=1e-6)
+    assert depths[0].shares == pytest.approx(depths[1].shares, rel=1e-3)
